@@ -1,0 +1,60 @@
+# On a fresh machine with Python >= 3.11 and make: `make run`, `make test`.
+PYTHON ?= $(shell for p in python3.11 python3; do \
+  $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV ?= .venv
+BIN := $(abspath $(VENV))/bin
+RUNTIME := $(VENV)/.installed
+TOOLS := $(VENV)/.installed-tools
+
+.PHONY: run test lint unit slow docs cases wheel bench clean
+
+run: $(RUNTIME)  ## the main case: its error, its run time, its plot
+	mkdir -p results
+	$(BIN)/python -m surfacechem.solvers
+	$(BIN)/surfacechem run exothermic -o results/exothermic.nc
+	$(BIN)/surfacechem plot results/exothermic.nc -o results/exothermic.png
+
+test: lint unit docs cases wheel  ## everything
+
+lint: $(TOOLS)  ## style and types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+unit: $(TOOLS)  ## the tests, without the slow ones
+	$(BIN)/pytest -n 2
+
+slow: $(TOOLS)  ## the slow tests
+	$(BIN)/pytest -n 2 -m slow
+
+docs: $(TOOLS)  ## the documentation, notebooks executed, warnings are errors
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+cases: $(RUNTIME)  ## every case in cases/
+	mkdir -p results
+	ls cases | sed -n 's/\.yaml$$//p' | xargs -P 2 -I{} $(BIN)/surfacechem run {} -o results/{}.nc
+
+wheel: $(TOOLS)  ## the wheel, by itself, in an empty environment and another folder
+	rm -rf dist build/wheel
+	$(BIN)/python -m build --no-isolation
+	$(BIN)/python -m venv build/wheel
+	build/wheel/bin/pip install --quiet dist/*.whl
+	cd build/wheel && bin/surfacechem run exothermic -o exothermic.nc
+
+bench: $(RUNTIME)  ## time against error of every solver
+	mkdir -p results
+	$(BIN)/surfacechem precision -o results/precision.png
+
+clean:  ## all that make has made
+	rm -rf $(VENV) build dist results site
+
+$(VENV)/bin/python:
+	$(or $(PYTHON),$(error No Python >= 3.11 found. Name one: make PYTHON=/path/to/python3.11)) -m venv $(VENV)
+
+$(RUNTIME): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/pip install --quiet --editable .
+	touch $@
+
+$(TOOLS): $(RUNTIME)
+	$(BIN)/pip install --quiet --editable '.[test,docs]'
+	touch $@

@@ -1,0 +1,67 @@
+"""What is built and installed is complete."""
+
+import subprocess
+import sys
+import tarfile
+import zipfile
+from email import message_from_string
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from surfacechem.data import cases, mechanisms
+
+ROOT = Path(__file__).parents[1]
+
+
+def files(folder: str, suffix: str = "") -> set[str]:
+    return {p.relative_to(ROOT).as_posix() for p in (ROOT / folder).rglob(f"*{suffix}") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory):
+    """A source distribution and the wheel built from it."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(dist):
+    (path,) = dist.glob("*.whl")
+    with zipfile.ZipFile(path) as archive:
+        yield archive
+
+
+def test_wheel_holds_the_package_its_cases_and_its_mechanisms(wheel):
+    data = {f"surfacechem/_data/{name}" for name in files("cases") | files("mechanisms")}
+    inside = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    assert inside >= files("surfacechem", ".py") | data
+    assert {name.split("/")[0] for name in inside} == {"surfacechem"}
+
+
+def test_wheel_has_the_command_and_the_license(wheel):
+    info = {name.split(".dist-info/")[1]: name for name in wheel.namelist() if ".dist-info/" in name}
+    assert "surfacechem = surfacechem.cli:app" in wheel.read(info["entry_points.txt"]).decode()
+    assert "licenses/LICENSE" in info
+    assert message_from_string(wheel.read(info["METADATA"]).decode())["Requires-Python"] == ">=3.11"
+
+
+def test_sdist_holds_what_a_rebuild_and_the_tests_need(dist):
+    (path,) = dist.glob("*.tar.gz")
+    with tarfile.open(path) as archive:
+        inside = {name.split("/", 1)[1] for name in archive.getnames()}
+    assert inside >= files("surfacechem", ".py") | files("cases") | files("mechanisms") | files("tests", ".py")
+
+
+def test_cases_and_mechanisms_are_found():
+    assert cases().is_dir()
+    assert mechanisms().is_dir()
+
+
+def test_citation_has_the_version():
+    assert YAML(typ="safe").load(ROOT / "CITATION.cff")["version"] == version("surfacechem")
