@@ -1,0 +1,120 @@
+r"""The balance laws: sites, energy. The only place where equations are formed.
+
+Everything conservative is a derivative of the free energy. For a temperature node with free energy
+:math:`F(T, x)`, where x are bonding variables and gaps,
+
+.. math:: U = F - T F_T, \qquad \dot U = -T F_{TT} \dot T + \sum_x (F_x - T F_{Tx})\,\dot x
+          = \text{mechanical power} + \text{heat},
+
+so the heat of reaction and the thermo-elastic coupling need no formula of their own. The row of the node that carries
+the interface is the sum of the rows of all nodes: exchange fluxes drop out of it by construction, and the mean
+temperature stays exact however large a conductance is.
+
+Source: Sauer, Duong & Mandadapu (2021), sections 3 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import symengine
+
+from surfacechem.expressions import Expression, depends
+
+
+@dataclass
+class Node:
+    """A temperature node: free energy, heat and power that flow in. Rates are per reference area [W/m^2]."""
+
+    name: str
+    T: Expression
+    T_dot: Expression
+    energies: dict[str, Expression] = field(default_factory=dict)
+    """Free energies of the members, by member name: a body's name or 'interface'."""
+    heat: Expression = 0
+    power: Expression = 0
+    prescribed: bool = False
+
+    @property
+    def free_energy(self) -> Expression:
+        """Free energy of the node [J/m^2]."""
+        return sum(self.energies.values(), symengine.Integer(0))
+
+    def capacity(self) -> Expression:
+        """Heat capacity -T F_TT [J/(m^2 K)]; zero where nothing stores heat."""
+        return -self.T * second(self.free_energy, self.T)
+
+
+def internal_energy(F: Expression, T: Expression) -> Expression:
+    """U = F - T F_T."""
+    return F - T * symengine.diff(F, T)
+
+
+def entropy(F: Expression, T: Expression) -> Expression:
+    """S = -F_T."""
+    return -symengine.diff(F, T)
+
+
+def second(F: Expression, T: Expression) -> Expression:
+    """F_TT."""
+    return symengine.diff(symengine.diff(F, T), T)
+
+
+def energy_rate(
+    F: Expression, T: Expression, T_dot: Expression, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]
+) -> Expression:
+    """dU/dt by the chain rule; ``rates`` maps the other variables of F to their time derivatives."""
+    if not isinstance(T, symengine.Symbol):  # no medium: F does not depend on temperature
+        return sum((symengine.diff(F, x) * rate for x, rate in rates.items()), symengine.Integer(0))
+    total = conditioned(-T * second(F, T), about) * T_dot
+    for x, rate in rates.items():
+        total += symengine.diff(internal_energy(F, T), x) * rate
+    return total
+
+
+def conditioned(expression: Expression, about: Mapping[Any, Expression], degree: int = 4) -> Expression:
+    """The same polynomial written in powers of (x - x_0) for each x in ``about``.
+
+    A capacity that nearly vanishes at x_0 would lose all its digits to cancellation as a difference of large terms;
+    in this form the small part is a term of its own. Left alone where it is no polynomial of x.
+    """
+    for x, x_0 in about.items():
+        if not depends(expression, x):
+            continue
+        derivatives = [expression]
+        while depends(derivatives[-1], x) and len(derivatives) <= degree + 1:
+            derivatives.append(symengine.diff(derivatives[-1], x))
+        if depends(derivatives[-1], x):
+            continue
+        expression = _horner([d.subs({x: x_0}) for d in derivatives], x - x_0)
+    return expression
+
+
+def _horner(derivatives: Sequence[Expression], z: Expression) -> Expression:
+    result = derivatives[-1]
+    for order in range(len(derivatives) - 1, 0, -1):
+        result = derivatives[order - 1] + z * result / order
+    return result
+
+
+def site_balance(rate: Expression, variable_dot: Expression, density: Expression, stretch: Expression) -> Expression:
+    """N x_dot = J_c R as a residual scaled by 1/N: bonds per reference area change by the reaction rate."""
+    return variable_dot - stretch * rate / density
+
+
+def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]) -> Expression:
+    """Energy balance of one node as a residual: dU/dt - power - heat."""
+    rate = energy_rate(node.free_energy, node.T, node.T_dot, rates, about)
+    return rate - node.power - node.heat
+
+
+def energy_rows(
+    nodes: Sequence[Node], centre: Node | None, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]
+) -> dict[str, Expression]:
+    """One energy balance per free node; that of ``centre`` is the sum over all of them."""
+    rows = {node.name: node_row(node, rates, about) for node in nodes}
+    if centre is not None:
+        rows[centre.name] = sum(rows.values(), symengine.Integer(0))
+    return rows

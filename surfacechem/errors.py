@@ -1,0 +1,46 @@
+"""Errors a user can act on: place, thing, what is allowed, nearest guess."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in the input something stands: file, line (from 1) and the dotted path of keys."""
+
+    file: str = ""
+    line: int = 0
+    path: str = ""
+
+    def __str__(self) -> str:
+        location = f"{self.file}:{self.line}" if self.line else self.file
+        return ": ".join(part for part in (location, self.path) if part)
+
+
+class SurfacechemError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class InputError(SurfacechemError):
+    """The input is wrong; nothing was computed."""
+
+    def __init__(self, message: str, place: Place | None = None) -> None:
+        self.message = message
+        self.place = place
+        super().__init__(f"{place}: {message}" if place and str(place) else message)
+
+    def at(self, place: Place) -> InputError:
+        """The same error with its place, unless it already knows one."""
+        return self if self.place else type(self)(self.message, place)
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.6)
+    guess = next((n for n in names if close and n.lower() == close[0]), None)
+    hint = f" Did you mean '{guess}'?" if guess else ""
+    return f"{hint} Known: {', '.join(names) or 'none'}."

@@ -1,0 +1,114 @@
+"""Elementary functions that take floats and symbols alike, guarded at their singular ends.
+
+Laws are written with these. Given a float they return a float; given a SymEngine expression they return one that
+SymEngine differentiates exactly and compiles. Every function here keeps its value *and its derivative* finite.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+Expression: TypeAlias = Any
+"""A float or a SymEngine expression."""
+
+EXPONENT_CAP = 300.0
+"""Largest exponent taken literally; above it exp continues as its tangent.
+
+A rate of exp(300) = 2e130 times its prefactor is instantaneous on every time scale a run can resolve, and its square
+is still a finite double, so error norms and matrix factorisations survive it.
+"""
+
+
+def is_symbolic(*values: Expression) -> bool:
+    """Whether any of the values is a symbolic expression."""
+    return any(hasattr(value, "free_symbols") for value in values)
+
+
+def depends(expression: Expression, symbol: Expression) -> bool:
+    """Whether the expression contains the symbol."""
+    return is_symbolic(expression) and symbol in expression.free_symbols
+
+
+def _engine(*values: Expression) -> Any:
+    if is_symbolic(*values):
+        import symengine
+
+        return symengine
+    return math
+
+
+def where(condition: Expression, yes: Expression, no: Expression) -> Expression:
+    """``yes`` where the condition holds, else ``no``."""
+    if isinstance(condition, bool):
+        return yes if condition else no
+    import symengine
+
+    return symengine.Piecewise((yes, condition), (no, True))
+
+
+def exp(x: Expression) -> Expression:
+    """exp(x), continued by its tangent above EXPONENT_CAP."""
+    if not is_symbolic(x):
+        return math.exp(x) if x < EXPONENT_CAP else math.exp(EXPONENT_CAP) * (1 + x - EXPONENT_CAP)
+    if x.is_Number:
+        return exp(float(x))
+    import symengine
+
+    top = math.exp(EXPONENT_CAP)
+    return where(x < EXPONENT_CAP, symengine.exp(x), top * (x + (1 - EXPONENT_CAP)))
+
+
+def expm1(x: Expression) -> Expression:
+    """exp(x) - 1 without cancellation near zero, continued by its tangent above EXPONENT_CAP."""
+    if not is_symbolic(x):
+        return math.expm1(x) if x < EXPONENT_CAP else exp(x)
+    if x.is_Number:
+        return expm1(float(x))
+    import symengine
+
+    # 2 e^(x/2) sinh(x/2) is exact near zero; the outer pieces are where one of its factors would over- or underflow.
+    middle = 2 * symengine.exp(x / 2) * symengine.sinh(x / 2)
+    return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
+
+
+LOGARITHM_FLOOR = 1e-300
+"""Arguments of a logarithm below this count as this, as Cantera does for vanished species."""
+
+
+def log(x: Expression) -> Expression:
+    """Natural logarithm, finite at zero."""
+    if not is_symbolic(x):
+        return math.log(max(x, LOGARITHM_FLOOR))
+    import symengine
+
+    return where(x > LOGARITHM_FLOOR, symengine.log(x), math.log(LOGARITHM_FLOOR))
+
+
+def sqrt(x: Expression) -> Expression:
+    """Square root."""
+    return _engine(x).sqrt(x)
+
+
+def sin(x: Expression) -> Expression:
+    """Sine of an angle in radians."""
+    return _engine(x).sin(x)
+
+
+def sign(x: Expression) -> Expression:
+    """-1, 0 or 1."""
+    if not is_symbolic(x):
+        return math.copysign(1.0, x) if x else 0.0
+    import symengine
+
+    return symengine.Piecewise((1.0, x > 0), (-1.0, x < 0), (0.0, True))
+
+
+def absolute(x: Expression) -> Expression:
+    """|x|."""
+    return where(x < 0, -x, x)
+
+
+def positive(x: Expression) -> Expression:
+    """The positive part of x."""
+    return where(x > 0, x, 0.0 * x)

@@ -1,0 +1,51 @@
+"""The laws, one family a module. A law is found by the contract it fulfils and its name; nothing else is imported."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Iterator
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.terms import (
+    BodyEnergy,
+    Factor,
+    Friction,
+    HeatTransfer,
+    Law,
+    Load,
+    Potential,
+    RateLaw,
+)
+
+FAMILIES: dict[type[Law], tuple[str, ...]] = {
+    BodyEnergy: ("bulk",),
+    Potential: ("bonding", "contact"),
+    RateLaw: ("kinetics",),
+    Friction: ("friction",),
+    HeatTransfer: ("heat",),
+    Load: ("loading",),
+    Factor: ("factors",),
+}
+"""The modules in which the laws of a contract stand."""
+
+
+def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
+    module = importlib.import_module(f"{__name__}.{family}")
+    for value in vars(module).values():
+        if inspect.isclass(value) and issubclass(value, contract) and value.__module__ == module.__name__:
+            yield value
+
+
+def laws(contract: type[Law]) -> dict[str, type[Law]]:
+    """All laws that fulfil a contract, by name."""
+    return {law.name(): law for family in FAMILIES[contract] for law in _in_module(contract, family)}
+
+
+def find(contract: type[Law], name: str) -> type[Law]:
+    """The law of that name; imports no family beyond the one that holds it."""
+    for family in FAMILIES[contract]:
+        for law in _in_module(contract, family):
+            if law.name() == name:
+                return law
+    raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract))}")

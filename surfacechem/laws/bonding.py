@@ -1,0 +1,74 @@
+"""Chemical part of the interface's free energy: bond energy, linear enthalpy, lattice gas."""
+
+from __future__ import annotations
+
+from surfacechem.expressions import Expression, log
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.terms import Potential, parameter
+
+
+class BondEnergy(Potential):
+    r"""Quadratic bond energy around an equilibrium bonding state.
+
+    .. math:: \Psi = \tfrac12 K (\phi - \phi_{eq})^2, \quad K = K_0 + K_1 \frac{T}{T_0} + K_2 \frac{T^2}{T_0^2}
+
+    :math:`K_0` releases heat on bonding, :math:`K_2` absorbs it, :math:`K_1` is purely entropic. Each coefficient and
+    :math:`\phi_{eq}` may vary with the other variables through factors.
+
+    Source: Sauer, Duong & Mandadapu (2021), eqs. e:phieq and e:Psi_bt. Any phi; the capacity it takes from the
+    interface, :math:`K_2 (\phi - \phi_{eq})^2 T / T_0^2` for constant :math:`\phi_{eq}`, must leave a positive rest.
+
+    >>> BondEnergy(K_0=300.0).energy(phi=0.5, T_c=300.0, T_0=300.0)
+    37.5
+    """
+
+    K_0: float = parameter("J/m^2", "temperature-independent part of the bond energy density", default=0.0)
+    K_1: float = parameter("J/m^2", "linear (entropic) part of the bond energy density", default=0.0)
+    K_2: float = parameter("J/m^2", "quadratic part of the bond energy density", default=0.0)
+    phi_eq: float = parameter("1", "equilibrium bonding state", default=1.0)
+    K: float = parameter("1", "common factor of all coefficients", default=1.0)
+
+    def energy(self, phi: Expression, T_c: Expression, T_0: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        ratio = T_c / T_0
+        stiffness = self.K * (self.K_0 + self.K_1 * ratio + self.K_2 * ratio**2)
+        return stiffness * (phi - self.phi_eq) ** 2 / 2
+
+
+class LinearEnthalpy(Potential):
+    r"""Constant heat of reaction: bonding releases H_r per unit of phi.
+
+    .. math:: \Psi = H_r (1 - \phi), \quad M = -H_r
+
+    A forward reaction only: the chemical potential never changes sign. Source: classical; the limit of constant bond
+    enthalpy used for cure kinetics.
+
+    >>> LinearEnthalpy(H_r=200.0).energy(phi=0.25)
+    150.0
+    """
+
+    H_r: float = parameter("J/m^2", "heat released by complete bonding")
+
+    def energy(self, phi: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.H_r * (1 - phi)
+
+
+class LatticeGas(Potential):
+    r"""Ideal mixing of bonded and free sites with a constant bond energy.
+
+    .. math:: \Psi = N_c \{ -\varepsilon \phi + k_B T [ \phi \ln \phi + (1 - \phi) \ln (1 - \phi) ] \}
+
+    The natural partner of mass-action kinetics; it has no heat capacity. Source: statistical mechanics of the ideal
+    lattice gas (e.g. Hill, An Introduction to Statistical Thermodynamics, 1960, ch. 7). 0 < phi < 1.
+
+    >>> LatticeGas(epsilon=6e-20).energy(phi=0.5, T_c=300.0, N_c=1e16)
+    -0.00032870...
+    """
+
+    epsilon: float = parameter("J", "energy released per bond")
+
+    def energy(self, phi: Expression, T_c: Expression, N_c: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        mixing = phi * log(phi) + (1 - phi) * log(1 - phi)
+        return N_c * (BOLTZMANN * T_c * mixing - self.epsilon * phi)

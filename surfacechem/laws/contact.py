@@ -1,0 +1,80 @@
+"""Mechanical and thermal part of the interface's free energy: elastic contact, interface capacity."""
+
+from __future__ import annotations
+
+from surfacechem.expressions import Expression, log
+from surfacechem.terms import Potential, parameter
+
+
+class NormalStiffness(Potential):
+    r"""Linear elastic contact normal to the interface, in tension and in compression.
+
+    .. math:: \Psi = \tfrac12 E_n g_n^2, \quad t_n = E_n g_n
+
+    :math:`E_n` may vary with temperature and bonding state; the thermo-elastic and chemical terms follow.
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any g_n.
+
+    >>> NormalStiffness(E_n=1e12).energy(g_n=1e-6)
+    0.5
+    """
+
+    E_n: float = parameter("Pa/m", "normal contact stiffness", at_least=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.E_n * g_n**2 / 2
+
+
+class TangentialStiffness(Potential):
+    r"""Linear elastic contact along the interface.
+
+    .. math:: \Psi = \tfrac12 E_t g_t^2, \quad t_t = E_t g_t
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any g_t.
+
+    >>> TangentialStiffness(E_t=1e12).energy(g_t=1e-6)
+    0.5
+    """
+
+    E_t: float = parameter("Pa/m", "tangential contact stiffness", at_least=0)
+
+    def energy(self, g_t: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.E_t * g_t**2 / 2
+
+
+class InterfaceCapacity(Potential):
+    r"""Heat capacity of the interface, of trapped wear debris or a film for instance.
+
+    .. math:: \Psi = -\frac{C_c}{2 T_0} (T_c - T_0)^2, \quad S = C_c (T_c / T_0 - 1)
+
+    The capacity at T is :math:`C_c T / T_0`. :math:`C_c` may vary with gap and bonding state.
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. T > 0.
+
+    >>> InterfaceCapacity(C_c=50.0).energy(T_c=330.0, T_0=300.0)
+    -75.0
+    """
+
+    C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface at T_0", above=0)
+
+    def energy(self, T_c: Expression, T_0: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return -self.C_c / (2 * T_0) * (T_c - T_0) ** 2
+
+
+class ConstantInterfaceCapacity(Potential):
+    r"""Temperature-independent heat capacity of the interface.
+
+    .. math:: \Psi = C_c\,[\,T_c - T_0 - T_c \ln(T_c/T_0)\,], \quad S = C_c \ln(T_c/T_0)
+
+    Source: classical thermodynamics. T > 0.
+
+    >>> round(ConstantInterfaceCapacity(C_c=50.0).energy(T_c=330.0, T_0=300.0), 6)
+    -72.617967
+    """
+
+    C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface", above=0)
+
+    def energy(self, T_c: Expression, T_0: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.C_c * (T_c - T_0 - T_c * log(T_c / T_0))

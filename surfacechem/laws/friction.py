@@ -1,0 +1,45 @@
+"""Sliding friction: Coulomb, viscous film."""
+
+from __future__ import annotations
+
+from surfacechem.expressions import Expression, sign
+from surfacechem.terms import Friction, parameter
+
+
+class Coulomb(Friction):
+    r"""Amontons-Coulomb dry friction.
+
+    .. math:: t_t = \mu\,p\,\mathrm{sgn}(v)
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`.
+
+    >>> Coulomb(mu=0.3).traction(p=1e5, v=0.02)
+    30000.0
+    """
+
+    mu: float = parameter("1", "sliding friction coefficient", at_least=0)
+
+    def traction(self, p: Expression, v: Expression) -> Expression:
+        """Tangential traction [Pa]."""
+        return self.mu * p * sign(v)
+
+
+class Viscous(Friction):
+    r"""Newtonian film that fills the gap.
+
+    .. math:: t_t = \eta\,v / g_n
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric (with eta in Pa s). Any v; g_n > 0.
+    Dissipates :math:`t_t v \ge 0`.
+
+    >>> Viscous(eta=0.5).traction(g_n=1e-6, v=0.25)
+    125000.0
+    """
+
+    positive = ("g_n",)
+
+    eta: float = parameter("Pa s", "film viscosity", at_least=0)
+
+    def traction(self, g_n: Expression, v: Expression) -> Expression:
+        """Tangential traction [Pa]."""
+        return self.eta * v / g_n

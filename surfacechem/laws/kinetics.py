@@ -1,0 +1,91 @@
+"""Bonding kinetics: linear affinity, exponential affinity, relaxation, Arrhenius."""
+
+from __future__ import annotations
+
+from surfacechem.expressions import Expression, exp, expm1
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
+from surfacechem.terms import RateLaw, parameter
+
+
+class LinearAffinity(RateLaw):
+    r"""Rate proportional to the chemical potential per bond.
+
+    .. math:: R = -n_c c_r \mu, \quad \dot\phi = -c_r \mu = -c_r M / N_c
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:R with :math:`C_r = n_c c_r`. Always admissible for c_r >= 0.
+
+    >>> round(LinearAffinity(c_r=4.0).rate(mu=-0.5, n_c=3.0), 12)
+    6.0
+    """
+
+    c_r: float = parameter("1/(J s)", "rate constant per bond", at_least=0)
+
+    def rate(self, mu: Expression, n_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        return -n_c * self.c_r * mu
+
+
+class ExponentialAffinity(RateLaw):
+    r"""Rate exponential in the chemical potential per bond.
+
+    .. math:: R = C_r k_B T_c \left( 1 - e^{\mu / k_B T_c} \right)
+
+    Source: Sauer, Duong & Mandadapu (2021), the equation after e:R, with the Boltzmann constant because mu is an energy
+    per bond. Always admissible for C_r >= 0; tends to the linear law for small mu. Exponents above 300 count as an
+    instantaneous reaction.
+
+    >>> ExponentialAffinity(C_r=2.5e38).rate(mu=-1e-19, T_c=310.0)
+    1.070002974...e+18
+    """
+
+    C_r: float = parameter("1/(J s m^2)", "rate constant per area", at_least=0)
+
+    def rate(self, mu: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        thermal = BOLTZMANN * T_c
+        return -self.C_r * thermal * expm1(mu / thermal)
+
+
+class Relaxation(RateLaw):
+    r"""Relaxation to chemical equilibrium on a constant time scale.
+
+    .. math:: R = -\frac{n_c}{\tau} \frac{\mu}{\partial \mu / \partial \phi}
+
+    With a quadratic bond energy :math:`\dot\phi = (\phi_{eq} - \phi) / \tau` at any temperature: the linear law with
+    :math:`c_r = n_c / (\tau K(T))`. Source: Sauer, Duong & Mandadapu (2021), eq. e:dphi_ex with constant tau.
+    Admissible while the potential is convex in phi.
+
+    >>> Relaxation(tau=0.5).rate(mu=-0.5, dmu_dphi=0.25, n_c=3.0)
+    12.0
+    """
+
+    positive = ("dmu_dphi",)
+
+    tau: float = parameter("s", "relaxation time", above=0)
+
+    def rate(self, mu: Expression, dmu_dphi: Expression, n_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        return -n_c / self.tau * mu / dmu_dphi
+
+
+class Arrhenius(RateLaw):
+    r"""Thermally activated forward reaction.
+
+    .. math:: R = n_c A \left(\frac{T_c}{T_0}\right)^b e^{-E_a / R_g T_c} (1 - \phi)^n
+
+    Source: Arrhenius (1889), doi 10.1515/zpch-1889-0416; modified form as in Cantera. phi <= 1. Admissible while
+    mu <= 0: it has no reverse, so pair it with a potential that keeps falling as bonds form.
+
+    >>> Arrhenius(A=2.0).rate(phi=0.5, n_c=1e18, T_c=300.0, T_0=300.0)
+    1e+18
+    """
+
+    A: float = parameter("1/s", "pre-exponential factor", at_least=0)
+    E_a: float = parameter("J/mol", "activation energy", default=0.0)
+    b: float = parameter("1", "temperature exponent", default=0.0)
+    n: float = parameter("1", "reaction order", default=1.0, above=0)
+
+    def rate(self, phi: Expression, n_c: Expression, T_c: Expression, T_0: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        k = self.A * (T_c / T_0) ** self.b * exp(-self.E_a / (GAS_CONSTANT * T_c))
+        return n_c * k * (1 - phi) ** self.n

@@ -1,0 +1,56 @@
+r"""The table of quantities: symbol, unit, long name, equation tag.
+
+Every name that a law may read or a dataset may hold stands here once. Quantities are per unit reference area and in
+SI units; temperatures are absolute. Sign conventions: the gap is :math:`g = x_2 - x_1`, the traction acts on body 1
+(tension positive), :math:`q_k` flows from the interface into body k.
+
+Source of tags: the equation labels of Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+BOLTZMANN = 1.380649e-23
+"""Boltzmann constant [J/K] (exact, SI 2019)."""
+
+GAS_CONSTANT = 8.31446261815324
+"""Molar gas constant [J/(mol K)] (exact, SI 2019)."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named quantity: SI unit, long name, LaTeX symbol and the tag of its equation in the paper."""
+
+    name: str
+    unit: str
+    long_name: str
+    latex: str = ""
+    tag: str = ""
+
+
+def _table(*rows: tuple[str, ...]) -> dict[str, Quantity]:
+    return {row[0]: Quantity(*row) for row in rows}
+
+
+VARIABLES = _table(
+    ("t", "s", "time", "t"),
+    ("T_0", "K", "reference temperature", "T_0"),
+    ("T_1", "K", "temperature of body 1", "T_1"),
+    ("T_2", "K", "temperature of body 2", "T_2"),
+    ("T_c", "K", "interface temperature", "T_c"),
+    ("T_a", "K", "temperature of the surroundings", "T_a"),
+    ("phi", "1", "bonding state: bonded sites per reference site", r"\phi", "e:phi_def"),
+    ("g_n", "m", "normal gap", "g_n"),
+    ("g_t", "m", "elastic tangential gap", "g_t"),
+    ("v", "m/s", "sliding velocity of body 2 relative to body 1", "v"),
+    ("p", "Pa", "contact pressure", "p"),
+    ("J_c", "1", "area stretch of the reference surface", "J_c"),
+    ("Q_1", "W/m^2", "external heat supplied to body 1", "Q_1"),
+    ("Q_2", "W/m^2", "external heat supplied to body 2", "Q_2"),
+    ("Q_c", "W/m^2", "external heat supplied to the interface", "Q_c"),
+    ("n_c", "1/m^2", "current density of reference bonding sites", "n_c"),
+    ("mu", "J", "chemical potential change of the reaction per bond", r"\mu_c", "e:muc"),
+    ("dmu_dphi", "J", "derivative of the chemical potential per bond with respect to the bonding state"),
+)
+"""What laws may read. Temperatures of bodies and interface resolve to the node that carries them."""

@@ -1,0 +1,94 @@
+"""A scene: two bodies, the interface between them, heat paths, loading and initial values. Plain data, SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from surfacechem.errors import InputError, Place
+from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw
+
+
+@dataclass(frozen=True)
+class Body:
+    """One of the two bodies.
+
+    ``temperature`` is the name of the temperature node that the body belongs to, or a prescribed history; bodies and
+    interface that share a node are in perfect thermal contact. Without ``energy`` it is a reservoir.
+    """
+
+    name: str
+    temperature: str | Load
+    energy: BodyEnergy | None = None
+
+
+@dataclass(frozen=True)
+class Sites:
+    """Bonding site densities [1/m^2] of the undeformed surfaces; the reference side defines phi = n_b / n_c."""
+
+    density_1: float
+    density_2: float
+    reference: int = 1
+
+    def __post_init__(self) -> None:
+        """Densities are positive and the reference side exists."""
+        if not (self.density_1 > 0 and self.density_2 > 0):
+            raise InputError("site densities must be positive.")
+        if self.reference not in (1, 2):
+            raise InputError(f"the reference side is 1 or 2, not {self.reference}.")
+
+    @property
+    def density(self) -> float:
+        """Reference density N_c [1/m^2]."""
+        return self.density_1 if self.reference == 1 else self.density_2
+
+    @property
+    def phi_max(self) -> float:
+        """Largest possible bonding state: min(n_1, n_2) / n_c."""
+        return min(self.density_1, self.density_2) / self.density
+
+
+@dataclass(frozen=True)
+class BondingVariable:
+    """A bonding variable beside phi, a coverage of a mechanism for instance.
+
+    ``density`` is the amount per reference area [1/m^2] at which the variable is one.
+    """
+
+    name: str
+    density: float
+    long_name: str = ""
+
+
+@dataclass(frozen=True)
+class Interface:
+    """What stands between the bodies.
+
+    ``temperature`` is the interface's node, a prescribed history, or None where there is no medium: then friction and
+    reaction heat go straight into the bodies, the fraction ``partition`` into body 1.
+    """
+
+    temperature: str | Load | None = None
+    potentials: Sequence[Potential] = ()
+    frictions: Sequence[Friction] = ()
+    reactions: Sequence[RateLaw] = ()
+    sites: Sites | None = None
+    partition: float = 0.5
+    variables: Sequence[BondingVariable] = ()
+    bonds: Sequence[str] = ()
+    """Names of those variables that count as bonds where phi is not itself a state."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is computed, and nothing else."""
+
+    bodies: tuple[Body, Body]
+    interface: Interface
+    heat: Sequence[HeatTransfer] = ()
+    loading: Mapping[str, Load] = field(default_factory=dict)
+    surroundings: Load | None = None
+    T_0: float | None = None
+    initial: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict)
+    """Place in the case file of each path, for error messages."""

@@ -1,0 +1,150 @@
+"""The assembled scene: states, equations, ledgers, margins and named quantities as one graph of expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import symengine
+
+from surfacechem.expressions import Expression
+from surfacechem.quantities import Quantity
+from surfacechem.terms import Load, Spec
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A run-time number of the compiled scene: a field of a law, or a local field of a history."""
+
+    symbol: Any
+    path: str
+    spec: Spec
+    value: float
+    load: Load | None = None
+    """The history whose pieces change the value, if any."""
+    field: str = ""
+
+    def at(self, start: float) -> float:
+        """Value on the piece of time that begins at ``start`` [s]."""
+        return self.load.piece(start)[self.field] if self.load else self.value
+
+
+@dataclass(frozen=True)
+class State:
+    """A variable that the run solves for: evolved by a balance, or algebraic where that has no capacity."""
+
+    quantity: Quantity
+    symbol: Any
+    dot: Any
+    initial: float
+    scale: float
+    algebraic: bool
+
+    @property
+    def name(self) -> str:
+        """Name in the dataset."""
+        return self.quantity.name
+
+
+@dataclass(frozen=True)
+class Named:
+    """A named quantity; its expression may use the names of earlier ones."""
+
+    quantity: Quantity
+    expression: Expression
+    output: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name in the dataset and in the printed source."""
+        return self.quantity.name
+
+
+@dataclass(frozen=True)
+class Account:
+    """A line of the ledger, integrated beside the state.
+
+    ``kind`` is 'energy supply', 'entropy supply' or 'entropy production'; ``law`` names what produces it.
+    """
+
+    quantity: Quantity
+    rate: Expression
+    kind: str
+    law: str = ""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Something that must stay positive. Where it crosses zero the run ends, or restarts if it is only a kink."""
+
+    name: str
+    expression: Expression
+    reason: str
+    terminal: bool = True
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
+
+    variable: str
+    role: str
+    by: str
+
+
+@dataclass(frozen=True)
+class System:
+    """States, equations and everything that is read off them.
+
+    The equations are G(t, y, dy/dt; p) = 0, linear in dy/dt; ``rows`` names them. ``energy`` and ``entropy`` are the
+    totals whose changes the ledger must explain.
+    """
+
+    t: Any
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...]
+    named: tuple[Named, ...]
+    rows: Mapping[str, Expression]
+    ledger: tuple[Account, ...]
+    margins: tuple[Margin, ...]
+    roles: tuple[Role, ...]
+    regime: str
+    breakpoints: tuple[float, ...]
+    warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def definitions(self) -> dict[Any, Expression]:
+        """Every name with its expression in t, states, derivatives and parameters only."""
+        result: dict[Any, Expression] = {}
+        for item in self.named:
+            result[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(result)
+        return result
+
+    def expand(self, expression: Expression) -> Expression:
+        """The expression in t, states, derivatives and parameters only."""
+        return symengine.sympify(expression).subs(self.definitions)
+
+    @property
+    def inputs(self) -> list[Any]:
+        """Arguments of every compiled function: t, states, derivatives, parameters."""
+        states = [state.symbol for state in self.states] + [state.dot for state in self.states]
+        return [self.t, *states, *(parameter.symbol for parameter in self.parameters)]
+
+    @cached_property
+    def outputs(self) -> tuple[Named, ...]:
+        """The named quantities that go into the dataset."""
+        return tuple(item for item in self.named if item.output)
+
+    def residual(self) -> list[Expression]:
+        """The equations, expanded, in the order of the rows."""
+        return [self.expand(row) for row in self.rows.values()]
+
+    def find(self, name: str) -> Named:
+        """The named quantity of that name."""
+        return next(item for item in self.named if item.name == name)
+
+    def segment_parameters(self, starts: Sequence[float]) -> list[list[float]]:
+        """A parameter vector for each piece of time."""
+        return [[parameter.at(start) for parameter in self.parameters] for start in starts]

@@ -1,0 +1,241 @@
+"""Contracts: what a law states and what it may read.
+
+A law is one class. Its parameters are its fields, its YAML name is its class name in kebab-case, and its method states
+the one formula; the argument names of the method say which quantities it reads. Everything else about it (schema,
+listing, documentation, generic tests) is read off the class.
+
+=================  ==================================================  ===========================
+contract           states                                              audited for
+=================  ==================================================  ===========================
+:class:`Potential`     free energy; all conservative quantities follow     capacity > 0
+:class:`BodyEnergy`    free energy of a body as a function of T            capacity > 0
+:class:`Friction`      traction that opposes sliding                       traction * v >= 0
+:class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
+:class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
+:class:`Load`          prescribed history of a variable                    --
+:class:`Factor`        how a parameter varies with one variable            --
+=================  ==================================================  ===========================
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import inspect
+import math
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self, dataclass_transform
+
+from surfacechem.errors import InputError, Place
+from surfacechem.expressions import Expression
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What a parameter is: unit ("[x]" stands for the unit of the loaded quantity), meaning and allowed range."""
+
+    unit: str
+    text: str
+    above: float = -math.inf
+    at_least: float = -math.inf
+    at_most: float = math.inf
+    varies: bool = True
+
+    def check(self, name: str, value: float) -> None:
+        """Raise InputError unless the value is finite and in range."""
+        if not math.isfinite(value):
+            raise InputError(f"{name} must be finite, got {value}.")
+        if value <= self.above or value < self.at_least or value > self.at_most:
+            raise InputError(f"{name} = {value:g} is outside its range: {self.range}.")
+
+    @property
+    def range(self) -> str:
+        """The allowed range in words."""
+        bounds = (("> ", self.above), (">= ", self.at_least), ("<= ", self.at_most))
+        return " and ".join(f"{sign}{bound:g}" for sign, bound in bounds if math.isfinite(bound)) or "any"
+
+
+def parameter(
+    unit: str,
+    text: str,
+    *,
+    default: Any = dataclasses.MISSING,
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+    varies: bool = True,
+) -> Any:
+    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors."""
+    spec = Spec(unit, text, above, at_least, at_most, varies)
+    return field(default=default, metadata={"spec": spec})
+
+
+def option(text: str, *, default: Any = dataclasses.MISSING) -> Any:
+    """A structural field of a law: a name or a list, not a number that a sweep may change."""
+    return field(default=default, metadata={"option": text})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law(ABC):
+    """A named law with parameters as fields. Subclasses become frozen, keyword-only dataclasses."""
+
+    contract: ClassVar[str] = "law"
+    positive: ClassVar[tuple[str, ...]] = ()
+    """Variables that must stay above zero for the law to hold."""
+
+    place: Place | None = field(default=None, repr=False)
+    """Where the law stands in its case file; None for laws built in Python."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+    def __post_init__(self) -> None:
+        """Check every numeric parameter against its range."""
+        for name, spec in self.specs():
+            value = getattr(self, name)
+            if isinstance(value, Varying):
+                spec.check(name, value.value)
+            elif isinstance(value, int | float):
+                spec.check(name, value)
+
+    @classmethod
+    def name(cls) -> str:
+        """The name of the law in a case file."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
+
+    @property
+    def path(self) -> str:
+        """Dotted path of the law in its case file, else its name."""
+        return self.place.path if self.place else self.name()
+
+    @property
+    def label(self) -> str:
+        """Short name for the quantities that belong to this law."""
+        return self.name().replace("-", "_")
+
+    @property
+    def title(self) -> str:
+        """The law in words."""
+        return self.name().replace("-", " ")
+
+    @classmethod
+    def specs(cls) -> Iterator[tuple[str, Spec]]:
+        """Names and specifications of the numeric parameters."""
+        for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+            if "spec" in item.metadata:
+                yield item.name, item.metadata["spec"]
+
+    @classmethod
+    def options(cls) -> Iterator[tuple[str, str]]:
+        """Names and meanings of the structural fields."""
+        for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+            if "option" in item.metadata:
+                yield item.name, item.metadata["option"]
+
+    def is_default(self, name: str) -> bool:
+        """Whether a parameter was left at its default, so that it is a constant of the formula."""
+        default = next(item.default for item in dataclasses.fields(self) if item.name == name)  # type: ignore[arg-type]
+        return bool(getattr(self, name) == default)
+
+    def bind(self, values: Mapping[str, Expression]) -> Self:
+        """The same law with some of its parameters replaced, by symbols for instance; nothing is checked."""
+        bound = copy.copy(self)
+        for name, value in values.items():
+            object.__setattr__(bound, name, value)
+        return bound
+
+
+@dataclass(frozen=True)
+class Varying:
+    """A parameter that depends on variables: a value at the reference state times factors."""
+
+    value: float
+    factors: tuple[Factor, ...]
+
+
+def reads(formula: Callable[..., Expression]) -> tuple[str, ...]:
+    """The quantities a law's formula reads: the names of its arguments."""
+    return tuple(inspect.signature(formula).parameters)
+
+
+class Factor(Law):
+    """How a parameter varies with one variable; multiplies the parameter's value."""
+
+    contract = "factor"
+
+    of: str = option("variable it depends on", default="T_c")
+
+    factor: ClassVar[Callable[..., Expression]]
+
+
+class Potential(Law):
+    """A term of the interface's Helmholtz free energy per unit reference area [J/m^2]."""
+
+    contract = "potential"
+
+    energy: ClassVar[Callable[..., Expression]]
+
+
+class BodyEnergy(Law):
+    """Helmholtz free energy of a body per unit reference area [J/m^2] as a function of its temperature."""
+
+    contract = "capacity"
+
+    @abstractmethod
+    def energy(self, T: Expression, T_0: Expression) -> Expression:
+        """Free energy [J/m^2] at T [K]."""
+
+
+class Friction(Law):
+    """Tangential traction [Pa] in the direction of sliding; dissipates traction * v >= 0."""
+
+    contract = "friction"
+
+    traction: ClassVar[Callable[..., Expression]]
+
+
+class RateLaw(Law):
+    """Net rate [1/(m^2 s)] of a reaction per unit current area; dissipates -mu * rate >= 0."""
+
+    contract = "bonding"
+
+    rate: ClassVar[Callable[..., Expression]]
+
+    def stoichiometry(self) -> Mapping[str, int | float]:
+        """Change of each bonding variable, in its own amounts, per unit of reaction."""
+        return {"phi": 1}
+
+
+class HeatTransfer(Law):
+    """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold."""
+
+    contract = "heat"
+
+    between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
+    conductance: ClassVar[Callable[..., Expression]]
+
+
+class Load(Law):
+    """Prescribed history of a variable."""
+
+    contract = "loading"
+
+    local: ClassVar[dict[str, str]] = {}
+    """Names and units of fields whose values change from one piece of the history to the next."""
+
+    @abstractmethod
+    def value(self, t: Expression) -> Expression:
+        """Value at time t [s]."""
+
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times [s] at which the history or its slope jumps."""
+        return ()
+
+    def piece(self, start: float) -> Mapping[str, float]:
+        """Values of the local fields on the piece that begins at time ``start`` [s]."""
+        return {}

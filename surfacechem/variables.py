@@ -1,0 +1,137 @@
+"""Symbols of a scene: parameters of laws, variables and their roles. A law gets what its formula asks for by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeVar
+
+import symengine
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import Expression
+from surfacechem.quantities import VARIABLES
+from surfacechem.system import Parameter, Role
+from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads
+
+L = TypeVar("L", bound=Law)
+
+REMEDIES = {
+    "g_n": "Prescribe `g_n` under `loading`.",
+    "g_t": "Prescribe `g_t` under `loading`.",
+    "v": "Prescribe `v` under `loading`.",
+    "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
+    "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
+    "T_0": "Give the reference temperature `T_0` at the top of the case.",
+    "T_c": "Give `interface.temperature`, or both bodies a temperature.",
+    "N_c": "Give `interface.sites`.",
+    "n_c": "Give `interface.sites`.",
+    "mu": "Give `interface.sites` and a potential that reads the bonding state.",
+}
+
+
+class Parameters:
+    """The run-time numbers, each with a short name that is unique in the scene."""
+
+    def __init__(self, reserved: Iterable[str] = ()) -> None:
+        self.items: list[Parameter] = []
+        self._taken = {*VARIABLES, *reserved}
+
+    def add(
+        self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
+    ) -> Expression:
+        """A new parameter of a law as a symbol; its name gives way to names that are taken."""
+        return self._append(Parameter(symengine.Symbol(self._unique(name, path)), path, spec, value, load, field))
+
+    def constant(self, name: str, path: str, spec: Spec, value: float) -> Expression:
+        """A scene-level number under exactly this name."""
+        self._taken.add(name)
+        return self._append(Parameter(symengine.Symbol(name), path, spec, value))
+
+    def _append(self, parameter: Parameter) -> Expression:
+        self.items.append(parameter)
+        return parameter.symbol
+
+    def _unique(self, name: str, path: str) -> str:
+        owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
+        candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
+        numbered = (f"{name}_{i}" for i in range(2, 1000))
+        free = next(c for c in (*candidates, *numbered) if c not in self._taken)
+        self._taken.add(free)
+        return free
+
+
+class Variables:
+    """What formulas may read. A definition is made when it is first read, so what nobody reads is not there."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.roles: list[Role] = []
+        self._makers: dict[str, Callable[[], Expression]] = {}
+        self._symbols: dict[str, Expression] = {}
+
+    def define(self, name: str, make: Callable[[], Expression], role: str, by: str) -> None:
+        """Give a name its role and the way to make its expression; a second role is an error."""
+        taken = next((r for r in self.roles if r.variable == name), None)
+        if taken is not None:
+            raise InputError(f"{name} has two roles: {taken.role} ({taken.by}) and {role} ({by}). Remove one of them.")
+        self._makers[name] = make
+        self.roles.append(Role(name, role, by))
+
+    def has(self, name: str) -> bool:
+        """Whether the name has a role."""
+        return name in self._makers
+
+    def was_read(self, name: str) -> bool:
+        """Whether anything asked for the name so far."""
+        return name in self._symbols
+
+    def get(self, name: str, reader: str | Law) -> Expression:
+        """The expression of a name for a law, or something else in words, that reads it."""
+        if name not in self._symbols:
+            if name not in self._makers:
+                raise self._missing(name, reader)
+            self._symbols[name] = self._makers[name]()
+        return self._symbols[name]
+
+    def _missing(self, name: str, reader: str | Law) -> InputError:
+        who = f"the law {reader.name()}" if isinstance(reader, Law) else reader
+        remedy = REMEDIES.get(name, suggestion(name, self._makers).strip())
+        message = f"{who} reads {self._described(name)}, but nothing evolves or prescribes it. {remedy}"
+        return InputError(message, reader.place if isinstance(reader, Law) else None)
+
+    def _described(self, name: str) -> str:
+        return f"the {VARIABLES[name].long_name} {name}" if name in VARIABLES else f"the variable {name}"
+
+    def call(
+        self, law: Law, formula: Callable[..., Expression], extra: Mapping[str, Expression] | None = None
+    ) -> Expression:
+        """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables."""
+        own = extra or {}
+        return formula(**{name: own[name] if name in own else self.get(name, law) for name in reads(formula)})
+
+    def bind(self, law: L, suffix: str = "") -> L:
+        """The law with every numeric parameter replaced by its symbol, times its factors where it varies."""
+        values: dict[str, Expression] = {}
+        for name, spec in law.specs():
+            values[name] = self._parameter(law, name, spec, suffix)
+        if isinstance(law, Load):
+            for name, unit in law.local.items():
+                spec = Spec(unit, f"{name} of the present piece")
+                values[name] = self.parameters.add(name, f"{law.path}.{name}", spec, 0.0, law, name)
+        return law.bind(values)
+
+    def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
+        value = getattr(law, name)
+        path = f"{law.path}.{name}"
+        if isinstance(value, Varying):
+            symbol = self.parameters.add(name + suffix, path, spec, value.value)
+            for factor in value.factors:
+                symbol *= self._factor(self.bind(factor))
+            return symbol
+        if law.is_default(name):
+            return int(value) if float(value).is_integer() else value
+        return self.parameters.add(name + suffix, path, spec, value)
+
+    def _factor(self, factor: Factor) -> Expression:
+        sources = {argument: factor.of if argument == "x" else argument for argument in reads(factor.factor)}
+        return factor.factor(**{argument: self.get(source, factor) for argument, source in sources.items()})
