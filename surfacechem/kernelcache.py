@@ -1,0 +1,92 @@
+"""The folder that keeps the compiled stepper, and compiling with or without it.
+
+The folder's name holds a digest of the kernel's sources, the versions of Numba and Python and the processor, so that code is never
+reused where it does not fit. A cache that cannot be written or read costs compile time, never a result.
+"""
+
+import hashlib
+import os
+import platform
+import shutil
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+
+def cache_root() -> Path:
+    """SURFACECHEM_CACHE, else NUMBA_CACHE_DIR, else the user's cache folder."""
+    for variable in ("SURFACECHEM_CACHE", "NUMBA_CACHE_DIR"):
+        if os.environ.get(variable):
+            return Path(os.environ[variable])
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "surfacechem"
+
+
+def _processor() -> str:
+    """Name of the processor; where it is not told, the instruction sets Numba finds still guard the machine code."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            return next(line for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()
+
+
+def kernel_folder(sources: Sequence[Path]) -> Path:
+    digest = hashlib.sha256()
+    for text in (version("numba"), sys.version, platform.machine(), _processor()):
+        digest.update(text.encode())
+    for source in sources:
+        digest.update(source.read_bytes())
+    return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
+
+
+def is_filled(folder: Path) -> bool:
+    return any(folder.glob("**/*.nbc"))
+
+
+def _writable(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
+def _compile_cached(function: Callable[..., None], signature: Any, folder: Path) -> Any:
+    """Compile or load through Numba's cache in this folder, without changing the folder of anybody else's functions."""
+    import numba
+
+    _writable(folder)
+    usual = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = usual
+
+
+def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) -> Any:
+    """The compiled function, from the cache if it is sound, else compiled anew, else compiled without a cache."""
+    import numba
+
+    try:
+        return _compile_cached(function, signature, folder)
+    except OSError as error:
+        problem = error
+    except Exception:  # noqa: BLE001 - unpickling damaged files can raise anything.
+        if not is_filled(folder):
+            raise
+        shutil.rmtree(folder, ignore_errors=True)
+        try:
+            return _compile_cached(function, signature, folder)
+        except OSError as error:
+            problem = error
+    warnings.warn(
+        f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process.", stacklevel=2
+    )
+    return numba.njit(signature, nogil=True, error_model="numpy")(function)

@@ -1,0 +1,1 @@
+"""Solvers by name; each is imported when it is asked for."""

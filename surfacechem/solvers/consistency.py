@@ -1,0 +1,121 @@
+"""Consistent states: the derivatives of the differential variables and the values of the algebraic ones from G(t, y, ydot) = 0.
+
+The unknowns enter one damped Newton iteration whose matrix has the column of G_ydot for a differential variable and that of G_y for
+an algebraic one; it is regular exactly when the system has index one.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solvers.lu import factor, solve
+from surfacechem.solvers.native import (
+    COLUMNS, DELTA, ERROR, JACOBIAN, RESIDUAL, RHS, TRIAL, TRIAL_DOT, compiled, evaluate, finite, set_inputs,
+)  # fmt: skip
+
+CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
+LIMIT = 60
+SMALLEST_PIVOT = 1e-15
+
+
+@compiled
+def _residual(w: Any) -> bool:
+    """Residual at the trial state into RHS."""
+    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
+    evaluate(w, RESIDUAL, w.vector[RHS].ctypes.data)
+    return bool(finite(w.vector[RHS]))
+
+
+@compiled
+def _factor(w: Any) -> bool:
+    n = w.algebraic.shape[0]
+    evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
+    for j in range(n):
+        largest = 0.0
+        for i in range(n):
+            w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
+        for i in range(n):
+            row = 0.0
+            for m in range(n):
+                row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]))
+            largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
+        w.vector[COLUMNS, j] = 1.0 / largest if largest > 0.0 else 1.0
+    return bool(factor(w.real, w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT))
+
+
+@compiled
+def _correction(w: Any, delta: Any) -> float:
+    """Newton correction for the residual in RHS; returns its size in the algebraic variables."""
+    norm = 0.0
+    for j in range(delta.shape[0]):
+        delta[j] = -w.vector[RHS, j]
+    solve(w.real, w.order[0], delta)
+    for j in range(delta.shape[0]):
+        if w.algebraic[j]:
+            norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290))
+    return norm
+
+
+@compiled
+def _shift(w: Any, delta: Any, fraction: float) -> None:
+    for j in range(delta.shape[0]):
+        w.vector[TRIAL if w.algebraic[j] else TRIAL_DOT, j] += fraction * delta[j]
+
+
+@compiled
+def _damped(w: Any, delta: Any) -> bool:
+    """Move as far along the correction as keeps the residual finite and not larger, in units of the matrix rows."""
+    before = 0.0
+    for j in range(delta.shape[0]):
+        before = max(before, abs(w.vector[RHS, j]) * w.vector[ERROR, j])
+    fraction = 1.0
+    _shift(w, delta, 1.0)
+    for _halving in range(40):
+        if _residual(w):
+            after = 0.0
+            for j in range(delta.shape[0]):
+                after = max(after, abs(w.vector[RHS, j]) * w.vector[ERROR, j])
+            if after <= before or after == 0.0:
+                return True
+        fraction *= 0.5
+        _shift(w, delta, -fraction)
+    return False
+
+
+@compiled
+def _row_units(w: Any) -> None:
+    """Inverse row sizes of the matrix into ERROR, the units of a residual."""
+    n = w.algebraic.shape[0]
+    for i in range(n):
+        row = 0.0
+        for m in range(n):
+            row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]) * w.vector[COLUMNS, m])
+        w.vector[ERROR, i] = 1.0 / row if row > 0.0 else 0.0
+
+
+@compiled
+def find_consistent(w: Any) -> int:
+    """Make the trial state consistent at the time in the inputs."""
+    if not _residual(w):
+        return NOT_FINITE_STATE
+    delta = w.g[0]
+    nonlinear = False
+    for flag in w.algebraic:
+        nonlinear = nonlinear or flag
+    norm_last = np.inf
+    for _iteration in range(LIMIT):
+        if not _factor(w):
+            return SINGULAR_STATE
+        norm = _correction(w, delta)
+        if not finite(delta):
+            return SINGULAR_STATE
+        # The system is linear in the derivatives: without algebraic variables one correction is exact.
+        if not nonlinear or norm <= 1e-15 or norm_last <= 1e-11:
+            _shift(w, delta, 1.0)
+            return CONSISTENT if _residual(w) else NOT_FINITE_STATE
+        _row_units(w)
+        if not _damped(w, delta):
+            # At rounding level the residual cannot fall any more.
+            return CONSISTENT if norm <= 1e-9 else NO_STATE
+        norm_last = norm
+    return NO_STATE

@@ -1,0 +1,193 @@
+"""What a solver is given and what it hands back.
+
+A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own parameters.
+Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures is integrated beside the
+state, outside the error norm. A result always carries a status and its reason in words.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Program
+
+Array = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    FINISHED = 0
+    EVENT = 1
+    STEP_UNDERFLOW = 2
+    MAX_STEPS = 3
+    NOT_FINITE = 4
+    NO_CONSISTENT_STATE = 5
+    SINGULAR = 6
+    STOPPED = 7
+    FAILED = 8
+
+    @property
+    def success(self) -> bool:
+        return self in (Status.FINISHED, Status.EVENT)
+
+
+REASONS = {
+    Status.FINISHED: "reached the end",
+    Status.EVENT: "a terminal margin reached zero",
+    Status.STEP_UNDERFLOW: "the step size fell to rounding level; the solution may end here",
+    Status.MAX_STEPS: "the number of steps allowed was used up",
+    Status.NOT_FINITE: "the equations or their derivatives are not finite here",
+    Status.NO_CONSISTENT_STATE: "no values of the algebraic variables satisfy the equations here",
+    Status.SINGULAR: "the equations do not determine the derivatives and algebraic variables here (singular matrix)",
+    Status.STOPPED: "the time allowed for the run was used up",
+    Status.FAILED: "the library failed",
+}
+
+
+@dataclass(frozen=True)
+class Margin:
+    """What happens where a margin crosses zero; direction -1 is falling, +1 rising, 0 both.
+
+    A margin that is zero at the start of a run or restart fires only after it has left zero.
+    """
+
+    terminal: bool
+    direction: int = -1
+
+    @classmethod
+    def stop(cls) -> "Margin":
+        """The run ends where the margin falls to zero."""
+        return cls(terminal=True)
+
+    @classmethod
+    def restart(cls, direction: int = 0) -> "Margin":
+        """A kink: a step ends there and the run goes on."""
+        return cls(terminal=False, direction=direction)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One initial value problem; algebraic entries of y0 are first guesses."""
+
+    program: Program
+    y0: Array
+    times: Array
+    """Output times, strictly increasing, within the segments; may be empty."""
+    segments: Array
+    """Breakpoints t_0 < ... < t_end."""
+    parameters: Array
+    """One parameter vector a segment."""
+    rtol: float
+    atol: Array
+    margins: tuple[Margin, ...] = ()
+    max_steps: int = 100_000
+    max_seconds: float | None = None
+    record_steps: bool = False
+
+    def __post_init__(self) -> None:
+        n, segments = self.program.n, len(self.segments) - 1
+        _require(self.y0.shape == (n,), f"y0 has shape {self.y0.shape}; the program has {n} states.")
+        _require(self.atol.shape == (n,), f"atol has shape {self.atol.shape}; it needs one entry for each of {n} states.")
+        _require(segments >= 1 and bool(np.all(np.diff(self.segments) > 0)), "segments must be increasing breakpoints, at least two.")
+        shape = (segments, self.program.n_parameters)
+        _require(self.parameters.shape == shape, f"parameters have shape {self.parameters.shape}; {shape} is needed.")
+        _require(bool(np.all(np.diff(self.times) > 0)), "output times must increase strictly.")
+        inside = len(self.times) == 0 or (self.times[0] >= self.segments[0] and self.times[-1] <= self.segments[-1])
+        _require(inside, "output times must lie within the segments.")
+        _require(len(self.margins) == self.program.n_margins, f"{self.program.n_margins} margins need as many kinds.")
+        _require(0.0 < self.rtol < 1.0 and bool(np.all(self.atol >= 0.0)), "rtol must lie in (0, 1) and atol must not be negative.")
+
+
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise ValueError(message)
+
+
+@dataclass(frozen=True)
+class Counters:
+    """What a run cost."""
+
+    steps: int = 0
+    rejected: int = 0
+    residuals: int = 0
+    jacobians: int = 0
+    factorizations: int = 0
+    iterations: int = 0
+
+
+@dataclass(frozen=True)
+class Points:
+    """States at a row of times: steps or events."""
+
+    t: Array
+    y: Array
+    ydot: Array
+    ledger: Array
+
+
+@dataclass(frozen=True)
+class Events(Points):
+    """Events in order of time; ``index`` is the margin that crossed zero. Coincident ones have a row each."""
+
+    index: NDArray[np.int64] = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A trajectory up to where it ended. Outputs beyond the stop are absent."""
+
+    problem: Problem
+    status: Status
+    message: str
+    t: float
+    """The time reached: the end, the terminal event, or the last good state."""
+    y: Array
+    ydot: Array
+    ledger: Array
+    margins: Array
+    """Margins at the end; where a run stalls, the one nearest zero is a hint at the reason."""
+    times: Array
+    outputs: Array
+    ledger_outputs: Array
+    events: Events
+    counters: Counters
+    steps: Points | None = None
+
+    @property
+    def success(self) -> bool:
+        return self.status.success
+
+    @cached_property
+    def output_rates(self) -> Array:
+        """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
+        from surfacechem.solvers.radau import consistent
+
+        segment = np.searchsorted(self.problem.segments[1:-1], self.times, side="left")
+        guess = np.zeros_like(self.outputs)
+        return consistent(self.problem.program, self.times, self.outputs, guess, self.problem.parameters[segment]).ydot
+
+
+class Solver(ABC):
+    """A method for problems; stateless, hence shared between threads."""
+
+    name: str
+
+    @abstractmethod
+    def solve(self, problem: Problem) -> Result:
+        """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong number."""
+
+
+def explain(status: Status, t: float, margins: Array, index: int | None = None) -> str:
+    """The status in words, with the time and the margin concerned."""
+    text = f"{REASONS[status]} (t = {t:.9g})"
+    if index is not None:
+        return f"{text}: margin {index}"
+    if not status.success and len(margins) and np.all(np.isfinite(margins)):
+        nearest = int(np.argmin(np.abs(margins)))
+        return f"{text}; nearest margin: {nearest} = {margins[nearest]:.3g}"
+    return text

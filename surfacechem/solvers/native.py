@@ -1,0 +1,125 @@
+"""Calling machine code by its address from compiled Python, and the workspace of one trajectory.
+
+The address is data, not a function type: code compiled here never depends on the scene it calls and is cached for good.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+compiled: Any = numba.njit(error_model="numpy", _nrt=False)
+"""Nothing is allocated inside a step; without reference counts the code compiles and runs about twice as fast."""
+
+RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
+"""Rows of the table of addresses (code, user data)."""
+
+ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION = range(12)
+"""Rows of the vectors of length n."""
+Q, Q_TRIAL, Q_CORRECTION = range(3)
+"""Rows of the vectors of length n_ledger."""
+M_NOW, M_SIDE, M_BEFORE, M_LARGEST, M_SLOPE = range(5)
+"""Rows of the vectors of length n_margins: value, side of zero it was last seen on, value before, largest
+size so far, its slope."""
+BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = range(10)
+"""Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of t."""
+STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS, MEMBER, LAST_MEMBER, TRIES, CALM, FRESH = range(11)
+"""Counters; members of the Radau family used now and by the stored polynomial; Newton
+iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state."""
+
+
+class Work(NamedTuple):
+    """Everything one trajectory writes to; allocated once for a batch."""
+
+    code: Any
+    algebraic: Any
+    inputs: Any
+    clock: Any
+    count: Any
+    vector: Any
+    z: Any
+    z_last: Any
+    g: Any
+    pairs: Any
+    jacobian: Any
+    real: Any
+    complex: Any
+    order: Any
+    basis: Any
+    ledger: Any
+    q_stage: Any
+    rates: Any
+    margin: Any
+    fired: Any
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> Any:
+    signature = types.void(types.intp, types.intp, types.intp, types.intp)
+
+    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        pointer = ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer, pointer]).as_pointer()
+        function = builder.inttoptr(args[0], kind)
+        builder.call(function, [builder.inttoptr(argument, pointer) for argument in args[1:]])
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@compiled
+def evaluate(w: Any, which: int, out: int) -> None:
+    """Call a function of the program on the current inputs; ``out`` is the address of the result."""
+    _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
+
+
+@compiled
+def set_inputs(w: Any, y: Any, ydot: Any) -> None:
+    n = y.shape[0]
+    for j in range(n):
+        w.inputs[1 + j] = y[j]
+        w.inputs[1 + n + j] = ydot[j]
+
+
+@compiled
+def copy(source: Any, target: Any) -> None:
+    for j in range(source.shape[0]):
+        target[j] = source[j]
+
+
+@compiled
+def finite(values: Any) -> bool:
+    total = 0.0
+    for value in values.flat:
+        total += 0.0 * value
+    return total == 0.0
+
+
+@numba.njit
+def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_margins: int) -> Work:
+    n = algebraic.shape[0]
+    return Work(
+        code,
+        algebraic,
+        np.zeros(1 + 2 * n + n_parameters),
+        np.zeros(10),
+        np.zeros(11, np.int64),
+        np.zeros((12, n)),
+        np.zeros((7, n)),
+        np.zeros((7, n)),
+        np.zeros((7, n)),
+        np.zeros((3, n), np.complex128),
+        np.zeros((2, n, n)),
+        np.zeros((n, n)),
+        np.zeros((3, n, n), np.complex128),
+        np.zeros((4, n), np.int64),
+        np.zeros(8),
+        np.zeros((3, n_ledger)),
+        np.zeros((7, n_ledger)),
+        np.zeros((8, n_ledger)),
+        np.zeros((5, n_margins)),
+        np.zeros(n_margins, np.bool_),
+    )

@@ -1,0 +1,206 @@
+"""The default solver: Radau IIA of adaptive order 5, 9, 13, compiled; single runs, batches, and consistent states."""
+
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfacechem.compile import Program
+from surfacechem.solvers import stepper
+from surfacechem.solvers.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, Status, explain
+
+EVENT_ROWS = 64
+STEP_ROWS = 512
+CHUNK = 256
+"""Runs a thread takes at a time."""
+END, OUTPUTS, EVENTS, RECORDS = range(4)
+
+
+class _Tables:
+    """Input and output arrays of a batch of runs, in the order of the compiled entry point."""
+
+    def __init__(
+        self, program: Program, y0: Array, parameters: Array, segments: Array, times: Array, rtol: float, atol: Array,
+        margins: tuple[Margin, ...], max_steps: int, step_rows: int, event_rows: int,
+    ) -> None:  # fmt: skip
+        runs, n, q = len(y0), program.n, program.n_ledger
+        self.stop = np.zeros(1, np.int64)
+        self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
+        self.counts = np.zeros((runs, 4), np.int64)
+        self.counters = np.empty((runs, 6), np.int64)
+        self.outputs = np.empty((runs, len(times), n + q))
+        self.steps = np.empty((runs, step_rows, 1 + 2 * n + q))
+        self.events = np.empty((runs, event_rows, 2 + 2 * n + q))
+        kinds = np.array([(margin.terminal, margin.direction) for margin in margins], np.int64).reshape(-1, 2)
+        limits = np.array([max_steps, q], np.int64)
+        self.arguments = (
+            program.addresses, program.algebraic_mask, limits, self.stop, np.array([rtol, *atol]), kinds, y0, parameters, segments, times,
+            self.ends, self.counts, self.counters, self.outputs, self.steps, self.events,
+        )  # fmt: skip
+
+    def run(self, first: int, last: int) -> None:
+        stepper.run_batch()(first, last, *self.arguments)
+
+
+def _contiguous(values: ArrayLike) -> Array:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
+    return _Tables(
+        problem.program, _contiguous(problem.y0)[None], _contiguous(problem.parameters)[None], _contiguous(problem.segments),
+        _contiguous(problem.times), problem.rtol, problem.atol, problem.margins, problem.max_steps, step_rows, event_rows,
+    )  # fmt: skip
+
+
+def _run_timed(tables: _Tables, seconds: float | None) -> None:
+    """Run once; the compiled loop looks at the stop flag before every step."""
+    if seconds is None:
+        return tables.run(0, 1)
+    timer = threading.Timer(seconds, tables.stop.fill, args=(1,))
+    timer.start()
+    try:
+        tables.run(0, 1)
+    finally:
+        timer.cancel()
+
+
+def _points(rows: Array, n: int) -> tuple[Array, Array, Array, Array]:
+    return rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n], rows[:, 1 + 2 * n :]
+
+
+class Radau(Solver):
+    """Radau IIA with 3, 5 or 7 stages, chosen by tolerance and by the convergence of Newton's method.
+
+    Source: Hairer & Wanner (1999), Stiff differential equations solved by Radau methods, J. Comput. Appl. Math. 111.
+    """
+
+    name = "radau"
+
+    def solve(self, problem: Problem) -> Result:
+        rows = STEP_ROWS if problem.record_steps else 0
+        tables = _tables(problem, rows, EVENT_ROWS if problem.margins else 0)
+        _run_timed(tables, problem.max_seconds)
+        _, _, events, records = map(int, tables.counts[0])
+        if events > tables.events.shape[1] or (problem.record_steps and records > rows):
+            # The tables were too short; the run is repeated with the sizes it turned out to need.
+            tables = _tables(problem, records if problem.record_steps else 0, events)
+            _run_timed(tables, problem.max_seconds)
+        return _result(problem, tables)
+
+
+def _result(problem: Problem, tables: _Tables) -> Result:
+    program, n = problem.program, problem.program.n
+    status, outputs, events, records = map(int, tables.counts[0])
+    end = tables.ends[0]
+    m = len(end) - program.n_margins
+    found = tables.events[0, :events]
+    index = found[:, 0].astype(np.int64)
+    terminal = int(next(i for i in reversed(index) if problem.margins[i].terminal)) if status == Status.EVENT else None
+    return Result(
+        problem=problem,
+        status=Status(status),
+        message=explain(Status(status), end[0], end[m:], terminal),
+        t=float(end[0]),
+        y=end[1 : 1 + n],
+        ydot=end[1 + n : 1 + 2 * n],
+        ledger=end[1 + 2 * n : m],
+        margins=end[m:],
+        times=problem.times[:outputs],
+        outputs=tables.outputs[0, :outputs, :n],
+        ledger_outputs=tables.outputs[0, :outputs, n:],
+        events=Events(*_points(found[:, 1:], n), index=index),
+        counters=Counters(*map(int, tables.counters[0])),
+        steps=Points(*_points(tables.steps[0, :records], n)) if problem.record_steps else None,
+    )
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Ends of many runs; ``outputs[i, :counts[i]]`` are the outputs run i reached, the rest is not set."""
+
+    status: NDArray[np.int64]
+    t: Array
+    y: Array
+    ydot: Array
+    ledger: Array
+    margins: Array
+    outputs: Array
+    ledger_outputs: Array
+    counts: NDArray[np.int64]
+    steps: NDArray[np.int64]
+
+
+def solve_many(
+    program: Program,
+    y0: ArrayLike,
+    parameters: ArrayLike,
+    segments: ArrayLike,
+    rtol: float,
+    atol: ArrayLike,
+    *,
+    times: ArrayLike = (),
+    margins: Sequence[Margin] = (),
+    max_steps: int = 100_000,
+    threads: int = 1,
+) -> Batch:
+    """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number of threads."""
+    states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
+    weights = np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))
+    if len(states) != len(table):
+        raise ValueError(f"{len(states)} initial values but {len(table)} parameter tables; a batch needs one of each a run.")
+    if len(states):
+        # All runs share shapes, so the checks of one problem are those of the batch.
+        Problem(program, states[0], outputs, breaks, table[0], rtol, weights, tuple(margins), max_steps)
+    tables = _Tables(program, states, table, breaks, outputs, rtol, weights, tuple(margins), max_steps, 0, 0)
+    starts = range(0, len(states), CHUNK)
+    stepper.run_batch()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda start: tables.run(start, min(start + CHUNK, len(states))), starts))
+    return _batch(program, tables)
+
+
+def _batch(program: Program, tables: _Tables) -> Batch:
+    n, q = program.n, program.n_ledger
+    _, y, ydot, rest = _points(tables.ends, n)
+    return Batch(
+        status=tables.counts[:, END],
+        t=tables.ends[:, 0],
+        y=y,
+        ydot=ydot,
+        ledger=rest[:, :q],
+        margins=rest[:, q:],
+        outputs=tables.outputs[:, :, :n],
+        ledger_outputs=tables.outputs[:, :, n:],
+        counts=tables.counts[:, OUTPUTS],
+        steps=tables.counters[:, 0],
+    )
+
+
+@dataclass(frozen=True)
+class Consistent:
+    """States that satisfy G(t, y, ydot) = 0; ``valid`` is False where none was found."""
+
+    y: Array
+    ydot: Array
+    valid: NDArray[np.bool_]
+
+
+def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, parameters: ArrayLike) -> Consistent:
+    """Keep the differential variables; find their derivatives and the algebraic variables.
+
+    For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses; parameters are
+    one vector or one for each state.
+    """
+    values = np.array(y, dtype=float)
+    shape = values.shape
+    states = np.ascontiguousarray(values.reshape(-1, program.n))
+    rates = np.array(np.broadcast_to(np.asarray(ydot, dtype=float), shape)).reshape(-1, program.n)
+    times = np.array(np.broadcast_to(np.asarray(t, dtype=float), shape[:-1])).reshape(-1)
+    table = _contiguous(parameters).reshape(-1, program.n_parameters) if program.n_parameters else np.zeros((1, 0))
+    outcomes = np.zeros(len(states), np.int64)
+    stepper.make_consistent()(program.addresses, program.algebraic_mask, times, states, rates, table, outcomes)
+    return Consistent(states.reshape(shape), rates.reshape(shape), (outcomes == 0).reshape(shape[:-1]))

@@ -1,0 +1,181 @@
+"""The nonlinear system of one Radau IIA step, solved for the stage increments Z_i = Y_i - y_n by a simplified Newton method.
+
+Each stage asks G(t_i, y_n + Z_i, (1/h) sum_j (A^-1)_ij Z_j) = 0. In the eigenbasis of A^-1 the Newton matrix falls apart into one
+real and (s-1)/2 complex matrices (lambda/h) G_ydot + G_y of the size of the state.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solvers.lu import factor, solve
+from surfacechem.solvers.native import (
+    BASE, CONTRACTION, DELTA, FACTORIZATIONS, H_LAST, ITERATIONS, JACOBIAN, JACOBIANS, LAST_MEMBER, MEMBER, OFFSET, RESIDUAL, RESIDUALS,
+    ROUNDING, SCALE, TAU, THETA, TRIES, WEIGHT, Y, YDOT, compiled, evaluate, finite, set_inputs,
+)  # fmt: skip
+from surfacechem.solvers.radau_tables import (
+    GAMMA, INVERSE, LAGRANGE, NODES, PAIR_COLUMNS, PAIR_ROWS, PAIR_VALUES, REAL_COLUMN, REAL_ROW,
+)  # fmt: skip
+
+CONVERGED, DIVERGED, NOT_FINITE = range(3)
+
+TIGHT = 0.05
+"""Newton error allowed, in units of the tolerance."""
+
+
+@compiled
+def stage_count(k: int) -> int:
+    return 2 * k + 3
+
+
+@compiled
+def differentiate_system(w: Any) -> bool:
+    """Evaluate G_y and G_ydot at the start of the step."""
+    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
+    set_inputs(w, w.vector[Y], w.vector[YDOT])
+    evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
+    w.count[JACOBIANS] += 1
+    return bool(finite(w.jacobian))
+
+
+@compiled
+def factor_newton(w: Any, h: float) -> bool:
+    k = w.count[MEMBER]
+    n = w.algebraic.shape[0]
+    mass, stiffness = w.jacobian[1], w.jacobian[0]
+    w.count[FACTORIZATIONS] += 1
+    for i in range(n):
+        for j in range(n):
+            w.real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
+    if not factor(w.real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
+        return False
+    for pair in range(k + 1):
+        shift = PAIR_VALUES[k, pair] / h
+        for i in range(n):
+            for j in range(n):
+                w.complex[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
+        if not factor(w.complex[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
+            return False
+    return True
+
+
+@compiled
+def lagrange(w: Any, k: int, x: float) -> None:
+    """Values at x of the Lagrange polynomials on 0, c_1, ..., c_s, without that of the node 0, into w.basis."""
+    s = stage_count(k)
+    for j in range(s):
+        product = x * LAGRANGE[k, j]
+        for i in range(s):
+            if i != j:
+                product *= x - NODES[k, i]
+        w.basis[j] = product
+
+
+@compiled
+def predict(w: Any, h: float) -> None:
+    """First guess of the stages from the stored polynomial, or no change where there is none."""
+    s, last = stage_count(w.count[MEMBER]), w.count[LAST_MEMBER]
+    n = w.algebraic.shape[0]
+    if w.clock[H_LAST] == 0.0:
+        w.z[:s] = 0.0
+        return
+    for i in range(s):
+        lagrange(w, last, w.clock[OFFSET] + NODES[w.count[MEMBER], i] * h / w.clock[H_LAST])
+        for m in range(n):
+            value = 0.0 if w.clock[OFFSET] == 0.0 else -w.z_last[stage_count(last) - 1, m]
+            for j in range(stage_count(last)):
+                value += w.basis[j] * w.z_last[j, m]
+            w.z[i, m] = value
+
+
+@compiled
+def set_stage(w: Any, i: int, h: float) -> None:
+    """Inputs of stage i."""
+    k = w.count[MEMBER]
+    n = w.algebraic.shape[0]
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[k, i] * h)
+    for m in range(n):
+        slope = 0.0
+        for j in range(stage_count(k)):
+            slope += INVERSE[k, i, j] * w.z[j, m]
+        w.inputs[1 + m] = w.vector[Y, m] + w.z[i, m]
+        w.inputs[1 + n + m] = slope / h
+
+
+@compiled
+def _stage_residuals(w: Any, h: float) -> bool:
+    s = stage_count(w.count[MEMBER])
+    n = w.algebraic.shape[0]
+    for i in range(s):
+        set_stage(w, i, h)
+        evaluate(w, RESIDUAL, w.g.ctypes.data + 8 * n * i)
+    w.count[RESIDUALS] += s
+    return bool(finite(w.g[:s]))
+
+
+@compiled
+def _correct(w: Any) -> float:
+    """One Newton correction of all stages; returns its weighted maximum norm."""
+    k = w.count[MEMBER]
+    s = stage_count(k)
+    n = w.algebraic.shape[0]
+    real = w.vector[DELTA]
+    for m in range(n):
+        total = 0.0
+        for i in range(s):
+            total -= REAL_ROW[k, i] * w.g[i, m]
+        real[m] = total
+    solve(w.real, w.order[0], real)
+    for pair in range(k + 1):
+        for m in range(n):
+            value = 0.0j
+            for i in range(s):
+                value -= PAIR_ROWS[k, pair, i] * w.g[i, m]
+            w.pairs[pair, m] = value
+        solve(w.complex[pair], w.order[1 + pair], w.pairs[pair])
+    norm = 0.0
+    for i in range(s):
+        for m in range(n):
+            change = REAL_COLUMN[k, i] * real[m]
+            for pair in range(k + 1):
+                column, value = PAIR_COLUMNS[k, i, pair], w.pairs[pair, m]
+                change += column.real * value.real - column.imag * value.imag
+            w.z[i, m] += change
+            size = abs(change) / w.vector[WEIGHT, m]
+            # Not max(): a NaN must reach the caller.
+            if not size <= norm:
+                norm = size
+    return norm
+
+
+@compiled
+def solve_stages(w: Any, h: float) -> int:
+    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the contraction rate in the clock."""
+    limit = 7 + 2 * w.count[MEMBER]
+    contraction = max(w.clock[CONTRACTION], 1e-16) ** 0.8
+    rounding = w.clock[ROUNDING]
+    norm_last, rate_last = 0.0, 0.0
+    w.clock[THETA] = 0.0
+    for iteration in range(limit):
+        if not _stage_residuals(w, h):
+            return NOT_FINITE
+        norm = _correct(w)
+        w.count[ITERATIONS] += 1
+        w.count[TRIES] = iteration + 1
+        if not norm < np.inf:
+            return NOT_FINITE
+        if iteration > 0:
+            ratio = norm / norm_last
+            rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
+            rate_last = ratio
+            w.clock[THETA] = rate
+            if rate >= 0.99:
+                return CONVERGED if norm <= min(1e3 * rounding, 1.0) else DIVERGED
+            contraction = rate / (1.0 - rate)
+            if contraction * norm * rate ** (limit - 1 - iteration) > max(TIGHT, 100.0 * rounding):
+                return DIVERGED
+        if contraction * norm <= TIGHT or norm <= 8.0 * rounding:
+            w.clock[CONTRACTION] = contraction
+            return CONVERGED
+        norm_last = max(norm, 1e-300)
+    return DIVERGED

@@ -1,0 +1,66 @@
+"""The compiled stepper: compiled once per machine, then loaded from the cache when a solve first needs it.
+
+Importing this module imports neither Numba nor the kernel.
+"""
+
+import threading
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
+
+_SOURCES = ("contract", "native", "lu", "radau_tables", "radau_stages", "radau_step", "radau_advance", "consistency", "dense", "locate",
+            "trajectory")  # fmt: skip
+_LOCK = threading.Lock()
+
+
+def _folder(part: str) -> Path:
+    here = Path(__file__).parent
+    return kernel_folder([here / f"{name}.py" for name in _SOURCES]) / part
+
+
+def is_compiled() -> bool:
+    """Whether the stepper can be loaded instead of compiled (which takes some ten seconds, once)."""
+    return is_filled(_folder("run"))
+
+
+@cache
+def _run_batch() -> Any:
+    from numba import boolean, float64, int64, void
+
+    from surfacechem.solvers.trajectory import run_batch
+
+    real, table, cube, count = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[:, ::1]
+    signature = void(
+        int64, int64, count, boolean[::1], int64[::1], int64[::1], real, count, table, cube, real, real, table, count, count, cube, cube,
+        cube,
+    )  # fmt: skip
+    return compile_kernel(run_batch, signature, _folder("run"))
+
+
+@cache
+def _make_consistent() -> Any:
+    from numba import boolean, float64, int64, void
+
+    from surfacechem.solvers.trajectory import make_consistent
+
+    real, table, count = float64[::1], float64[:, ::1], int64[:, ::1]
+    signature = void(count, boolean[::1], real, table, table, table, int64[::1])
+    return compile_kernel(make_consistent, signature, _folder("consistent"))
+
+
+def run_batch() -> Any:
+    with _LOCK:
+        return _run_batch()
+
+
+def make_consistent() -> Any:
+    with _LOCK:
+        return _make_consistent()
+
+
+def compile_stepper() -> None:
+    """Compile the stepper now, as a set-up step, or load it if that has been done."""
+    run_batch()
+    make_consistent()
