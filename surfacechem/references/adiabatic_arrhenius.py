@@ -1,0 +1,100 @@
+"""Adiabatic first-order reaction with an Arrhenius rate: thermal runaway."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.references._roots import increasing_root
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+EULER_GAMMA = 0.57721566490153286061
+SERIES_LIMIT = 40.0
+
+
+class AdiabaticArrhenius(Reference):
+    r"""Adiabatic exothermic first-order bonding with an Arrhenius rate, constant capacity.
+
+    .. math:: \dot\phi=Ae^{-E_a/(R_gT)}(1-\phi),\quad T=T_i+\Delta T\,\phi
+
+    With :math:`s=\frac{E_a}{R_gT}`, :math:`s_i,s_f` its values at :math:`T_i` and :math:`T_f=T_i+\Delta T`
+
+    .. math:: At=e^{s_f}[{\rm Ei}(s_i-s_f)-{\rm Ei}(s-s_f)]-[{\rm Ei}(s_i)-{\rm Ei}(s)]
+
+    is inverted to rounding for :math:`-\ln(1-\phi)`. Everything is scaled by :math:`e^{-s_i}`, so that no activation
+    energy overflows. Any t >= 0. During the runaway the temperature follows the rounding of t times its own slope.
+
+    Source: Abramowitz & Stegun (1964), 5.1 (exponential integral), adiabatic reaction integrated.
+
+    >>> reaction = AdiabaticArrhenius(A=1e13, E_a=1.1e5, T_i=320.0, delta_T=150.0)
+    >>> f"{reaction.solution(4743.32606507994)['T']:.8f}"
+    '342.50000000'
+    """
+
+    name: ClassVar[str] = "adiabatic-arrhenius"
+
+    A: float = parameter("1/s", "pre-exponential factor", above=0)
+    E_a: float = parameter("J/mol", "activation energy", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+    delta_T: float = parameter("K", "adiabatic temperature rise of the complete reaction", above=0)
+
+    @property
+    def _initial_exponent(self) -> float:
+        return self.E_a / (GAS_CONSTANT * self.T_i)
+
+    @property
+    def initial_rate(self) -> float:
+        """Rate constant [1/s] at the initial temperature; the exponent's rounding would cost s_i roundings of t."""
+        exact = Fraction(self.E_a) / (Fraction(str(GAS_CONSTANT)) * Fraction(self.T_i))
+        lost = float(exact - Fraction(self._initial_exponent))
+        return self.A * math.exp(-self._initial_exponent) * (1.0 - lost)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        scaled, span = self.initial_rate * t, self._initial_exponent * self.delta_T / (self.T_i + self.delta_T)
+        phi = -np.expm1(-increasing_root(self._scaled_time, scaled, scaled, scaled * np.exp(span)))
+        return {"phi": phi, "T": self.T_i + self.delta_T * phi}
+
+    def time(self, phi: Array) -> Array:
+        """The time [s] at which the bonding state is phi."""
+        return self._scaled_time(-np.log1p(-phi))[0] / self.initial_rate
+
+    def _scaled_time(self, unreacted: Array) -> tuple[Array, Array]:
+        r""":math:`Ae^{-s_i}t` as a function of :math:`-\ln(1-\phi)`, and its slope :math:`e^{s-s_i}`."""
+        rise, left = -self.delta_T * np.expm1(-unreacted), self.delta_T * np.exp(-unreacted)
+        T, final, s_i = self.T_i + rise, self.T_i + self.delta_T, self._initial_exponent
+        slope = np.exp(-s_i * rise / T)
+        at_start = scaled_Ei(np.array([s_i * self.delta_T / final])) - scaled_Ei(np.array([s_i]))
+        now = scaled_Ei(s_i * self.T_i / T * left / final) - scaled_Ei(s_i * self.T_i / T)
+        return at_start - slope * now, slope
+
+
+def scaled_Ei(x: Array) -> Array:
+    r""":math:`e^{-x}{\rm Ei}(x)` for x > 0: convergent series up to 40, asymptotic series above.
+
+    >>> scaled_Ei(np.array([1.0, 50.0]))
+    array([0.69717488, 0.02041705])
+    """
+    near, far = np.minimum(x, SERIES_LIMIT), np.maximum(x, SERIES_LIMIT)
+    return np.where(x < SERIES_LIMIT, _convergent(near), _asymptotic(far))
+
+
+def _convergent(x: Array) -> Array:
+    term, total = np.ones_like(x), np.zeros_like(x)
+    for n in range(1, 160):
+        term = term * x / n
+        total = total + term / n
+    return np.asarray(np.exp(-x) * (EULER_GAMMA + np.log(x) + total))
+
+
+def _asymptotic(x: Array) -> Array:
+    term, total = 1.0 / x, 1.0 / x
+    for n in range(1, int(SERIES_LIMIT)):
+        term = term * n / x
+        total = total + term
+    return total

@@ -1,0 +1,62 @@
+r"""What every exact solution is: parameters in SI, and exact values of named quantities at any time.
+
+A reference is one frozen dataclass in a file of its own. The file carries the reference's name, so that asking for one
+reference imports one file.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, TypeAlias, dataclass_transform
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfacechem.errors import InputError
+from surfacechem.terms import parameter
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
+class Reference(ABC):
+    """An exact solution. Subclasses become frozen, keyword-only dataclasses and state `quantities`."""
+
+    name: ClassVar[str]
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        dataclass(frozen=True, kw_only=True)(cls)
+
+    def __post_init__(self) -> None:
+        """Check every parameter against its range."""
+        for item in fields(self):  # type: ignore[arg-type]
+            item.metadata["spec"].check(f"{self.name}: {item.name}", getattr(self, item.name))
+
+    @property
+    def end_time(self) -> float:
+        """Last time [s] at which the solution exists."""
+        return math.inf
+
+    def solution(self, t: ArrayLike) -> dict[str, Array]:
+        """Exact values of the named quantities at the times `t` [s] after the start."""
+        times = np.asarray(t, dtype=np.float64)
+        if not np.all((times >= 0.0) & (times <= self.end_time)):
+            raise InputError(f"{self.name}: exact for 0 <= t <= {self.end_time!r} s only.")
+        with np.errstate(all="ignore"):
+            values = self.quantities(times.reshape(-1))
+        exact = {key: np.array(np.broadcast_to(value, times.size)) for key, value in values.items()}
+        self._check_values(times.reshape(-1), exact)
+        return {key: value.reshape(times.shape) for key, value in exact.items()}
+
+    def _check_values(self, t: Array, exact: Mapping[str, Array]) -> None:
+        for key, value in exact.items():
+            if np.isnan(value).any():
+                raise InputError(f"{self.name}: {key} has no real value at t = {t[np.isnan(value)][0]} s.")
+
+    @abstractmethod
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        """The exact solution at a vector of times; what does not change in time may be one number."""

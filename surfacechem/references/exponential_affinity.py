@@ -1,0 +1,85 @@
+"""Bonding and debonding with a rate exponential in the affinity, isothermal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+
+class ExponentialAffinity(Reference):
+    r"""Two-way bonding whose rate is exponential in the affinity, constant temperature.
+
+    With the affinity :math:`y=a(\phi_{eq}-\phi)=-\mu_c/(k_BT)`, :math:`a=\frac{K_c}{n_ck_BT}`,
+    :math:`\lambda=\frac{C_rK_c}{n_c^2}`
+
+    .. math:: \dot\phi=\frac\lambda a(1-e^{-y}),\qquad e^y-1=(e^{y_i}-1)e^{-\lambda t}
+
+    Evaluated in logarithms, so that :math:`|y|` may be 1e6 and more. Any t >= 0; only the rate at t = 0 itself is
+    beyond double precision (minus infinity) for debonding from :math:`y_i<-745`.
+
+    Source: Sauer, Duong & Mandadapu (2021), section 5.7 (bonding reactions), exponential law with the Boltzmann
+    constant, integrated.
+
+    >>> sites = ExponentialAffinity(n_c=5e17, C_r=2.5e38, K_c=0.05, T=310.0, phi_eq=0.4, phi_i=1.0)
+    >>> f"{sites.solution(1.20603953943341209e-9)['phi']:.12f}"
+    '0.996949093794'
+    """
+
+    name: ClassVar[str] = "exponential-affinity"
+
+    n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
+    C_r: float = parameter("1/(J s m^2)", "rate constant per area", at_least=0)
+    K_c: float = parameter("J/m^2", "bond energy density", above=0)
+    T: float = parameter("K", "temperature", above=0)
+    phi_eq: float = parameter("1", "equilibrium bonding state", default=1.0)
+    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @property
+    def steepness(self) -> float:
+        """Affinity in units of k_B T per distance of phi from equilibrium."""
+        return self.K_c / (self.n_c * BOLTZMANN * self.T)
+
+    @property
+    def relaxation_rate(self) -> float:
+        """Decay rate [1/s] close to equilibrium."""
+        return self.C_r * self.K_c / self.n_c**2
+
+    @property
+    def initial_affinity(self) -> float:
+        """Affinity at the start in units of k_B T; positive when bonds form."""
+        return self.steepness * (self.phi_eq - self.phi_i)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        state = _bonding if self.initial_affinity >= 0.0 else _debonding
+        spent, left, thrust = state(self.initial_affinity, self.relaxation_rate * t)
+        from_start, to_equilibrium = self.phi_i + spent / self.steepness, self.phi_eq - left / self.steepness
+        return {
+            "phi": np.where(np.abs(left) < np.abs(spent), to_equilibrium, from_start),
+            "phi_dot": self.relaxation_rate / self.steepness * thrust,
+        }
+
+
+def _bonding(y_i: float, decay: Array) -> tuple[Array, Array, Array]:
+    r"""Affinity spent :math:`y_i-y`, affinity left y, and :math:`1-e^{-y}` for :math:`y_i\ge0`."""
+    log_gone = np.log(-np.expm1(-decay))
+    product = np.expm1(-y_i) * np.expm1(-decay)
+    spent = np.where(product < 0.5, -np.log1p(-product), -np.logaddexp(-decay, log_gone - y_i))
+    log_excess = y_i + np.log(-np.expm1(-y_i)) - decay  # ln(e^y - 1)
+    return spent, np.logaddexp(0.0, log_excess), np.exp(-np.logaddexp(0.0, -log_excess))
+
+
+def _debonding(y_i: float, decay: Array) -> tuple[Array, Array, Array]:
+    r"""Affinity spent :math:`y_i-y`, affinity left y, and :math:`1-e^{-y}` for :math:`y_i<0`."""
+    gone, excess = -np.expm1(-decay), np.expm1(y_i) * np.exp(-decay)  # excess = e^y - 1
+    power = gone + np.exp(y_i - decay)  # e^y as a sum of positive numbers
+    log_factor = -y_i + np.log(-np.expm1(y_i))  # ln(e^-y_i - 1)
+    spent = -np.where(
+        log_factor < 30.0, np.log1p(np.expm1(min(-y_i, 100.0)) * gone), np.logaddexp(0.0, log_factor + np.log(gone))
+    )
+    return spent, np.where(excess > -0.5, np.log1p(excess), np.log(power)), excess / power

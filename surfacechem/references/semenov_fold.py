@@ -1,0 +1,70 @@
+"""An interface without capacity whose dissipation grows exponentially with its temperature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.errors import InputError
+from surfacechem.references._roots import increasing_root
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+
+class SemenovFold(Reference):
+    r"""Algebraic temperature of an interface whose dissipation is activated by temperature; lower branch.
+
+    .. math:: D_0e^{\beta(T_c-T_0)}=H(T_c-T_0),\qquad T_c=T_0-\frac1\beta W_0\Big(-\frac{\beta D_0}H\Big),\qquad
+        D_0\le D_{crit}=\frac H{e\beta}
+
+    Both branches meet at :math:`T_0+1/\beta`; beyond :math:`D_{crit}` no solution exists (ignition). Close to the fold
+    W loses half the digits; v = 1 - beta (T_c - T_0) is found to rounding from :math:`-v-\ln(1-v)=-\ln(D_0/D_{crit})`.
+    What then remains is that D_0 itself is rounded: T_c is known to about
+    :math:`10^{-16}/(\beta\sqrt{1-D_0/D_{crit}})`.
+
+    Source: Semenov (1928), Z. Phys. 48, 571-582, thermal explosion; interface without capacity of Sauer, Duong &
+    Mandadapu (2021).
+
+    >>> interface = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=183.939720585721)
+    >>> f"{interface.solution(0.0)['T_c']:.10f}, {interface.critical_dissipation:.10f}"
+    '304.6392190597, 367.8794411714'
+    """
+
+    name: ClassVar[str] = "semenov-fold"
+
+    T_0: float = parameter("K", "temperature of both bodies", above=0)
+    beta: float = parameter("1/K", "growth of the dissipation per kelvin", above=0)
+    H: float = parameter("W/(m^2 K)", "sum of the conductances to the bodies", above=0)
+    D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
+
+    def __post_init__(self) -> None:
+        """Refuse what has ignited."""
+        super().__post_init__()
+        if self.critical_dissipation < self.D_0:
+            raise InputError(f"{self.name}: no solution above D_0 = {self.critical_dissipation!r} W/m^2 (ignition).")
+
+    @property
+    def critical_dissipation(self) -> float:
+        """Largest D_0 [W/m^2] that has a solution."""
+        return self.H / (math.e * self.beta)
+
+    @property
+    def fold_temperature(self) -> float:
+        """Interface temperature [K] at the largest D_0."""
+        return self.T_0 + 1.0 / self.beta
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        scaled = scaled_rise(np.array([self.D_0 / self.critical_dissipation]))[0]
+        return {"T_c": self.T_0 + scaled / self.beta, "D": self.H * scaled / self.beta}
+
+
+def scaled_rise(severity: Array) -> Array:
+    r"""The smaller x with :math:`xe^{1-x}=D_0/D_{crit}`, as 1 - v; not above one."""
+    distance = -np.log1p(severity - 1.0)
+    low = -distance + np.sqrt(distance * (distance + 2.0))
+    high = np.minimum(np.sqrt(2.0 * distance), np.nextafter(1.0, 0.0))
+    v = increasing_root(lambda v: (-v - np.log1p(-v), v / (1.0 - v)), distance, np.minimum(low, high), high)
+    return np.where(v < 0.5, 1.0 - v, severity / math.e * np.exp(1.0 - v))
