@@ -159,14 +159,9 @@ class Build:
 
     def shares(self) -> tuple[Expression, Expression]:
         """Fractions of the interface's heat that go into body 1 and 2 where there is no medium."""
-        self.variables.has("partition") or self.variables.define(
-            "partition",
-            lambda: self.constant(
-                "alpha", "interface.partition", "1", "fraction of heat into body 1", self.interface.partition
-            ),
-            "constant",
-            "interface.partition",
-        )
+        if not self.variables.has("partition"):
+            path, text, value = "interface.partition", "fraction of heat into body 1", self.interface.partition
+            self.variables.define("partition", lambda: self.constant("alpha", path, "1", text, value), "constant", path)
         alpha = self.variables.get("partition", "the interface")
         return alpha, 1 - alpha
 
@@ -306,6 +301,8 @@ class Build:
                 total[x] += n * rate
         for name, (_, dot, density) in self.bonding.items():
             self.rows[name] = balances.site_balance(total[name], dot, density, self.stretch)
+            formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
+            self.ledger.append(Account(formed, dot - self.rows[name], "bonds", name))
         self._prescribed_bonding()
 
     def _chemical_potential(self, name: str, symbol: Any, density: Expression) -> Expression:

@@ -1,0 +1,27 @@
+"""Contact interfaces that bond, slide, break and heat.
+
+>>> import surfacechem
+>>> solution = surfacechem.run("exothermic")
+>>> solution.status
+'finished'
+
+``load`` reads a case and returns a :class:`~surfacechem.simulation.Simulation`, which compiles once and runs with any
+values of its parameters; ``run`` does both. Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from surfacechem.simulation import Simulation, load, run
+
+__all__ = ["Simulation", "load", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        from surfacechem import simulation
+
+        return getattr(simulation, name)
+    raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")

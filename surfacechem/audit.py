@@ -1,0 +1,142 @@
+"""Energy, entropy and sites along a run, against what the ledger says they should be.
+
+The equations satisfy both laws of thermodynamics as they stand, so the residuals measure the integration. A law that
+dissipates less than nothing shows in ``least``.
+
+Source: Sauer, Duong & Mandadapu (2021), sections 3.3, 3.4 and 4.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.integrate import Trajectory
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-12
+"""Dissipation below zero by less than this part of the law's largest is rounding."""
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Residuals of the balances at the output times and the least dissipation of each law."""
+
+    energy: Array
+    """Total energy minus what was supplied since the start [J/m^2], shape (times,)."""
+    entropy: Array
+    """Total entropy minus what was supplied and produced since the start [J/(m^2 K)], shape (times,)."""
+    sites: Array
+    """Largest residual of the site balances [1], shape (times,)."""
+    energy_scale: float
+    """Largest energy that was exchanged [J/m^2]."""
+    entropy_scale: float
+    """Largest entropy that was exchanged or produced [J/(m^2 K)]."""
+    least: Mapping[str, float]
+    """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
+    largest: Mapping[str, float]
+    """Largest entropy production of each dissipative law [W/(m^2 K)]."""
+
+    @property
+    def energy_error(self) -> float:
+        """Largest energy residual relative to the energy exchanged."""
+        return _relative(self.energy, self.energy_scale)
+
+    @property
+    def entropy_error(self) -> float:
+        """Largest entropy residual relative to the entropy exchanged or produced."""
+        return _relative(self.entropy, self.entropy_scale)
+
+    @property
+    def site_error(self) -> float:
+        """Largest site residual."""
+        return float(np.max(np.abs(self.sites), initial=0.0))
+
+    @cached_property
+    def violations(self) -> tuple[str, ...]:
+        """Laws that destroyed entropy beyond rounding."""
+        return tuple(
+            law for law, low in self.least.items() if low < -ROUNDING * max(self.largest[law], abs(low) * ROUNDING)
+        )
+
+
+def _relative(residual: Array, scale: float) -> float:
+    worst = float(np.max(np.abs(residual), initial=0.0))
+    return worst / scale if scale > 0 else worst
+
+
+def audit(trajectory: Trajectory) -> Audit:
+    """Audit of a trajectory."""
+    return _Books(trajectory).audit()
+
+
+class _Books:
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+        self.system = trajectory.model.system
+        self.names = [item.name for item in self.system.outputs]
+        self.ledger = trajectory.result.ledger_outputs
+        self.outputs = trajectory.outputs
+
+    def column(self, name: str) -> Array:
+        return self.outputs[:, self.names.index(name)]
+
+    def booked(self, kind: str) -> Array:
+        """Ledger columns of a kind, shape (times, accounts)."""
+        columns = [j for j, account in enumerate(self.system.ledger) if account.kind == kind]
+        return self.ledger[:, columns]
+
+    def changes(self, prefix: str) -> Array:
+        """Changes of the named totals since the start, shape (times, totals)."""
+        columns = [j for j, name in enumerate(self.names) if name.startswith(prefix) and name[2:] in ("1", "2", "c")]
+        return self.outputs[:, columns] - self.outputs[:1, columns]
+
+    def residual(self, total: str, kinds: tuple[str, ...]) -> Array:
+        values = self.column(total)
+        return values - values[:1] - sum(self.booked(kind).sum(axis=1) for kind in kinds)
+
+    def audit(self) -> Audit:
+        exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation")]
+        turned = [self.changes("S_"), self.booked("entropy supply"), self.booked("entropy production")]
+        low, high = self.production()
+        return Audit(
+            energy=self.residual("E_total", ("energy supply",)),
+            entropy=self.residual("S_total", ("entropy supply", "entropy production")),
+            sites=self.sites(),
+            energy_scale=_largest(exchanged),
+            entropy_scale=_largest(turned),
+            least=low,
+            largest=high,
+        )
+
+    def sites(self) -> Array:
+        accounts = [(j, a.law) for j, a in enumerate(self.system.ledger) if a.kind == "bonds"]
+        states = [state.name for state in self.system.states]
+        y = self.trajectory.result.outputs
+        residuals = [y[:, states.index(n)] - y[:1, states.index(n)] - self.ledger[:, j] for j, n in accounts]
+        return np.max(np.abs(residuals), axis=0) if residuals else np.zeros(len(y))
+
+    def production(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Least and largest entropy production of each law over outputs and steps."""
+        steps = self.trajectory.result.steps
+        rows = [self.outputs]
+        if steps is not None and len(steps.t):
+            rows.append(self.trajectory.model.evaluate(self.trajectory.result, steps.t, steps.y, steps.ydot))
+        values = np.concatenate(rows)
+        laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
+        columns = {law: values[:, self.names.index(f"sigma_{law}")] for law in laws}
+        if len(values) == 0:
+            return {}, {}
+        return (
+            {law: float(c.min()) for law, c in columns.items()},
+            {law: float(c.max()) for law, c in columns.items()},
+        )
+
+
+def _largest(columns: list[Array]) -> float:
+    return max((float(np.max(np.abs(c), initial=0.0)) for c in columns), default=0.0)

@@ -1,0 +1,177 @@
+"""A system in time: compiled once, run with any values of its parameters."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Function, Program, compile_function, compile_program
+from surfacechem.errors import InputError, suggestion
+from surfacechem.solvers import solver
+from surfacechem.solvers.contract import Margin, Problem, Result, Status
+from surfacechem.system import System
+from surfacechem.validity import check_start
+
+Array = NDArray[np.float64]
+
+ABSOLUTE = 1e-6
+"""Default absolute tolerance of a state, relative to rtol times its scale."""
+
+STALLED = 1e-3
+"""A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a scene is run: output times [s], tolerances, method, budgets."""
+
+    times: Sequence[float]
+    rtol: float = 1e-10
+    atol: float | None = None
+    solver: str = "radau"
+    max_steps: int = 100_000
+    max_seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A solved run: the solver's result, the values it ran with, its end in words and its run time [s]."""
+
+    model: Model
+    run: Run
+    result: Result
+    values: Mapping[str, float]
+    status: str
+    reason: str
+    seconds: float
+
+    @cached_property
+    def outputs(self) -> Array:
+        """Named quantities at the output times, shape (times, outputs)."""
+        return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.result.output_rates)
+
+
+class Model:
+    """A system with its machine code, made when it is built."""
+
+    def __init__(self, system: System) -> None:
+        start = time.perf_counter()
+        n, inputs = len(system.states), system.inputs
+        self.system = system
+        self.program: Program = compile_program(
+            system.t,
+            inputs[1 : n + 1],
+            inputs[n + 1 : 2 * n + 1],
+            inputs[2 * n + 1 :],
+            system.residual(),
+            [system.expand(account.rate) for account in system.ledger],
+            [system.expand(margin.expression) for margin in system.margins],
+        )
+        outputs = [system.expand(item.expression) for item in system.outputs]
+        self.output_function: Function = compile_function(inputs, outputs)
+        self.compile_seconds = time.perf_counter() - start
+
+    def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Every parameter and initial value by path, with some of them changed."""
+        values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
+        values |= {f"initial.{state.name}": state.initial for state in self.system.states}
+        for path, value in (changes or {}).items():
+            if path not in values:
+                raise InputError(f"no parameter '{path}'.{suggestion(path, values)}")
+            values[path] = float(value)
+        return values
+
+    def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
+        """The initial value problem; InputError where the initial state is not admissible."""
+        system = self.system
+        initial = {state.name: values[f"initial.{state.name}"] for state in system.states}
+        check_start(system, values, initial)
+        end = run.times[-1]
+        segments = np.array([0.0, *(t for t in system.breakpoints if 0 < t < end), end])
+        scales = np.array([state.scale for state in system.states])
+        return Problem(
+            program=self.program,
+            y0=np.array(list(initial.values())),
+            times=np.asarray(run.times, dtype=float),
+            segments=segments,
+            parameters=self._segment_parameters(segments[:-1], run, values),
+            rtol=run.rtol,
+            atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
+            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in system.margins),
+            max_steps=run.max_steps,
+            max_seconds=run.max_seconds,
+            record_steps=True,
+        )
+
+    def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
+        rows = np.empty((len(starts), len(self.system.parameters)))
+        for j, parameter in enumerate(self.system.parameters):
+            if parameter.load is not None:
+                rows[:, j] = [parameter.at(float(start)) for start in starts]
+            elif parameter.path == "run.slack":
+                rows[:, j] = max(values[parameter.path], 10 * run.rtol)
+            else:
+                rows[:, j] = values[parameter.path]
+        return rows
+
+    def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
+        """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
+        return self._solve(run, self.values(changes))
+
+    def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
+        """The same run at another tolerance, its absolute tolerance in proportion."""
+        run = trajectory.run
+        atol = None if run.atol is None else run.atol * rtol / run.rtol
+        return self._solve(replace(run, rtol=rtol, atol=atol), trajectory.values)
+
+    def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        method = solver(run.solver)
+        problem = self.problem(run, values)
+        start = time.perf_counter()
+        result = method.solve(problem)
+        seconds = time.perf_counter() - start
+        status, reason = self._verdict(result)
+        return Trajectory(self, run, result, values, status, reason, seconds)
+
+    def _verdict(self, result: Result) -> tuple[str, str]:
+        where = f"t = {result.t:.9g} s"
+        if result.status is Status.FINISHED:
+            return "finished", f"reached the end at {where}"
+        if result.status is Status.EVENT:
+            return "stopped", f"{self.system.margins[int(result.events.index[-1])].reason} at {where}"
+        shrunk = self._closest_margin(result)
+        if shrunk is not None:
+            return "stopped", f"{shrunk} near {where}"
+        if result.status is Status.NO_CONSISTENT_STATE and any(state.algebraic for state in self.system.states):
+            names = ", ".join(state.name for state in self.system.states if state.algebraic)
+            return "stopped", f"ignition: no {names} balances the heat that the interface produces, at {where}"
+        return "failed", f"{result.message}"
+
+    def _closest_margin(self, result: Result) -> str | None:
+        """Reason of the margin that has all but closed where a run could not go on."""
+        if result.steps is None or len(result.steps.t) < 2 or self.program.margins is None:
+            return None
+        first = self._margins(result, 0)
+        last = self._margins(result, -1)
+        shrink = [abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
+        order = [i for i in np.argsort(shrink) if self.system.margins[i].terminal]
+        return self.system.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
+
+    def _margins(self, result: Result, step: int) -> Array:
+        steps = result.steps
+        assert steps is not None and self.program.margins is not None
+        parameters = result.problem.parameters[0 if step == 0 else -1]
+        inputs = np.concatenate([[steps.t[step]], steps.y[step], steps.ydot[step], parameters])
+        return self.program.margins(inputs)
+
+    def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
+        """Named quantities along a trajectory, shape (len(t), outputs)."""
+        problem = result.problem
+        segment = np.searchsorted(problem.segments[1:-1], t, side="left")
+        inputs = np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
+        return self.output_function(inputs)

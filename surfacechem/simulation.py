@@ -1,0 +1,118 @@
+"""A case ready to run: read, assembled and compiled once, run with any values of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import case as cases
+from surfacechem.case import Case
+from surfacechem.errors import InputError, suggestion
+from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.solution import Accuracy, Solution
+from surfacechem.system import System
+from surfacechem.units import parse
+
+TIGHTER = 1e-2
+"""Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
+
+TIGHTEST = 1e-13
+"""Tolerances below this are rounding."""
+
+FLOOR = 1e-9
+"""Exact values of a state below this part of its largest count as this when errors are made relative."""
+
+
+def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
+    """Read a case by file or by the name of a shipped one; ``overrides`` are "path=value" or {path: value}."""
+    return Simulation(cases.load(name, overrides))
+
+
+def run(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Solution:
+    """Read a case and run it."""
+    return load(name, overrides).run()
+
+
+class Simulation:
+    """A case with its system and machine code, each made when first needed."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+
+    @cached_property
+    def system(self) -> System:
+        """The assembled equations."""
+        return self.case.system()
+
+    @cached_property
+    def model(self) -> Model:
+        """The compiled system."""
+        return Model(self.system)
+
+    def run(self, changes: Mapping[str, float | str] | None = None, run: Run | None = None) -> Solution:
+        """Run with some parameters or initial values changed, by path; nothing is compiled again."""
+        settings = run or self.case.run
+        try:
+            trajectory = self.model.solve(settings, self._values(changes or {}))
+        except InputError as error:
+            raise self.case.located(error) from None
+        case = self.case
+        accuracy = self._accuracy(trajectory)
+        return Solution(trajectory, case.title, case.source, case.text, case.mechanism_text, accuracy)
+
+    def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
+        units = {parameter.path: parameter.spec.unit for parameter in self.system.parameters}
+        units |= {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
+        unknown = next((path for path in changes if path not in units), None)
+        if unknown is not None:
+            raise InputError(f"no parameter '{unknown}'.{suggestion(unknown, units)}")
+        return {path: parse(value, units[path]) for path, value in changes.items()}
+
+    def _accuracy(self, trajectory: Trajectory) -> Accuracy | None:
+        if len(trajectory.result.times) == 0:
+            return None
+        return self._against_exact(trajectory) if self.case.reference else self._against_tighter(trajectory)
+
+    def _against_exact(self, trajectory: Trajectory) -> Accuracy:
+        from surfacechem.references.matching import exact_values
+
+        assert self.case.reference is not None
+        title, exact = exact_values(self.case.reference, trajectory)
+        columns, states = computed(trajectory), _states(trajectory)
+        errors = {
+            name: relative_error(columns[name], values, FLOOR if name in states else 1.0)
+            for name, values in exact.items()
+            if name in columns
+        }
+        return Accuracy(max(errors.values()), title, errors, {name: exact[name] for name in errors})
+
+    def _against_tighter(self, trajectory: Trajectory) -> Accuracy:
+        tolerance = max(trajectory.run.rtol * TIGHTER, TIGHTEST)
+        second = self.model.resolve(trajectory, tolerance)
+        ours, theirs = _states(trajectory), _states(second)
+        shared = min(len(second.result.times), len(trajectory.result.times))
+        errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
+        return Accuracy(max(errors.values()), f"estimate: a second run at rtol {tolerance:.0e}", errors)
+
+
+def _states(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
+    names = [state.name for state in trajectory.model.system.states]
+    return dict(zip(names, trajectory.result.outputs.T, strict=True))
+
+
+def computed(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
+    """States and named quantities at the output times."""
+    names = [item.name for item in trajectory.model.system.outputs]
+    return _states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
+
+
+def relative_error(values: NDArray[np.float64], exact: NDArray[np.float64], floor: float) -> float:
+    """Largest error relative to the exact value at the same time, or to ``floor`` times its largest if that is more."""
+    largest = float(np.max(np.abs(exact), initial=0.0))
+    if largest == 0.0:
+        return float(np.max(np.abs(values), initial=0.0))
+    return float(np.max(np.abs(values - exact) / np.maximum(np.abs(exact), floor * largest), initial=0.0))

@@ -1,0 +1,253 @@
+"""A run as a labelled dataset: physics, balances, error and run time, in xarray and in netCDF with CF conventions."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surfacechem.audit import Audit, audit
+from surfacechem.errors import InputError, Place
+from surfacechem.integrate import Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+CONVENTIONS = "CF-1.11"
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
+
+    error: float
+    source: str
+    """Words: the exact solution's name, or the second run at tighter tolerance."""
+    variables: Mapping[str, float] = field(default_factory=dict)
+    exact: Mapping[str, Any] = field(default_factory=dict)
+    """Exact values at the output times, by variable, where an exact solution was named."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One variable of the dataset."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    values: Any
+    unit: str
+    long_name: str
+    tag: str = ""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes."""
+        result = {"units": cf_unit(self.unit), "long_name": self.long_name}
+        return result | ({"equation": self.tag} if self.tag else {})
+
+
+def cf_unit(unit: str) -> str:
+    """A unit of this package in the notation of the CF conventions.
+
+    >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1")
+    ('W m-2 K-1', 'm-2', '1')
+    """
+    top, _, bottom = unit.partition("/")
+    factors = [re.sub(r"\^", "", factor) for factor in top.split() if factor != "1"]
+    for factor in bottom.strip("()").split():
+        base, _, power = factor.partition("^")
+        factors.append(f"{base}-{power or 1}")
+    return " ".join(factors) or "1"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
+
+    trajectory: Trajectory
+    title: str = ""
+    source: str = ""
+    case: str = ""
+    mechanism: str = ""
+    accuracy: Accuracy | None = None
+
+    @property
+    def status(self) -> str:
+        """'finished', 'stopped' by physics, or 'failed' numerically."""
+        return self.trajectory.status
+
+    @property
+    def reason(self) -> str:
+        """Why the run ended."""
+        return self.trajectory.reason
+
+    @cached_property
+    def audit(self) -> Audit:
+        """Residuals of the balances and least dissipation."""
+        return audit(self.trajectory)
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Every variable of the dataset, the time coordinate first."""
+        return (*self._states(), *self._named(), *self._ledger(), *self._balances(), *self._exact(), *self._events())
+
+    def _states(self) -> list[Column]:
+        result = self.trajectory.result
+        columns = [Column("time", ("time",), result.times, "s", "time since the start")]
+        for j, state in enumerate(self.trajectory.model.system.states):
+            q = state.quantity
+            columns.append(Column(q.name, ("time",), result.outputs[:, j], q.unit, q.long_name, q.tag))
+        return columns
+
+    def _named(self) -> list[Column]:
+        values = self.trajectory.outputs
+        items = self.trajectory.model.system.outputs
+        return [
+            Column(i.name, ("time",), values[:, j], i.quantity.unit, i.quantity.long_name, i.quantity.tag)
+            for j, i in enumerate(items)
+        ]
+
+    def _ledger(self) -> list[Column]:
+        values = self.trajectory.result.ledger_outputs
+        accounts = [account.quantity for account in self.trajectory.model.system.ledger]
+        return [Column(q.name, ("time",), values[:, j], q.unit, q.long_name) for j, q in enumerate(accounts)]
+
+    def _balances(self) -> list[Column]:
+        books = self.audit
+        columns = [
+            Column("energy_residual", ("time",), books.energy, "J/m^2", "total energy minus the energy supplied"),
+            Column(
+                "entropy_residual",
+                ("time",),
+                books.entropy,
+                "J/(m^2 K)",
+                "total entropy minus the entropy supplied and produced",
+            ),
+        ]
+        if any(account.kind == "bonds" for account in self.trajectory.model.system.ledger):
+            columns.append(
+                Column("site_residual", ("time",), books.sites, "1", "largest residual of the site balances")
+            )
+        for law, low in books.least.items():
+            text = f"least entropy production of {law.replace('_', ' ')}"
+            columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
+        return columns
+
+    def _exact(self) -> list[Column]:
+        exact = self.accuracy.exact if self.accuracy else {}
+        by_name = {c.name: c for c in (*self._states(), *self._named())}
+        return [
+            Column(f"{name}_exact", ("time",), values, by_name[name].unit, f"exact {by_name[name].long_name}")
+            for name, values in exact.items()
+        ]
+
+    def _events(self) -> list[Column]:
+        events = self.trajectory.result.events
+        if len(events.t) == 0:
+            return []
+        margins = self.trajectory.model.system.margins
+        names = np.array([margins[i].reason for i in events.index], dtype=object)
+        return [
+            Column("event_time", ("event",), events.t, "s", "time of the event"),
+            Column("event_reason", ("event",), names, "1", "what happened"),
+        ]
+
+    @cached_property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+        run, result = self.trajectory.run, self.trajectory.result
+        counters = {f"count_{name}": int(value) for name, value in vars(result.counters).items()}
+        books = self.audit
+        return {
+            "Conventions": CONVENTIONS,
+            "title": self.title,
+            "source": self.source or "surfacechem",
+            "case": self.case,
+            **({"mechanism": self.mechanism} if self.mechanism else {}),
+            "status": self.status,
+            "reason": self.reason,
+            "regime": self.trajectory.model.system.regime,
+            "solver": run.solver,
+            "rtol": float(run.rtol),
+            **counters,
+            "time_reached": float(result.t),
+            "run_seconds": float(self.trajectory.seconds),
+            "compile_seconds": float(self.trajectory.model.compile_seconds),
+            **({"error": float(self.accuracy.error), "error_source": self.accuracy.source} if self.accuracy else {}),
+            "energy_error": books.energy_error,
+            "entropy_error": books.entropy_error,
+            "site_error": books.site_error,
+            "entropy_violations": ", ".join(books.violations) or "none",
+            "versions": _versions(),
+        }
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The run as an xarray Dataset."""
+        import xarray
+
+        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
+        time = data.pop("time")
+        return xarray.Dataset(data, coords={"time": time}, attrs=dict(self.attributes))
+
+    def write(self, path: str | Path) -> Path:
+        """Save as netCDF; the file appears whole or not at all."""
+        target = Path(path)
+        with replacing(target) as temporary:
+            _write_netcdf(temporary, self.columns, self.attributes)
+        return target
+
+
+def _versions() -> str:
+    names = ("surfacechem", "numpy", "numba", "symengine")
+    return ", ".join(f"{name} {version(name)}" for name in names)
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """A temporary file beside the target that takes its place when all went well; InputError if it cannot be made."""
+    if target.is_dir():
+        raise InputError("is a directory; give a file name to write to.", Place(str(target)))
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
+        os.close(handle)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror or error}.", Place(str(target))) from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o644)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    import netCDF4
+
+    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        for dimension, size in _dimensions(columns).items():
+            file.createDimension(dimension, size)
+        for column in columns:
+            kind = str if np.asarray(column.values).dtype == object else np.float64
+            variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
+            variable.setncatts(column.attributes)
+            variable[...] = column.values
+        file.setncatts(attributes)
+
+
+def _dimensions(columns: Sequence[Column]) -> dict[str, int]:
+    sizes: dict[str, int] = {}
+    for column in columns:
+        for axis, dimension in enumerate(column.dimensions):
+            sizes[dimension] = np.shape(column.values)[axis]
+    return sizes
