@@ -11,7 +11,8 @@ import shutil
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -57,25 +58,38 @@ def _writable(folder: Path) -> None:
         pass
 
 
-def _compile_cached(function: Callable[..., None], signature: Any, folder: Path) -> Any:
-    """Compile or load through Numba's cache in this folder, without changing the folder of anybody else's functions."""
+@contextmanager
+def _settings(folder: Path | None) -> Iterator[None]:
+    """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
+
+    Loops here run over a handful of states: vectorising and unrolling them doubles the compile time and slows them down.
+    """
     import numba
 
-    _writable(folder)
-    usual = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)
+    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0, "OPT": type(numba.config.OPT)(1)}
+    usual = {name: getattr(numba.config, name) for name in chosen}
     try:
-        return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function)
+        for name, value in chosen.items():
+            setattr(numba.config, name, value)
+        yield
     finally:
-        numba.config.CACHE_DIR = usual
+        for name, value in usual.items():
+            setattr(numba.config, name, value)
+
+
+def _compile(function: Callable[..., None], signature: Any, folder: Path | None) -> Any:
+    import numba
+
+    if folder is not None:
+        _writable(folder)
+    with _settings(folder):
+        return numba.njit(signature, cache=folder is not None, nogil=True, error_model="numpy")(function)
 
 
 def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) -> Any:
     """The compiled function, from the cache if it is sound, else compiled anew, else compiled without a cache."""
-    import numba
-
     try:
-        return _compile_cached(function, signature, folder)
+        return _compile(function, signature, folder)
     except OSError as error:
         problem = error
     except Exception:  # noqa: BLE001 - unpickling damaged files can raise anything.
@@ -83,10 +97,10 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) 
             raise
         shutil.rmtree(folder, ignore_errors=True)
         try:
-            return _compile_cached(function, signature, folder)
+            return _compile(function, signature, folder)
         except OSError as error:
             problem = error
     warnings.warn(
         f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process.", stacklevel=2
     )
-    return numba.njit(signature, nogil=True, error_model="numpy")(function)
+    return _compile(function, signature, None)

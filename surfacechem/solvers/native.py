@@ -9,7 +9,9 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+from numba.core import cgutils
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 
 compiled: Any = numba.njit(error_model="numpy", _nrt=False)
 """Nothing is allocated inside a step; without reference counts the code compiles and runs about twice as fast."""
@@ -54,6 +56,57 @@ class Work(NamedTuple):
     rates: Any
     margin: Any
     fired: Any
+
+
+class WorkType(types.Type):  # type: ignore[misc]
+    """Pointer to a Work. By value its twenty arrays would be 140 arguments of every call."""
+
+    def __init__(self, content: Any) -> None:
+        self.content = content
+        super().__init__(name=f"Pointer({content})")
+
+
+@register_model(WorkType)
+class _WorkModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.IntType(8).as_pointer())
+
+
+@infer_getattr
+class _WorkFields(AttributeTemplate):  # type: ignore[misc]
+    key = WorkType
+
+    def generic_resolve(self, work: Any, name: str) -> Any:
+        return work.content.types[work.content.fields.index(name)]
+
+
+def _load(builder: Any, pointer: Any, kind: Any) -> Any:
+    """Load a structure leaf by leaf, so that unused leaves are dropped."""
+    if not isinstance(kind, ir.Aggregate):
+        return builder.load(pointer)
+    value = ir.Constant(kind, ir.Undefined)
+    for i in range(len(kind)):
+        leaf = builder.gep(pointer, [ir.IntType(32)(0), ir.IntType(32)(i)], inbounds=True)
+        value = builder.insert_value(value, _load(builder, leaf, kind.gep(ir.Constant(ir.IntType(32), i))), i)
+    return value
+
+
+@lower_getattr_generic(WorkType)
+def _load_field(context: Any, builder: Any, work: Any, value: Any, name: str) -> Any:
+    kind = context.get_value_type(work.content)
+    index = ir.IntType(32)(work.content.fields.index(name))
+    pointer = builder.gep(builder.bitcast(value, kind.as_pointer()), [ir.IntType(32)(0), index], inbounds=True)
+    return _load(builder, pointer, pointer.type.pointee)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def reference(_context: Any, content: Any) -> Any:
+    """Pointer to a copy on the caller's stack; the caller keeps the arrays alive."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return builder.bitcast(cgutils.alloca_once_value(builder, args[0]), ir.IntType(8).as_pointer())
+
+    return WorkType(content)(content), generate
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -123,3 +176,9 @@ def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_marg
         np.zeros((5, n_margins)),
         np.zeros(n_margins, np.bool_),
     )
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def keep_alive(work: Work) -> None:
+    """A last use: Numba releases an array after the last statement that names it."""
+    work.clock[0] = 0.0

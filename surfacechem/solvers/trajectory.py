@@ -8,7 +8,7 @@ from surfacechem.solvers.dense import interpolate
 from surfacechem.solvers.locate import find_event, start_margins
 from surfacechem.solvers.native import (
     ATOL, BASE, FRESH, H_FACTORED, LOOSE, M_NOW, M_SLOPE, Q, Q_TRIAL, RTOL, TAU, TRIAL, TRIAL_DOT, Y, YDOT, allocate, compiled,
-    copy,
+    copy, keep_alive, reference,
 )  # fmt: skip
 from surfacechem.solvers.radau_advance import GOOD, INVALID, accept, advance, finish_step, keep_matrices, restart, store_polynomial
 from surfacechem.solvers.radau_step import first_size, loosening
@@ -193,7 +193,8 @@ def run_batch(
     segments: Any, times: Any, ends: Any, counts: Any, counters: Any, outputs: Any, steps: Any, events: Any,
 ) -> None:  # fmt: skip
     """Runs first to last - 1 of a batch; every run writes to its own rows, so the result does not depend on the threads."""
-    w = allocate(code, algebraic, parameters.shape[2], limits[1], kinds.shape[0])
+    work = allocate(code, algebraic, parameters.shape[2], limits[1], kinds.shape[0])
+    w = reference(work)
     w.clock[RTOL] = tolerances[0]
     w.clock[LOOSE] = loosening(tolerances[0])
     w.vector[ATOL] = tolerances[1:]
@@ -201,12 +202,14 @@ def run_batch(
         _run(
             w, y0[i], parameters[i], segments, times, kinds, limits, stop, ends[i], counts[i], counters[i], outputs[i], steps[i], events[i]
         )  # fmt: skip
+    keep_alive(work)
 
 
 def make_consistent(code: Any, algebraic: Any, t: Any, y: Any, ydot: Any, parameters: Any, outcomes: Any) -> None:
     """Consistent states in place, row by row; parameters may be one row for all."""
     n = algebraic.shape[0]
-    w = allocate(code, algebraic, parameters.shape[1], 0, 0)
+    work = allocate(code, algebraic, parameters.shape[1], 0, 0)
+    w = reference(work)
     for i in range(t.shape[0]):
         w.inputs[0] = t[i]
         w.inputs[1 + 2 * n :] = parameters[i if parameters.shape[0] > 1 else 0]
@@ -217,3 +220,4 @@ def make_consistent(code: Any, algebraic: Any, t: Any, y: Any, ydot: Any, parame
         for j in range(n):
             y[i, j] = w.vector[TRIAL, j]
             ydot[i, j] = w.vector[TRIAL_DOT, j]
+    keep_alive(work)
