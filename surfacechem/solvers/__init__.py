@@ -1,1 +1,35 @@
-"""Solvers by name; each is imported when it is asked for."""
+"""Solvers by name; each is imported when it is asked for.
+
+>>> solver("radua")
+Traceback (most recent call last):
+    ...
+ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cvode, ida, lsoda, radau, scipy-radau.
+"""
+
+import difflib
+from importlib import import_module
+
+from surfacechem.solvers.contract import Solver
+
+_FACTORIES = {
+    "radau": ("radau", "Radau"),
+    "lsoda": ("scipy_methods", "lsoda"),
+    "bdf": ("scipy_methods", "bdf"),
+    "scipy-radau": ("scipy_methods", "radau"),
+    "cvode": ("sundials", "CVODESolver"),
+    "ida": ("sundials", "IDASolver"),
+}
+
+names = tuple(_FACTORIES)
+
+
+def solver(name: str) -> Solver:
+    """The solver of this name; 'radau' is our own and the default."""
+    if name not in _FACTORIES:
+        near = difflib.get_close_matches(name, _FACTORIES, n=1)
+        guess = f" Did you mean '{near[0]}'?" if near else ""
+        raise ValueError(f"no solver '{name}'.{guess} Known: {', '.join(sorted(_FACTORIES))}.")
+    module, factory = _FACTORIES[name]
+    made = getattr(import_module(f"surfacechem.solvers.{module}"), factory)()
+    assert isinstance(made, Solver)
+    return made

@@ -22,6 +22,9 @@ CONVERGED, DIVERGED, NOT_FINITE = range(3)
 TIGHT = 0.05
 """Newton error allowed, in units of the tolerance."""
 
+SLOWEST_KNOWN = 0.02
+"""Contraction never assumed better than this: a component that converges at once hides a slower one behind its first correction."""
+
 
 @compiled
 def stage_count(k: int) -> int:
@@ -171,7 +174,7 @@ def solve_stages(w: Any, h: float) -> int:
             w.clock[THETA] = rate
             if rate >= 0.99:
                 return CONVERGED if norm <= min(1e3 * rounding, 1.0) else DIVERGED
-            contraction = rate / (1.0 - rate)
+            contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
             if contraction * norm * rate ** (limit - 1 - iteration) > max(TIGHT, 100.0 * rounding):
                 return DIVERGED
         if contraction * norm <= TIGHT or norm <= 8.0 * rounding:

@@ -1,0 +1,268 @@
+"""Runs with a library's method: its single steps, and around them the segments, events, outputs and checks of the contract."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+
+from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status, explain
+from surfacechem.solvers.radau import consistent
+
+POINTS = 16
+LEDGER_ATOL = 1e100
+"""Takes the ledger out of the library's error norm."""
+
+
+class StepFailure(Exception):
+    """The library could not take a step."""
+
+
+class NoState(Exception):
+    """No consistent state exists at a point the run needs."""
+
+
+@dataclass
+class View:
+    """The problem as a library sees it in one segment: x = [differential or all variables | ledger]."""
+
+    problem: Problem
+    parameters: Array
+    guess: Array
+    """Last algebraic variables found: the start of the next search."""
+    residuals: int = 0
+    jacobians: int = 0
+
+    def inputs(self, t: float, y: Array, ydot: Array) -> Array:
+        return np.concatenate(([t], y, ydot, self.parameters))
+
+    def complete(self, t: float, differential: Array) -> tuple[Array, Array]:
+        """State and derivative with the algebraic variables found from the equations."""
+        program = self.problem.program
+        y = np.where(program.algebraic_mask, self.guess, 0.0)
+        y[~program.algebraic_mask] = differential
+        found = consistent(program, t, y, np.zeros_like(y), self.parameters)
+        self.residuals += 1
+        if not found.valid:
+            return np.full_like(y, np.nan), np.full_like(y, np.nan)
+        self.guess = found.y
+        return found.y, found.ydot
+
+    def ledger_rates(self, t: float, y: Array, ydot: Array) -> Array:
+        ledger = self.problem.program.ledger
+        return np.zeros(0) if ledger is None else ledger(self.inputs(t, y, ydot))
+
+    def margins(self, t: float, y: Array, ydot: Array) -> Array:
+        margins = self.problem.program.margins
+        return np.zeros(0) if margins is None else margins(self.inputs(t, y, ydot))
+
+    def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
+        """G_y and G_ydot."""
+        self.jacobians += 1
+        both = self.problem.program.jacobian(self.inputs(t, y, ydot))
+        n = len(y)
+        return both[: n * n].reshape(n, n), both[n * n :].reshape(n, n)
+
+
+class Method(ABC):
+    """One library method running over one stretch without breakpoints."""
+
+    @abstractmethod
+    def advance(self) -> float:
+        """Take one step of the library's choice; returns the time reached."""
+
+    @abstractmethod
+    def at(self, t: float) -> Array:
+        """x inside the last step."""
+
+
+@dataclass
+class Progress:
+    """What a run has produced so far."""
+
+    problem: Problem
+    started: float
+    t: float
+    y: Array
+    ydot: Array
+    ledger: Array
+    margins: Array
+    sides: Array
+    outputs: list[Array] = field(default_factory=list)
+    events: list[tuple[int, float, Array, Array, Array]] = field(default_factory=list)
+    steps: list[tuple[float, Array, Array, Array]] = field(default_factory=list)
+    count: int = 0
+    residuals: int = 0
+    jacobians: int = 0
+
+    def restart_sides(self, fired: set[int]) -> None:
+        self.sides = np.sign(self.margins)
+        self.sides[list(fired)] = 0.0
+
+    def over_budget(self) -> Status | None:
+        if self.count >= self.problem.max_steps:
+            return Status.MAX_STEPS
+        limit = self.problem.max_seconds
+        return Status.STOPPED if limit is not None and time.monotonic() - self.started > limit else None
+
+
+class SteppingSolver(Solver):
+    """A solver made of a library's single steps."""
+
+    keeps_algebraic = False
+    """Whether x holds the algebraic variables too."""
+
+    @abstractmethod
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+        """Start the library's method at a consistent state."""
+
+    def solve(self, problem: Problem) -> Result:
+        program = problem.program
+        empty = np.zeros(0)
+        progress = Progress(
+            problem, time.monotonic(), float(problem.segments[0]), problem.y0, np.zeros(program.n), np.zeros(program.n_ledger), empty, empty
+        )
+        status = Status.FINISHED
+        for parameters, end in zip(problem.parameters, problem.segments[1:], strict=True):
+            view = View(problem, parameters, progress.y)
+            try:
+                status = self._segment(view, progress, float(end))
+            except NoState:
+                status = Status.NO_CONSISTENT_STATE
+            except StepFailure:
+                status = Status.STEP_UNDERFLOW if np.all(np.isfinite(progress.y)) else Status.NOT_FINITE
+            progress.residuals += view.residuals
+            progress.jacobians += view.jacobians
+            if status != Status.FINISHED:
+                break
+        return _result(progress, status)
+
+    def _split(self, view: View, t: float, x: Array) -> tuple[Array, Array, Array]:
+        """y, ydot, ledger of x."""
+        mask = view.problem.program.algebraic_mask
+        size = len(mask) if self.keeps_algebraic else int(np.sum(~mask))
+        if self.keeps_algebraic:
+            view.guess = x[:size]
+        differential = x[:size][~mask] if self.keeps_algebraic else x[:size]
+        return *view.complete(t, differential), x[size:]
+
+    def _segment(self, view: View, progress: Progress, end: float) -> Status:
+        fired: set[int] = set()
+        while progress.t < end:
+            start = progress.t
+            progress.y, progress.ydot = view.complete(start, progress.y[~view.problem.program.algebraic_mask])
+            if not np.all(np.isfinite(progress.y)):
+                raise NoState
+            progress.margins = view.margins(start, progress.y, progress.ydot)
+            progress.restart_sides(fired)
+            _start_tables(progress)
+            method = self.begin(view, start, end, progress.y, progress.ydot, progress.ledger)
+            fired = self._stretch(view, progress, method, end)
+            if any(view.problem.margins[i].terminal for i in fired):
+                return Status.EVENT
+            over = progress.over_budget()
+            if over is not None and progress.t < end:
+                return over
+        return Status.FINISHED
+
+    def _stretch(self, view: View, progress: Progress, method: Method, end: float) -> set[int]:
+        """Step until an event, the end of the segment or of the budget; returns the margins that fired."""
+        while progress.t < end and progress.over_budget() is None:
+            reached = min(method.advance(), end)
+            if not reached > progress.t:
+                raise StepFailure("the step size fell to zero")
+            fired: set[int] = set()
+            if view.problem.margins:
+                reached, fired = self._find_event(view, progress, method, reached)
+            self._write_outputs(view, progress, method, reached)
+            y, ydot, ledger = self._split(view, reached, method.at(reached))
+            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
+                raise StepFailure("a state is not finite")
+            progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
+            progress.margins = view.margins(reached, y, ydot)
+            progress.count += 1
+            if view.problem.record_steps:
+                progress.steps.append((reached, y, ydot, ledger))
+            progress.events.extend((i, reached, y, ydot, ledger) for i in sorted(fired))
+            if fired:
+                return fired
+        return set()
+
+    def _margins(self, view: View, method: Method, t: float) -> Array:
+        y, ydot, _ = self._split(view, t, method.at(t))
+        return view.margins(t, y, ydot)
+
+    def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
+        low = progress.t
+        for t in np.linspace(progress.t, reached, POINTS + 1)[1:]:
+            values = self._margins(view, method, t)
+            crossing = [i for i, kind in enumerate(view.problem.margins) if _crosses(progress.sides[i], values[i], kind.direction)]
+            if crossing:
+                zeros = {i: _zero(lambda s, i=i: float(self._margins(view, method, s)[i]), low, t) for i in crossing}  # type: ignore[misc]
+                first = min(zeros.values())
+                near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
+                return first, {i for i, zero in zeros.items() if zero <= first + near}
+            progress.sides = np.where(values != 0.0, np.sign(values), progress.sides)
+            low = t
+        return reached, set()
+
+    def _write_outputs(self, view: View, progress: Progress, method: Method, reached: float) -> None:
+        times = view.problem.times
+        while len(progress.outputs) < len(times) and times[len(progress.outputs)] <= reached:
+            t = float(times[len(progress.outputs)])
+            y, _, ledger = self._split(view, t, method.at(t))
+            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ledger))):
+                raise StepFailure("an output is not finite")
+            progress.outputs.append(np.concatenate((y, ledger)))
+
+
+def _start_tables(progress: Progress) -> None:
+    """The initial state as first output and first step."""
+    times = progress.problem.times
+    if not progress.outputs and len(times) and times[0] <= progress.t:
+        progress.outputs.append(np.concatenate((progress.y, progress.ledger)))
+    if progress.problem.record_steps and not progress.steps:
+        progress.steps.append((progress.t, progress.y, progress.ydot, progress.ledger))
+
+
+def _crosses(side: float, value: float, direction: int) -> bool:
+    return (side > 0.0 >= value and direction <= 0) or (side < 0.0 <= value and direction >= 0)
+
+
+def _zero(margin: Callable[[float], float], low: float, high: float) -> float:
+    """Zero in the bracket; its lower end where a margin starts on the far side already."""
+    if margin(low) * margin(high) >= 0.0:
+        return high if margin(high) == 0.0 else float(np.nextafter(low, high))
+    return float(brentq(margin, low, high, xtol=1e-300, rtol=4 * np.finfo(float).eps))
+
+
+def _rows(rows: list[tuple[float, Array, Array, Array]], problem: Problem) -> tuple[Array, Array, Array, Array]:
+    widths = (problem.program.n, problem.program.n, problem.program.n_ledger)
+    t = np.array([row[0] for row in rows])
+    y, ydot, ledger = (np.array([row[1 + i] for row in rows]).reshape(len(rows), width) for i, width in enumerate(widths))
+    return t, y, ydot, ledger
+
+
+def _result(progress: Progress, status: Status) -> Result:
+    problem, n = progress.problem, progress.problem.program.n
+    terminal = [event[0] for event in progress.events if problem.margins[event[0]].terminal]
+    outputs = np.array(progress.outputs).reshape(-1, n + problem.program.n_ledger)
+    index = np.array([event[0] for event in progress.events], dtype=np.int64)
+    return Result(
+        problem=problem,
+        status=status,
+        message=explain(status, progress.t, progress.margins, terminal[-1] if status == Status.EVENT else None),
+        t=progress.t,
+        y=progress.y,
+        ydot=progress.ydot,
+        ledger=progress.ledger,
+        margins=progress.margins,
+        times=problem.times[: len(outputs)],
+        outputs=outputs[:, :n],
+        ledger_outputs=outputs[:, n:],
+        events=Events(*_rows([event[1:] for event in progress.events], problem), index=index),
+        counters=Counters(steps=progress.count, residuals=progress.residuals, jacobians=progress.jacobians),
+        steps=Points(*_rows(progress.steps, problem)) if problem.record_steps else None,
+    )

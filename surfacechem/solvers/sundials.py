@@ -1,0 +1,91 @@
+"""SUNDIALS' CVODE and IDA under the contract, through scikit-sundae."""
+
+from typing import Any
+
+import numpy as np
+from sksundae.cvode import CVODE
+from sksundae.ida import IDA
+
+from surfacechem.solvers.contract import Array
+from surfacechem.solvers.reduced import Reduced
+from surfacechem.solvers.stepping import LEDGER_ATOL, Method, StepFailure, SteppingSolver, View
+
+
+class _Stretch(Method):
+    """Single steps of either library; interpolation inside the last step is a step back to it."""
+
+    def __init__(self, library: Any, t: float, end: float, *start: Array) -> None:
+        self.library = library
+        self.end = end
+        self.t = t
+        self.x = start[0]
+        self._call(lambda: library.init_step(t, *start))
+
+    def _call(self, action: Any) -> Any:
+        try:
+            answer = action()
+        except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, SystemError) as error:
+            raise StepFailure(str(error)) from error
+        if not answer.success:
+            raise StepFailure(str(answer.message))
+        return answer
+
+    def advance(self) -> float:
+        answer = self._call(lambda: self.library.step(self.end, method="onestep", tstop=self.end))
+        self.t, self.x = float(answer.t), np.array(answer.y)
+        return self.t
+
+    def at(self, t: float) -> Array:
+        if t == self.t:
+            return self.x
+        answer = self._call(lambda: self.library.step(t, method="normal", tstop=self.end))
+        if not abs(answer.t - t) <= 1e-12 * abs(t):
+            raise StepFailure(f"asked for t = {t}, given t = {answer.t}")
+        return np.array(answer.y)
+
+
+class CVODESolver(SteppingSolver):
+    """BDF of variable order; algebraic variables are eliminated inside the right-hand side."""
+
+    name = "cvode"
+
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+        system = Reduced(view)
+
+        def rates(t: float, x: Array, out: Array) -> None:
+            out[:] = system.rates(t, x)
+
+        def jacobian(t: float, x: Array, _rates: Array, out: Array) -> None:
+            out[:] = system.jacobian(t, x)
+
+        library = CVODE(rates, rtol=view.problem.rtol, atol=system.atol, jacfn=jacobian, max_num_steps=100_000)
+        return _Stretch(library, t, end, system.start(y, ledger))
+
+
+class IDASolver(SteppingSolver):
+    """BDF of variable order on the implicit equations themselves."""
+
+    name = "ida"
+    keeps_algebraic = True
+
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+        program = view.problem.program
+        n = program.n
+
+        def residual(t: float, x: Array, rate: Array, out: Array) -> None:
+            view.residuals += 1
+            out[:n] = program.residual(view.inputs(t, x[:n], rate[:n]))
+            out[n:] = rate[n:] - view.ledger_rates(t, x[:n], rate[:n])
+
+        def jacobian(t: float, x: Array, rate: Array, _residual: Array, shift: float, out: Array) -> None:
+            by_state, by_rate = view.matrices(t, x[:n], rate[:n])
+            out[:] = shift * np.eye(len(x))
+            out[:n, :n] = by_state + shift * by_rate
+
+        atol = np.concatenate((view.problem.atol, np.full(program.n_ledger, LEDGER_ATOL)))
+        library = IDA(
+            residual, rtol=view.problem.rtol, atol=atol, jacfn=jacobian, max_num_steps=100_000,
+            algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
+        )  # fmt: skip
+        start = np.concatenate((y, ledger))
+        return _Stretch(library, t, end, start, np.concatenate((ydot, view.ledger_rates(t, y, ydot))))
