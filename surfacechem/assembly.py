@@ -205,6 +205,7 @@ class Build:
                 f"N_{variable.name}", f"interface.{variable.name}.density", "1/m^2", "site density", variable.density
             )
             self._bonding_state(Quantity(variable.name, "1", variable.long_name), density, 1.0)
+            self._amounts(variable.name, density)
         if self.interface.bonds:
             self.variables.define("phi", self._derived_phi, "derived", "coverages of bonds")
 
@@ -213,6 +214,11 @@ class Build:
         if not self.variables.has("J_c"):
             return nominal
         return self.name(VARIABLES["n_c"], nominal / self.stretch)
+
+    def _amounts(self, name: str, density: Expression) -> None:
+        """What a bonding variable amounts to where it is one: N_x per reference area, n_x per current area."""
+        self.variables.define(f"N_{name}", lambda: density, "constant", f"interface.{name}")
+        self.variables.define(f"n_{name}", lambda: density / self.stretch, "derived", f"interface.{name}")
 
     def _derived_phi(self) -> Expression:
         N_c = self.variables.get("N_c", "the bonding state")
@@ -249,7 +255,7 @@ class Build:
         """the sum of the interface's potentials, and the tractions that follow."""
         for law in self.interface.potentials:
             bound = self.variables.bind(law)
-            self.psi += self.variables.call(bound, bound.energy)
+            self.psi += self.variables.call(bound, bound.statement)
         if self.interface.temperature is not None:
             node = self.node_of["interface"]
             node.energies["interface"] = self.psi
@@ -318,7 +324,7 @@ class Build:
         if "phi" in self.bonding:
             symbol, _, density = self.bonding["phi"]
             own["dmu_dphi"] = symengine.diff(symengine.diff(self.psi, symbol), symbol) / density
-        rate = self.variables.call(bound, bound.rate, own)
+        rate = self.variables.call(bound, bound.statement, own)
         self._law_margins(law, own)
         return self.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
 
@@ -344,7 +350,7 @@ class Build:
         for law in self.interface.frictions:
             label = self.label(law)
             bound = self.variables.bind(law)
-            traction = self.variables.call(bound, bound.traction)
+            traction = self.variables.call(bound, bound.statement)
             self._law_margins(law, {})
             traction = self.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
             v = self.variables.get("v", law)
@@ -390,7 +396,7 @@ class Build:
         if nodes[0] is nodes[1]:
             raise InputError(f"heat path between {a} and {b}: both share the temperature {nodes[0].name}; remove it.")
         bound = self.variables.bind(law)
-        h = self.variables.call(bound, bound.conductance)
+        h = self.variables.call(bound, bound.statement)
         area = symengine.Integer(1) if "surroundings" in (a, b) else self.stretch
         quantity = Quantity(self.label_path(law), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
         difference = nodes[0].T - nodes[1].T
@@ -580,6 +586,8 @@ class Build:
         self.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
         self.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
         self._fluxes()
+        if self.interface.bonds:
+            self.name(VARIABLES["phi"], self.variables.get("phi", "the dataset"))
 
     def _total(self, name: str, unit: str, what: str, member: str, expression: Expression) -> Expression:
         return self.name(Quantity(name, unit, f"{what} of {member}"), expression)

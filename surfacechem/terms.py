@@ -84,6 +84,8 @@ class Law(ABC):
     """A named law with parameters as fields. Subclasses become frozen, keyword-only dataclasses."""
 
     contract: ClassVar[str] = "law"
+    formula: ClassVar[str] = ""
+    """Name of the method that states the law."""
     positive: ClassVar[tuple[str, ...]] = ()
     """Variables that must stay above zero for the law to hold."""
 
@@ -107,6 +109,12 @@ class Law(ABC):
     def name(cls) -> str:
         """The name of the law in a case file."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
+
+    @property
+    def statement(self) -> Callable[..., Expression]:
+        """The bound method that states the law."""
+        method: Callable[..., Expression] = getattr(self, self.formula)
+        return method
 
     @property
     def path(self) -> str:
@@ -136,6 +144,10 @@ class Law(ABC):
         for item in dataclasses.fields(cls):  # type: ignore[arg-type]
             if "option" in item.metadata:
                 yield item.name, item.metadata["option"]
+
+    def refine(self, name: str, spec: Spec) -> Spec:
+        """Specification of a parameter of this very law, where its unit depends on the other fields."""
+        return spec
 
     def is_default(self, name: str) -> bool:
         """Whether a parameter was left at its default, so that it is a constant of the formula."""
@@ -167,6 +179,7 @@ class Factor(Law):
     """How a parameter varies with one variable; multiplies the parameter's value."""
 
     contract = "factor"
+    formula = "factor"
 
     of: str = option("variable it depends on", default="T_c")
 
@@ -177,6 +190,7 @@ class Potential(Law):
     """A term of the interface's Helmholtz free energy per unit reference area [J/m^2]."""
 
     contract = "potential"
+    formula = "energy"
 
     energy: ClassVar[Callable[..., Expression]]
 
@@ -185,6 +199,7 @@ class BodyEnergy(Law):
     """Helmholtz free energy of a body per unit reference area [J/m^2] as a function of its temperature."""
 
     contract = "capacity"
+    formula = "energy"
 
     @abstractmethod
     def energy(self, T: Expression, T_0: Expression) -> Expression:
@@ -195,6 +210,7 @@ class Friction(Law):
     """Tangential traction [Pa] in the direction of sliding; dissipates traction * v >= 0."""
 
     contract = "friction"
+    formula = "traction"
 
     traction: ClassVar[Callable[..., Expression]]
 
@@ -203,6 +219,7 @@ class RateLaw(Law):
     """Net rate [1/(m^2 s)] of a reaction per unit current area; dissipates -mu * rate >= 0."""
 
     contract = "bonding"
+    formula = "rate"
 
     rate: ClassVar[Callable[..., Expression]]
 
@@ -215,6 +232,7 @@ class HeatTransfer(Law):
     """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold."""
 
     contract = "heat"
+    formula = "conductance"
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
     conductance: ClassVar[Callable[..., Expression]]
@@ -224,6 +242,7 @@ class Load(Law):
     """Prescribed history of a variable."""
 
     contract = "loading"
+    formula = "value"
 
     local: ClassVar[dict[str, str]] = {}
     """Names and units of fields whose values change from one piece of the history to the next."""

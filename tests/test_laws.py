@@ -1,0 +1,122 @@
+"""What holds for every law without naming one: documented, sourced, with units, the same for floats and symbols."""
+
+import dataclasses
+import inspect
+import math
+import random
+
+import pytest
+import symengine
+
+from surfacechem.errors import InputError
+from surfacechem.laws import FAMILIES, find, laws
+from surfacechem.quantities import VARIABLES
+from surfacechem.terms import Factor, Friction, HeatTransfer, Law, Load, RateLaw, Varying, reads
+
+EVERY = [law for contract in FAMILIES for law in laws(contract).values()]
+OPTIONS = {"between": ("lower", "upper"), "of": "T_c", "times": (0.0, 1.0, 3.0), "values": (1.0, 2.0, 0.5)}
+READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
+SAMPLES = 20
+
+each_law = pytest.mark.parametrize("law", EVERY, ids=lambda law: f"{law.contract}-{law.name()}")
+
+
+def example(law: type[Law], seed: int) -> Law:
+    """An instance with random admissible parameters."""
+    draw = random.Random(f"{law.name()}{seed}")
+    values = {name: draw.uniform(0.1, 0.9) for name, _ in law.specs()}
+    return law(**values, **{name: OPTIONS[name] for name, _ in law.options()})
+
+
+def point(law: Law, seed: int) -> dict[str, float]:
+    draw = random.Random(seed)
+    return {name: draw.uniform(0.1, 0.9) for name in reads(law.statement)}
+
+
+@each_law
+def test_documented_with_formula_source_and_worked_number(law):
+    text = inspect.getdoc(law)
+    assert ".. math::" in text
+    assert "Source:" in text
+    assert ">>> " in text
+
+
+@each_law
+def test_every_parameter_has_unit_meaning_and_range(law):
+    for name, spec in law.specs():
+        assert spec.unit, name
+        assert spec.text, name
+        assert spec.range
+
+
+@each_law
+def test_reads_only_quantities_of_the_table(law):
+    assert set(reads(example(law, 0).statement)) <= READABLE
+
+
+@each_law
+def test_floats_and_symbols_agree(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        if isinstance(instance, Load):
+            instance = instance.bind(instance.piece(0.5))
+        values = point(instance, seed)
+        symbols = {name: symengine.Symbol(name) for name in values}
+        symbolic = symengine.sympify(instance.statement(**symbols))
+        number = instance.statement(**values)
+        substituted = symbolic.subs({symbols[name]: value for name, value in values.items()})
+        assert float(substituted) == pytest.approx(number, rel=1e-12, abs=1e-16)
+
+
+@pytest.mark.parametrize("law", laws(Friction).values(), ids=lambda law: law.name())
+def test_friction_never_drives(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        values = point(instance, seed)
+        for v in (values["v"], -values["v"], 0.0):
+            assert instance.traction(**values | {"v": v}) * v >= 0
+
+
+@pytest.mark.parametrize("law", laws(RateLaw).values(), ids=lambda law: law.name())
+def test_reaction_runs_downhill(law):
+    """Laws that read the affinity are admissible for any sign of it; the others state their condition."""
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        values = point(instance, seed)
+        for mu in (values.get("mu", -1.0) * 1e-20, -1e-20):
+            state = values | ({"mu": mu} if "mu" in values else {})
+            assert -mu * instance.rate(**state) >= 0 or "mu" not in values
+
+
+@pytest.mark.parametrize("law", laws(HeatTransfer).values(), ids=lambda law: law.name())
+def test_heat_flows_from_hot_to_cold(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        assert instance.conductance(**point(instance, seed)) >= 0
+
+
+@each_law
+def test_refuses_what_is_not_finite_or_out_of_range(law):
+    good = example(law, 0)
+    fields = {item.name: getattr(good, item.name) for item in dataclasses.fields(good) if item.name != "place"}
+    for name, spec in law.specs():
+        bad = [math.nan, math.inf]
+        bad += [spec.above] * math.isfinite(spec.above) + [spec.at_least - 1] * math.isfinite(spec.at_least)
+        for value in bad:
+            with pytest.raises(InputError, match=name):
+                law(**fields | {name: value})
+
+
+def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest():
+    assert find(Friction, "coulomb").name() == "coulomb"
+    with pytest.raises(
+        InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: coulomb, viscous"
+    ):
+        find(Friction, "colomb")
+
+
+def test_a_parameter_that_varies_is_its_value_times_factors():
+    factor = find(Factor, "linear")(of="phi", slope=0.5)
+    law = find(Friction, "coulomb")(mu=Varying(0.3, (factor,)))
+    assert law.mu.value == 0.3
+    assert law.mu.factors[0].factor(x=1.0) == 1.5
