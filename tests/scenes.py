@@ -1,0 +1,173 @@
+"""Scenes built in Python: one for each thermal regime and coupling."""
+
+from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity, NormalStiffness, TangentialStiffness
+from surfacechem.laws.factors import Activated, Exponential, Linear, LinearInTemperature, Polynomial, Power
+from surfacechem.laws.friction import Coulomb, Viscous
+from surfacechem.laws.heat import Conductance
+from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.scene import Body, Interface, Scene, Sites
+from surfacechem.terms import Varying
+
+SITES = Sites(1e18, 1e18)
+
+
+def varying(value, *factors):
+    return Varying(value, factors)
+
+
+def bodies(first="T_1", second="T_2", energy=Quadratic, C_1=40.0, C_2=25.0):
+    return Body("lower", first, energy(C=C_1)), Body("upper", second, energy(C=C_2))
+
+
+def path(a, b, h):
+    return Conductance(between=(a, b), h=h)
+
+
+def perfect_contact(potentials, reactions=(), phi=0.0, T=300.0, C_1=1.0, C_2=1.0, energy=Quadratic, T_0=300.0, **rest):
+    """Both bodies and the interface at one temperature."""
+    interface = Interface(
+        "T",
+        potentials,
+        reactions=reactions,
+        sites=SITES,
+        frictions=rest.pop("frictions", ()),
+    )
+    initial = {"T": T} | ({"phi": phi} if reactions else {})
+    return Scene(bodies("T", "T", energy, C_1, C_2), interface, T_0=T_0, initial=initial, **rest)
+
+
+def coupled() -> Scene:
+    """Everything depends on everything: the interface has its own temperature, a moving gap, bonds and friction."""
+    potentials = [
+        NormalStiffness(E_n=varying(1e12, Linear(of="phi", slope=0.5), LinearInTemperature(slope=-2e-3))),
+        TangentialStiffness(E_t=varying(2e11, Linear(of="phi", slope=0.8))),
+        InterfaceCapacity(C_c=varying(2.0, Linear(of="phi", slope=0.3))),
+        BondEnergy(
+            K_0=300.0,
+            K_1=80.0,
+            K_2=40.0,
+            K=varying(1.0, Linear(of="g_n", slope=2e5)),
+            phi_eq=varying(0.9, Polynomial(c_0=2 / 3, c_1=1 / 3)),
+        ),
+    ]
+    interface = Interface(
+        "T_c",
+        potentials,
+        [Viscous(eta=varying(0.05, Exponential(beta=0.01)))],
+        [LinearAffinity(c_r=varying(1e16, Activated(E_a=3e4)))],
+        SITES,
+    )
+    heat = [path("interface", "lower", 900.0), path("upper", "interface", 300.0), path("lower", "upper", 50.0)]
+    loading = {
+        "g_n": Harmonic(mean=1e-6, amplitude=5e-7, frequency=0.5),
+        "g_t": Ramp(start=1e-7, rate=1e-8),
+        "v": Hold(level=0.2),
+        "Q_1": Hold(level=20.0),
+        "Q_c": Ramp(start=5.0, rate=1.0),
+    }
+    return Scene(
+        bodies(), interface, heat, loading, None, 300.0, {"T_1": 300.0, "T_2": 310.0, "T_c": 320.0, "phi": 0.4}
+    )
+
+
+def no_medium() -> Scene:
+    """The bodies touch directly; half of another split of the heat goes into body 1."""
+    interface = Interface(
+        None,
+        [BondEnergy(K_0=300.0)],
+        [Coulomb(mu=varying(0.3, Power(exponent=-1.0)))],
+        [LinearAffinity(c_r=1e16)],
+        SITES,
+        partition=0.3,
+    )
+    loading = {"v": Hold(level=0.02), "p": Hold(level=1e5), "Q_c": Hold(level=3.0)}
+    initial = {"T_1": 290.0, "T_2": 330.0, "phi": 0.1}
+    return Scene(bodies(energy=Constant), interface, [path("lower", "upper", 250.0)], loading, None, 300.0, initial)
+
+
+def algebraic() -> Scene:
+    """A medium without capacity whose friction falls with temperature."""
+    interface = Interface("T_c", [], [Viscous(eta=varying(0.1, Exponential(beta=0.02)))])
+    heat = [path("interface", "lower", 2500.0), path("interface", "upper", 700.0)]
+    loading = {"v": Hold(level=0.1), "g_n": Hold(level=1e-6)}
+    return Scene(bodies(energy=Constant), interface, heat, loading, None, 300.0, {"T_1": 290.0, "T_2": 350.0})
+
+
+def one_sided() -> Scene:
+    """The interface is in perfect contact with body 1 only; the other body loses heat to the surroundings."""
+    interface = Interface("T_1", [BondEnergy(K_2=20.0), InterfaceCapacity(C_c=3.0)], (), [Relaxation(tau=0.5)], SITES)
+    heat = [path("interface", "upper", 100.0), path("upper", "surroundings", 12.0)]
+    return Scene(bodies(), interface, heat, {}, Hold(level=280.0), 300.0, {"T_1": 310.0, "T_2": 290.0, "phi": 0.0})
+
+
+def reservoirs() -> Scene:
+    """One body is a reservoir, the other follows a prescribed temperature."""
+    pair = Body("lower", Hold(level=310.0)), Body("upper", Ramp(start=300.0, rate=2.0), Quadratic(C=10.0))
+    interface = Interface(
+        "T_c",
+        [BondEnergy(K_0=30.0, K_1=5.0), ConstantInterfaceCapacity(C_c=2.0)],
+        (),
+        [ExponentialAffinity(C_r=1e36)],
+        SITES,
+    )
+    heat = [path("lower", "interface", 100.0), path("interface", "upper", 70.0)]
+    return Scene(pair, interface, heat, {}, None, 300.0, {"T_c": 305.0, "phi": 0.2})
+
+
+def prescribed_medium() -> Scene:
+    """A medium that is kept at a temperature from outside."""
+    interface = Interface(Harmonic(mean=300.0, amplitude=5.0, frequency=1.0), [InterfaceCapacity(C_c=2.0)])
+    heat = [path("lower", "interface", 100.0), path("interface", "upper", 70.0)]
+    return Scene(bodies(), interface, heat, {}, None, 300.0, {"T_1": 305.0, "T_2": 295.0})
+
+
+def stretched() -> Scene:
+    """The reference surface stretches while bonds form; the second surface, with fewer sites, limits them."""
+    interface = Interface(
+        "T_c",
+        [LatticeGas(epsilon=1e-20), InterfaceCapacity(C_c=3.0)],
+        [Coulomb(mu=0.3)],
+        [ExponentialAffinity(C_r=1e38)],
+        Sites(1e18, 6e17, 1),
+    )
+    heat = [path("lower", "interface", 100.0), path("interface", "upper", 70.0)]
+    loading = {"J_c": Ramp(start=1.0, rate=0.1), "v": Hold(level=0.01), "p": Hold(level=1e4)}
+    return Scene(
+        bodies(), interface, heat, loading, None, 300.0, {"T_1": 300.0, "T_2": 300.0, "T_c": 300.0, "phi": 0.1}
+    )
+
+
+def prescribed_bonding() -> Scene:
+    """Bonds form as told; their heat still follows."""
+    loading = {"phi": Table(times=[0.0, 1.0, 2.0], values=[0.0, 0.5, 0.6])}
+    interface = Interface("T", [BondEnergy(K_0=100.0)], sites=SITES)
+    return Scene(bodies("T", "T"), interface, (), loading, None, 300.0, {"T": 300.0})
+
+
+def cure() -> Scene:
+    """A constant heat of reaction, thermally activated, between bodies of constant capacity."""
+    reaction = Arrhenius(A=1e13, E_a=1.1e5)
+    return perfect_contact([LinearEnthalpy(H_r=300.0)], [reaction], T=320.0, energy=Constant)
+
+
+def sliding() -> Scene:
+    """Dry sliding that reverses."""
+    loading = {"v": Harmonic(amplitude=0.02, frequency=1.0), "p": Hold(level=1e5)}
+    return perfect_contact([], frictions=[Coulomb(mu=0.3)], C_1=2000.0, C_2=2000.0, loading=loading)
+
+
+ALL = [
+    coupled,
+    no_medium,
+    algebraic,
+    one_sided,
+    reservoirs,
+    prescribed_medium,
+    stretched,
+    prescribed_bonding,
+    cure,
+    sliding,
+]

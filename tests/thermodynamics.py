@@ -1,0 +1,117 @@
+"""Both laws of thermodynamics on assembled equations, to 40 digits: no solver is involved."""
+
+import random
+
+import mpmath
+import symengine
+
+from surfacechem.system import System
+
+BITS = 200
+DIGITS = 40
+mpmath.mp.prec = BITS
+
+
+def number(expression, point) -> mpmath.mpf:
+    """The value of an expression at a point, to BITS bits; doubles in it count as the exact numbers they are."""
+    expression = symengine.sympify(expression)
+    if expression.is_Symbol:
+        return point[expression]
+    if expression.is_Number:
+        return _mpf(expression)
+    if expression == symengine.E:
+        return +mpmath.e
+    name = type(expression).__name__
+    if name == "Piecewise":
+        pairs = list(zip(expression.args[::2], expression.args[1::2], strict=True))
+        return next(number(value, point) for value, condition in pairs if _holds(condition, point))
+    arguments = [number(argument, point) for argument in expression.args]
+    return OPERATIONS.get(name, getattr(mpmath, name.lower(), None))(*arguments)
+
+
+def _mpf(value) -> mpmath.mpf:
+    if isinstance(value, symengine.Rational):
+        top, bottom = value.get_num_den()
+        return mpmath.mpf(int(top)) / int(bottom)
+    return mpmath.mpf(float(value))
+
+
+def _holds(condition, point) -> bool:
+    if condition in (True, symengine.true):
+        return True
+    left, right = (number(argument, point) for argument in condition.args)
+    return {"StrictLessThan": left < right, "LessThan": left <= right}[type(condition).__name__]
+
+
+OPERATIONS = {
+    "Add": lambda *terms: mpmath.fsum(terms),
+    "Mul": lambda *factors: mpmath.fprod(factors),
+    "Pow": lambda base, exponent: base**exponent,
+}
+
+
+def start_point(system: System, seed: int) -> dict:
+    """Parameters as they are, states moved a little at random, time early in the run."""
+    draw = random.Random(seed)
+    point = {parameter.symbol: mpmath.mpf(parameter.at(0.0)) for parameter in system.parameters}
+    point[system.t] = mpmath.mpf(draw.uniform(0.0, 0.1))
+    for state in system.states:
+        inside = (
+            state.initial + draw.uniform(0.05, 0.4) if state.scale == 1.0 else state.initial * draw.uniform(0.95, 1.05)
+        )
+        point[state.symbol] = mpmath.mpf(min(inside, 0.95) if state.scale == 1.0 else inside)
+        point[state.dot] = mpmath.mpf(0)
+    return point
+
+
+def consistent_point(system: System, seed: int) -> dict:
+    """A point at which the equations hold to DIGITS digits: Newton on derivatives and algebraic variables."""
+    point = start_point(system, seed)
+    unknowns = [state.symbol if state.algebraic else state.dot for state in system.states]
+    rows = system.residual()
+    slopes = [[symengine.diff(row, unknown) for unknown in unknowns] for row in rows]
+    for _ in range(50):
+        matrix = mpmath.matrix([[number(entry, point) for entry in row] for row in slopes])
+        step = mpmath.lu_solve(matrix, -mpmath.matrix([number(row, point) for row in rows]))
+        for unknown, change in zip(unknowns, step, strict=True):
+            point[unknown] += change
+        if all(abs(change) <= 1e-50 * (1 + abs(point[u])) for u, change in zip(unknowns, step, strict=True)):
+            return point
+    raise AssertionError("no consistent point")
+
+
+def rate(system: System, name: str):
+    """Time derivative of a named quantity that depends on t and the states."""
+    total = system.expand(symengine.Symbol(name))
+    result = symengine.diff(total, system.t)
+    for state in system.states:
+        result += symengine.diff(total, state.symbol) * state.dot
+    return result
+
+
+def booked(system: System, *kinds: str) -> list:
+    return [system.expand(account.rate) for account in system.ledger if account.kind in kinds]
+
+
+def closes(total, parts, point) -> bool:
+    """Whether the total is the sum of its parts, relative to the largest of them."""
+    values = [number(part, point) for part in parts]
+    whole = number(total, point)
+    scale = max([abs(whole), *(abs(value) for value in values)], default=mpmath.mpf(0))
+    return bool(abs(whole - sum(values)) <= scale * mpmath.mpf(10) ** -DIGITS)
+
+
+def first_law_holds(system: System, point) -> bool:
+    """dE/dt is what is supplied."""
+    return closes(rate(system, "E_total"), booked(system, "energy supply"), point)
+
+
+def second_law_holds(system: System, point) -> bool:
+    """dS/dt is what is supplied and produced."""
+    return closes(rate(system, "S_total"), booked(system, "entropy supply", "entropy production"), point)
+
+
+def productions(system: System, point) -> dict[str, mpmath.mpf]:
+    """Entropy production of each law."""
+    accounts = [account for account in system.ledger if account.kind == "entropy production"]
+    return {account.law: number(system.expand(account.rate), point) for account in accounts}
