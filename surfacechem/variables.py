@@ -113,7 +113,7 @@ class Variables:
         """The law with every numeric parameter replaced by its symbol, times its factors where it varies."""
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
-            values[name] = self._parameter(law, name, spec, suffix)
+            values[name] = self._parameter(law, name, law.refine(name, spec), suffix)
         if isinstance(law, Load):
             for name, unit in law.local.items():
                 spec = Spec(unit, f"{name} of the present piece")

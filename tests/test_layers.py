@@ -13,15 +13,15 @@ import surfacechem.data
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
     "words": ["quantities", "expressions", "units", "errors", "data"],
-    "contracts": ["terms"],
-    "core": ["scene", "balances", "variables", "system", "assembly", "compile"],
+    "contracts": ["terms", "scene"],
+    "core": ["balances", "variables", "system", "assembly", "compile"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
     "studies": ["references.*", "sweep", "precision", "stability", "plots"],
     "doors": ["case", "reactor", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
-WING = ["laws.*", "mechanism"]
+WING = ["laws.*", "mechanism.*"]
 WING_SEES = ["words", "contracts"]
 SEES_WING = ["studies", "doors"]
 
