@@ -11,7 +11,7 @@ import symengine
 from surfacechem import balances
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import Expression, depends
+from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body, Scene
 from surfacechem.system import Account, Margin, Named, State, System
@@ -101,7 +101,7 @@ class Build:
     def rate_of(self, symbol: Any) -> Expression:
         """Time derivative of a prescribed variable."""
         expression = next(item.expression for item in self.named if item.name == str(symbol))
-        return symengine.diff(symengine.sympify(expression), self.t)
+        return derivative(expression, self.t)
 
     @property
     def stretch(self) -> Expression:
@@ -201,11 +201,11 @@ class Build:
             limit = sites.phi_max if sites else 1.0
             self._bonding_state(VARIABLES["phi"], self.variables.get("N_c", "the bonding reaction"), limit)
         for variable in self.interface.variables:
-            density = self.constant(
+            amount = self.constant(
                 f"N_{variable.name}", f"interface.{variable.name}.density", "1/m^2", "site density", variable.density
             )
-            self._bonding_state(Quantity(variable.name, "1", variable.long_name), density, 1.0)
-            self._amounts(variable.name, density)
+            self._bonding_state(Quantity(variable.name, "1", variable.long_name), amount, 1.0)
+            self._amounts(variable.name, amount)
         if self.interface.bonds:
             self.variables.define("phi", self._derived_phi, "derived", "coverages of bonds")
 
@@ -268,7 +268,7 @@ class Build:
             symbol = symengine.Symbol(gap)
             if depends(self.psi, symbol):
                 text = "normal traction on body 1" if gap == "g_n" else "elastic tangential traction on body 1"
-                self._areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), symengine.diff(self.psi, symbol))
+                self._areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(self.psi, symbol))
         if self.variables.has("p") is False and depends(self.psi, symengine.Symbol("g_n")):
             self.variables.define(
                 "p", lambda: self.name(VARIABLES["p"], -symengine.Symbol("t_n")), "derived", "normal traction"
@@ -312,7 +312,7 @@ class Build:
         self._prescribed_bonding()
 
     def _chemical_potential(self, name: str, symbol: Any, density: Expression) -> Expression:
-        M = symengine.diff(self.psi, symbol)
+        M = derivative(self.psi, symbol)
         suffix = "" if name == "phi" else f"_{name}"
         M = self.name(Quantity(f"M{suffix}", "J/m^2", f"chemical potential of {name} per area", tag="e:SMuc"), M)
         long_name = "chemical potential per bond" if name == "phi" else f"chemical potential of {name} per site"
@@ -323,7 +323,7 @@ class Build:
         own = {"mu": affinity, "t": self.t}
         if "phi" in self.bonding:
             symbol, _, density = self.bonding["phi"]
-            own["dmu_dphi"] = symengine.diff(symengine.diff(self.psi, symbol), symbol) / density
+            own["dmu_dphi"] = derivative(derivative(self.psi, symbol), symbol) / density
         rate = self.variables.call(bound, bound.statement, own)
         self._law_margins(law, own)
         return self.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
@@ -339,7 +339,7 @@ class Build:
         if "phi" in self.bonding or not depends(self.psi, phi):
             return
         M = self.name(
-            Quantity("M", "J/m^2", "chemical potential of phi per area", tag="e:SMuc"), symengine.diff(self.psi, phi)
+            Quantity("M", "J/m^2", "chemical potential of phi per area", tag="e:SMuc"), derivative(self.psi, phi)
         )
         rate = self.rate_of(phi)
         if rate != 0:
@@ -479,7 +479,7 @@ class Build:
             if not depends(self.psi, symbol):
                 continue
             rates[symbol] = self.rate_of(symbol)
-            power = symengine.diff(self.psi, symbol) * rates[symbol]
+            power = derivative(self.psi, symbol) * rates[symbol]
             if power != 0:
                 self._supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
                 self._give_power(power)
@@ -547,7 +547,7 @@ class Build:
         """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
         explicit = {dot: -(self.rows[name] - dot) for name, (_, dot, _) in self.bonding.items()}
         row = self._expanded(self._own_rows[node.name].subs(explicit))
-        slope = symengine.diff(row, node.T)
+        slope = derivative(row, node.T)
         state_symbols = {state.symbol for state in self.states}
         if slope.free_symbols & state_symbols:
             reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
@@ -577,7 +577,7 @@ class Build:
                 energies.append(
                     self._total(f"U_{suffix}", "J/m^2", "internal energy", member, balances.internal_energy(F, node.T))
                 )
-                if symengine.diff(F, node.T) != 0:
+                if derivative(F, node.T) != 0:
                     entropies.append(
                         self._total(f"S_{suffix}", "J/(m^2 K)", "entropy", member, balances.entropy(F, node.T))
                     )

@@ -21,7 +21,7 @@ from typing import Any
 
 import symengine
 
-from surfacechem.expressions import Expression, depends
+from surfacechem.expressions import Expression, depends, derivative
 
 
 @dataclass
@@ -49,17 +49,17 @@ class Node:
 
 def internal_energy(F: Expression, T: Expression) -> Expression:
     """U = F - T F_T."""
-    return F - T * symengine.diff(F, T)
+    return F - T * derivative(F, T)
 
 
 def entropy(F: Expression, T: Expression) -> Expression:
     """S = -F_T."""
-    return -symengine.diff(F, T)
+    return -derivative(F, T)
 
 
 def second(F: Expression, T: Expression) -> Expression:
     """F_TT."""
-    return symengine.diff(symengine.diff(F, T), T)
+    return derivative(derivative(F, T), T)
 
 
 def energy_rate(
@@ -67,10 +67,10 @@ def energy_rate(
 ) -> Expression:
     """dU/dt by the chain rule; ``rates`` maps the other variables of F to their time derivatives."""
     if not isinstance(T, symengine.Symbol):  # no medium: F does not depend on temperature
-        return sum((symengine.diff(F, x) * rate for x, rate in rates.items()), symengine.Integer(0))
+        return sum((derivative(F, x) * rate for x, rate in rates.items()), symengine.Integer(0))
     total = conditioned(-T * second(F, T), about) * T_dot
     for x, rate in rates.items():
-        total += symengine.diff(internal_energy(F, T), x) * rate
+        total += derivative(internal_energy(F, T), x) * rate
     return total
 
 
@@ -85,7 +85,7 @@ def conditioned(expression: Expression, about: Mapping[Any, Expression], degree:
             continue
         derivatives = [expression]
         while depends(derivatives[-1], x) and len(derivatives) <= degree + 1:
-            derivatives.append(symengine.diff(derivatives[-1], x))
+            derivatives.append(derivative(derivatives[-1], x))
         if depends(derivatives[-1], x):
             continue
         expression = _horner([d.subs({x: x_0}) for d in derivatives], x - x_0)

@@ -30,6 +30,25 @@ def depends(expression: Expression, symbol: Expression) -> bool:
     return is_symbolic(expression) and symbol in expression.free_symbols
 
 
+def derivative(expression: Expression, symbol: Expression) -> Expression:
+    """Derivative of an expression, without the empty pieces that differentiation leaves of guarded functions.
+
+    >>> import symengine
+    >>> x, T = symengine.symbols("x T")
+    >>> derivative(derivative(T * log(x), T), T)
+    0
+    """
+    import symengine
+
+    result = symengine.diff(symengine.sympify(expression), symbol)
+    empty = {piece: symengine.Integer(0) for piece in result.atoms(symengine.Piecewise) if _vanishes(piece)}
+    return result.xreplace(empty) if empty else result
+
+
+def _vanishes(piece: Any) -> bool:
+    return all(value == 0 for value in piece.args[::2])
+
+
 def _engine(*values: Expression) -> Any:
     if is_symbolic(*values):
         import symengine
