@@ -10,6 +10,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 
@@ -96,7 +97,8 @@ def _load_field(context: Any, builder: Any, work: Any, value: Any, name: str) ->
     kind = context.get_value_type(work.content)
     index = ir.IntType(32)(work.content.fields.index(name))
     pointer = builder.gep(builder.bitcast(value, kind.as_pointer()), [ir.IntType(32)(0), index], inbounds=True)
-    return _load(builder, pointer, pointer.type.pointee)
+    field = work.content.types[work.content.fields.index(name)]
+    return impl_ret_borrowed(context, builder, field, _load(builder, pointer, pointer.type.pointee))
 
 
 @intrinsic  # type: ignore[untyped-decorator]

@@ -155,9 +155,10 @@ def first_size(w: Any, span: float) -> float:
         return trial
     for j in range(n):
         w.vector[TRIAL_DOT, j] -= w.vector[YDOT, j]
-    bend = _rate_norm(w, w.vector[TRIAL_DOT]) / trial
-    if not bend * span > 1e-9 * speed:
+    change = _rate_norm(w, w.vector[TRIAL_DOT]) / speed
+    if not change * span > 1e-9 * trial:
         return 0.05 * span
-    time_scale = speed / bend
+    # Ratios first: a rate of 1e200 over 1e-200 s would overflow.
+    time_scale = trial / change
     exponent = 1.0 / (stage_count(w.count[MEMBER]) + 1.0)
     return min(time_scale * min(1.0, (speed * time_scale) ** -exponent), 0.05 * span)

@@ -31,8 +31,13 @@ class _Stretch(Method):
         return answer
 
     def advance(self) -> float:
-        answer = self._call(lambda: self.library.step(self.end, method="onestep", tstop=self.end))
-        self.t, self.x = float(answer.t), np.array(answer.y)
+        before = self.t
+        # After an interpolation the library first returns to where it was.
+        for _attempt in range(2):
+            answer = self._call(lambda: self.library.step(self.end, method="onestep", tstop=self.end))
+            self.t, self.x = float(answer.t), np.array(answer.y)
+            if self.t > before:
+                break
         return self.t
 
     def at(self, t: float) -> Array:

@@ -1,0 +1,240 @@
+"""The compiled stepper: hard problems with known answers, events, batches, failures."""
+
+import mpmath
+import numpy as np
+import pytest
+import symengine as se
+from solver_problems import (
+    CONDUCTANCE, coupled_nodes, exothermic, exothermic_exact, exothermic_problem, linear_decay, problem, robertson, robertson_dae,
+)  # fmt: skip
+
+from surfacechem.compile import compile_program
+from surfacechem.solvers import names, solver
+from surfacechem.solvers.contract import Margin, Problem, Status
+from surfacechem.solvers.radau import Radau, consistent, solve_many
+from surfacechem.solvers.radau_tables import COLLOCATION, GAMMA, INVERSE, NODES, PAIR_VALUES, STAGES
+
+radau = Radau()
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_order_conditions(k: int) -> None:
+    """C(s): A c^(q-1) = c^q / q, and B(2s-1): b c^(q-1) = 1 / q."""
+    s = STAGES[k]
+    a, c = COLLOCATION[k, :s, :s], NODES[k, :s]
+    for q in range(1, s + 1):
+        np.testing.assert_allclose(a @ c ** (q - 1), c**q / q, rtol=1e-13, atol=1e-16)
+    for q in range(1, 2 * s):
+        assert a[-1] @ c ** (q - 1) == pytest.approx(1 / q, rel=1e-14)
+    np.testing.assert_allclose(a @ INVERSE[k, :s, :s], np.eye(s), atol=1e-13)
+    pairs = PAIR_VALUES[k, : (s - 1) // 2]
+    values = np.concatenate(([GAMMA[k]], pairs, pairs.conj()))
+    np.testing.assert_allclose(np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", names)
+def test_every_solver_on_exothermic_bonding(name: str) -> None:
+    result = solver(name).solve(exothermic_problem(1e-8))
+    assert result.status == Status.FINISHED
+    assert result.t == 2.5 and len(result.times) == 200
+    np.testing.assert_allclose(result.outputs, exothermic_exact(result.times), rtol=1e-6)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_error_follows_the_tolerance(rtol: float) -> None:
+    result = radau.solve(exothermic_problem(rtol))
+    error = np.max(np.abs(result.outputs / exothermic_exact(result.times) - 1))
+    assert error < 3 * rtol + 2e-15
+
+
+def test_output_rates_come_from_the_equations() -> None:
+    result = radau.solve(exothermic_problem(1e-10))
+    np.testing.assert_allclose(result.output_rates[:, 1], 2.0 * np.exp(-2.0 * result.times), rtol=1e-7)
+
+
+@pytest.mark.parametrize("make", [robertson, robertson_dae])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+def test_robertson(make, rtol: float) -> None:
+    """Reference: Hairer & Wanner II, IV.10, at t = 1e11."""
+    result = radau.solve(problem(make(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.y[:2], [2.083340149701255e-08, 8.333360770334713e-14], rtol=10 * rtol)
+    assert result.counters.steps < 1500
+
+
+def test_van_der_pol() -> None:
+    """Reference: Hairer & Wanner II, IV.10, eps = 1e-6, t = 2."""
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    program = compile_program(t, [x, v], [dx, dv], [], [dx - v, 1e-6 * dv - ((1 - x**2) * v - x)])
+    result = radau.solve(problem(program, [2.0, -0.66], [0.0, 2.0], 1e-9))
+    np.testing.assert_allclose(result.y, [1.706167732170483, -0.8928097010247975], rtol=1e-6)
+
+
+@pytest.mark.parametrize("conductance", CONDUCTANCE)
+def test_sum_row_keeps_the_mean_temperature(conductance: float) -> None:
+    """Two nodes, capacities 1e-15 and 2, heated with 3 W: the total energy is exact whatever the conductance."""
+    result = radau.solve(problem(coupled_nodes(conductance), [300.0, 300.0], [0.0, 10.0], 1e-10))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.y, [315.0, 315.0], rtol=1e-9)
+
+
+def test_initial_layer_far_below_rounding() -> None:
+    """y' = -(y - cos t) / 1e-200: the first step is of the layer's own size."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + 1e200 * (y - se.cos(t))])
+    result = radau.solve(Problem(program, np.array([2.0]), np.zeros(0), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, np.array([1e-10]),
+                                 record_steps=True))  # fmt: skip
+    assert result.status == Status.FINISHED and result.steps is not None
+    assert result.steps.t[1] < 1e-199
+    assert result.y[0] == pytest.approx(np.cos(1.0), rel=1e-8)
+
+
+def test_vanishing_capacity_ends_at_zero_temperature() -> None:
+    """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
+    t, temperature, rate = se.symbols("t T dT")
+    program = compile_program(t, [temperature], [rate], [], [2.0 * temperature / 300 * rate + 600.0], margins=[temperature])
+    result = radau.solve(problem(program, [300.0], [0.0, 2.0], 1e-10, margins=(Margin.stop(),)))
+    assert result.status in (Status.EVENT, Status.STEP_UNDERFLOW)
+    assert result.t == pytest.approx(0.5, rel=1e-9)
+    assert abs(result.y[0]) < 1e-2
+
+
+def test_algebraic_variable_and_ledger() -> None:
+    """y' = -z, 0 = z^3 + z - y - y^3 has z = y; the ledger of z is 1 - y."""
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**3 + z - y - y**3], ledger=[z])
+    assert program.algebraic == (False, True)
+    for name in names:
+        result = solver(name).solve(problem(program, [1.0, 5.0], [0.0, 2.0], 1e-8, times=np.linspace(0, 2, 21)))
+        assert result.status == Status.FINISHED
+        np.testing.assert_allclose(result.outputs, np.exp(-result.times)[:, None] * [1, 1], rtol=2e-6)
+        np.testing.assert_allclose(result.ledger_outputs[:, 0], 1 - np.exp(-result.times), atol=2e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_segments_change_parameters(name: str) -> None:
+    t, y, dy, rate = se.symbols("t y dy rate")
+    program = compile_program(t, [y], [dy], [rate], [dy - rate])
+    case = Problem(program, np.array([0.0]), np.array([0.5, 1.0, 1.5, 3.0]), np.array([0.0, 1.0, 3.0]), np.array([[1.0], [-2.0]]), 1e-8,
+                   np.array([1e-10]))  # fmt: skip
+    np.testing.assert_allclose(solver(name).solve(case).outputs[:, 0], [0.5, 1.0, 0.0, -3.0], atol=1e-8)
+
+
+@pytest.mark.parametrize("name", names)
+def test_terminal_event(name: str) -> None:
+    result = solver(name).solve(problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Margin.stop(),), times=np.arange(11.0)))
+    assert result.status == Status.EVENT
+    assert result.t == pytest.approx(np.log(2), rel=1e-6 if name != "radau" else 1e-11)
+    assert list(result.times) == [0.0]
+    assert list(result.events.index) == [0]
+    assert "margin 0" in result.message
+
+
+def oscillator(*margins):
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    values = [margin(t, x, v) for margin in margins]
+    return compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + x], margins=values)
+
+
+def test_double_crossing_between_steps_is_seen() -> None:
+    """cos t dips below -0.99 between 3.0 and 3.28 only."""
+    case = problem(oscillator(lambda t, x, v: x + 0.99), [1.0, 0.0], [0.0, 20.0], 1e-5, margins=(Margin.stop(),))
+    assert radau.solve(case).t == pytest.approx(np.arccos(-0.99), rel=1e-5)
+
+
+def test_coincident_events_are_both_reported() -> None:
+    case = problem(oscillator(lambda t, x, v: x, lambda t, x, v: 3 * x), [1.0, 0.0], [0.0, 3.0], 1e-10,
+                   margins=(Margin.restart(), Margin.stop()))  # fmt: skip
+    result = radau.solve(case)
+    assert result.status == Status.EVENT and sorted(result.events.index) == [0, 1]
+    assert result.t == pytest.approx(np.pi / 2, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", names)
+def test_margin_zero_at_the_start_does_not_fire(name: str) -> None:
+    case = problem(oscillator(lambda t, x, v: x), [0.0, 1.0], [0.0, 4.0], 1e-8, margins=(Margin.stop(),))
+    assert solver(name).solve(case).t == pytest.approx(np.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_kinks_restart(name: str) -> None:
+    """x' = v, v' = -sign(x): parabolas of period 4 sqrt(2), exact between kinks."""
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    sign = se.Piecewise((1.0, x > 0), (-1.0, True))
+    program = compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + sign], margins=[x])
+    result = solver(name).solve(problem(program, [1.0, 0.0], [0.0, 9.0], 1e-9, margins=(Margin.restart(),)))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.events.t, np.sqrt(2) * np.array([1.0, 3.0, 5.0]), rtol=1e-6)
+    assert len(result.events.t) == 3
+    phase = 9.0 - 5 * np.sqrt(2)
+    np.testing.assert_allclose(result.y[0], -(np.sqrt(2) * phase - phase**2 / 2), rtol=1e-5)
+
+
+def test_blow_up_ends_with_a_status() -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - y**2])
+    for name in names:
+        result = solver(name).solve(problem(program, [1.0], [0.0, 2.0], 1e-6, max_steps=20_000))
+        assert not result.success, name
+        assert result.t <= 1.0 + 1e-5 and np.all(np.isfinite(result.y))
+
+
+def test_no_consistent_state() -> None:
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**2 + 1 + y**2])
+    for name in names:
+        assert not solver(name).solve(problem(program, [1.0, 1.0], [0.0, 1.0], 1e-6)).success, name
+
+
+def test_singular_capacity() -> None:
+    t, x, y, dx, dy = se.symbols("t x y dx dy")
+    program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
+    result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
+    assert result.status == Status.SINGULAR and "singular" in result.message
+
+
+def test_steps_and_seconds_are_limited() -> None:
+    case = oscillator()
+    assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e9], 1e-10, max_steps=50)).status == Status.MAX_STEPS
+    assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)).status == Status.STOPPED
+
+
+def test_recorded_steps_are_consistent() -> None:
+    case = problem(exothermic(), [300.0, 0.0], [0.0, 2.5], 1e-8, parameters=[2.0, 300.0, 300.0, 1.0, 0.5], record_steps=True)
+    steps = radau.solve(case).steps
+    assert steps is not None and steps.t[0] == 0.0 and steps.t[-1] == 2.5
+    np.testing.assert_allclose(steps.ydot[:, 1], 2.0 * np.exp(-2.0 * steps.t), rtol=1e-5)
+
+
+def test_batch_is_deterministic_and_equals_single_runs() -> None:
+    rng = np.random.default_rng(1)
+    parameters = np.array([2.0, 300.0, 300.0, 1.0, 0.5]) * rng.uniform(0.5, 1.5, (600, 1, 5))
+    y0 = np.stack([parameters[:, 0, 2], np.zeros(600)], axis=1)
+    one, two = (
+        solve_many(exothermic(), y0, parameters, [0.0, 2.5], 1e-8, [1e-8, 1e-10], times=[1.0, 2.5], threads=threads) for threads in (1, 2)
+    )
+    assert one.y.tobytes() == two.y.tobytes() and one.outputs.tobytes() == two.outputs.tobytes()
+    assert np.all(one.status == Status.FINISHED)
+    single = radau.solve(Problem(exothermic(), y0[7], np.array([1.0, 2.5]), np.array([0.0, 2.5]), parameters[7], 1e-8, np.array([1e-8, 1e-10])))
+    assert single.y.tobytes() == one.y[7].tobytes()
+    for i in (0, 599):
+        np.testing.assert_allclose(one.y[i], exothermic_exact(2.5, parameters[i, 0]), rtol=1e-7)
+
+
+def test_consistent_states_in_rows() -> None:
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**3 + z - y])
+    y_values = np.linspace(-5.0, 5.0, 11)
+    found = consistent(program, 0.0, np.stack([y_values, np.ones(11)], axis=1), np.zeros((11, 2)), [])
+    assert np.all(found.valid)
+    np.testing.assert_allclose(found.y[:, 1] ** 3 + found.y[:, 1], y_values, atol=1e-13)
+    np.testing.assert_allclose(found.ydot[:, 0], -found.y[:, 1], rtol=1e-14)
+
+
+def test_thirteen_digits_against_high_precision() -> None:
+    """Logistic growth to 1e-13: the tables and the linear algebra lose nothing."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - y * (1 - y)])
+    result = radau.solve(problem(program, [0.1], [0.0, 5.0], 1e-13, atol=1e-16))
+    exact = mpmath.mpf(1) / (1 + 9 * mpmath.exp(-5))
+    assert abs(result.y[0] / float(exact) - 1) < 1e-13
