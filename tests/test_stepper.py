@@ -53,13 +53,13 @@ def test_output_rates_come_from_the_equations() -> None:
 
 
 @pytest.mark.parametrize("make", [robertson, robertson_dae])
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_robertson(make, rtol: float) -> None:
-    """Reference: Hairer & Wanner II, IV.10, at t = 1e11."""
+    """Reference: Hairer & Wanner II, IV.10, at t = 1e11, where cancelling rates of 1e-9 over 1e11 s leave eight digits."""
     result = radau.solve(problem(make(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10))
     assert result.status == Status.FINISHED
-    np.testing.assert_allclose(result.y[:2], [2.083340149701255e-08, 8.333360770334713e-14], rtol=10 * rtol)
-    assert result.counters.steps < 1500
+    np.testing.assert_allclose(result.y[:2], [2.083340149701255e-08, 8.333360770334713e-14], rtol=20 * rtol)
+    assert result.counters.steps < 500
 
 
 def test_van_der_pol() -> None:

@@ -1,0 +1,40 @@
+"""Solvers by name, and the honesty of the adapters: what a library gets wrong must not be reported as a success."""
+
+import numpy as np
+import pytest
+import symengine as se
+from solver_problems import problem
+
+from surfacechem.compile import compile_program
+from surfacechem.solvers import names, solver
+from surfacechem.solvers.contract import Problem
+
+
+def test_unknown_name() -> None:
+    with pytest.raises(ValueError, match="Did you mean 'cvode'"):
+        solver("cvodes")
+
+
+@pytest.mark.parametrize("name", names)
+def test_equations_that_stop_being_finite(name: str) -> None:
+    """y' = -sqrt(y) - 1 has no real right-hand side once y falls below zero."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + se.sqrt(y) + 1])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-6, max_steps=5_000))
+    assert not result.success
+    assert np.isfinite(result.y[0]) and result.t < 0.7
+
+
+@pytest.mark.parametrize("name", names)
+def test_outputs_right_after_the_start(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-10, times=[2e-10, 1.0]))
+    np.testing.assert_allclose(1.0 - result.outputs[0], 2e-10, rtol=1e-4)
+
+
+def test_problem_is_checked() -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y])
+    with pytest.raises(ValueError, match="output times must lie within"):
+        Problem(program, np.ones(1), np.array([3.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-6, np.ones(1))
