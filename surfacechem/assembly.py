@@ -1,4 +1,4 @@
-"""From a scene to its system: roles are read off, potentials differentiated, dissipative laws stated, balances formed."""
+"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOADABLE = ("phi", "g_n", "g_t", "v", "p", "J_c", "Q_1", "Q_2", "Q_c")
 
 
 def assemble(scene: Scene) -> System:
-    """the system of a scene; InputError where a variable that is read has no role, or two."""
+    """The system of a scene; InputError where a variable that is read has no role, or two."""
     build = Build(scene)
     build.temperatures()
     build.prescribed_variables()
@@ -89,14 +89,14 @@ class Build:
         self.used_names.add(name)
         return name
 
-    def history(self, load: Load) -> Expression:
+    def history(self, name: str, load: Load) -> Expression:
         """A prescribed history as an expression of time; its breakpoints will end a step."""
         self.breakpoints.update(load.breakpoints())
-        return self.variables.bind(load).value(self.t)
+        return self.variables.bind(load, f"loading.{name}").value(self.t)
 
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
         """Make a prescribed variable a named quantity."""
-        return self.name(quantity, self.history(load))
+        return self.name(quantity, self.history(quantity.name, load))
 
     def rate_of(self, symbol: Any) -> Expression:
         """Time derivative of a prescribed variable."""
@@ -168,7 +168,7 @@ class Build:
     def _body_energy(self, body: Body, suffix: str) -> None:
         node = self.node_of[body.name]
         if body.energy is not None:
-            law = self.variables.bind(body.energy, suffix)
+            law = self.variables.bind(body.energy, f"bodies.{body.name}", suffix)
             node.energies[body.name] = law.energy(T=node.T, T_0=self.variables.get("T_0", f"the body {body.name}"))
 
     def prescribed_variables(self) -> None:
@@ -252,9 +252,9 @@ class Build:
         return self.scene.initial[name]
 
     def free_energy(self) -> None:
-        """the sum of the interface's potentials, and the tractions that follow."""
+        """The sum of the interface's potentials, and the tractions that follow."""
         for law in self.interface.potentials:
-            bound = self.variables.bind(law)
+            bound = self.variables.bind(law, f"interface.potential.{law.name()}")
             self.psi += self.variables.call(bound, bound.statement)
         if self.interface.temperature is not None:
             node = self.node_of["interface"]
@@ -319,7 +319,7 @@ class Build:
         return self.name(Quantity(f"mu{suffix}", "J", long_name, tag="e:muc"), M / density, output=name == "phi")
 
     def _rate(self, law: RateLaw, label: str, affinity: Expression) -> Expression:
-        bound = self.variables.bind(law)
+        bound = self.variables.bind(law, f"interface.bonding.{law.name()}")
         own = {"mu": affinity, "t": self.t}
         if "phi" in self.bonding:
             symbol, _, density = self.bonding["phi"]
@@ -349,7 +349,7 @@ class Build:
         """Sliding tractions and what they dissipate; their power comes from outside."""
         for law in self.interface.frictions:
             label = self.label(law)
-            bound = self.variables.bind(law)
+            bound = self.variables.bind(law, f"interface.friction.{law.name()}")
             traction = self.variables.call(bound, bound.statement)
             self._law_margins(law, {})
             traction = self.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
@@ -395,7 +395,7 @@ class Build:
         nodes = [self._end(end, law) for end in (a, b)]
         if nodes[0] is nodes[1]:
             raise InputError(f"heat path between {a} and {b}: both share the temperature {nodes[0].name}; remove it.")
-        bound = self.variables.bind(law)
+        bound = self.variables.bind(law, f"heat.{law.name()}")
         h = self.variables.call(bound, bound.statement)
         area = symengine.Integer(1) if "surroundings" in (a, b) else self.stretch
         quantity = Quantity(self.label_path(law), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
@@ -449,7 +449,7 @@ class Build:
         self.ledger.append(Account(integral, symbol, "entropy production", name))
 
     def equations(self) -> None:
-        """the work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
+        """The work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
         gap_rates = self._gaps()
         self._dissipation()
         rates = {symbol: dot for symbol, dot, _ in self.bonding.values()} | gap_rates
@@ -560,7 +560,7 @@ class Build:
         return symengine.sympify(expression).subs(result)
 
     def _recovered_heat(self, node: Node, rates: Mapping[Any, Expression]) -> None:
-        """the heat that must be supplied from outside to keep a prescribed temperature."""
+        """The heat that must be supplied from outside to keep a prescribed temperature."""
         supply = balances.node_row(node, rates, self.about)
         if supply != 0:
             symbol = self.name(Quantity(f"Q_{node.name}", "W/m^2", f"heat supplied to keep {node.name}"), supply)
@@ -624,7 +624,7 @@ class Build:
         return symengine.Symbol(quantity.name)
 
     def regime(self) -> str:
-        """the thermal regime in words."""
+        """The thermal regime in words."""
         nodes = [self.node_of[body.name] for body in self.scene.bodies]
         centre = self.node_of.get("interface")
         if centre is None:
@@ -636,7 +636,7 @@ class Build:
         return "separate interface temperature"
 
     def system(self) -> System:
-        """the finished system."""
+        """The finished system."""
         rows = {name: self.rows[name] for name in (state.name for state in self.states)}
         unread = [n for n in self.scene.loading if n not in self.nodes and not self.variables.was_read(n)]
         warnings = tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread)

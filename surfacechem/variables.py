@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import TypeVar
 
 import symengine
 
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Parameter, Role
@@ -48,7 +49,10 @@ class Parameters:
         return self._append(Parameter(symengine.Symbol(name), path, spec, value))
 
     def _append(self, parameter: Parameter) -> Expression:
-        self.items.append(parameter)
+        taken = {item.path for item in self.items}
+        numbered = (f"{parameter.path}[{i}]" for i in range(2, 1000))
+        path = next(path for path in (parameter.path, *numbered) if path not in taken)
+        self.items.append(replace(parameter, path=path))
         return parameter.symbol
 
     def _unique(self, name: str, path: str) -> str:
@@ -109,8 +113,12 @@ class Variables:
         own = extra or {}
         return formula(**{name: own[name] if name in own else self.get(name, law) for name in reads(formula)})
 
-    def bind(self, law: L, suffix: str = "") -> L:
-        """The law with every numeric parameter replaced by its symbol, times its factors where it varies."""
+    def bind(self, law: L, path: str, suffix: str = "") -> L:
+        """The law with every numeric parameter replaced by its symbol, times its factors where it varies.
+
+        ``path`` is where a law that was built in Python would stand in a case file.
+        """
+        law = law if law.place else replace(law, place=Place(path=path))
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
             values[name] = self._parameter(law, name, law.refine(name, spec), suffix)
@@ -126,7 +134,7 @@ class Variables:
         if isinstance(value, Varying):
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
             for factor in value.factors:
-                symbol *= self._factor(self.bind(factor))
+                symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}"))
             return symbol
         if law.is_default(name):
             return int(value) if float(value).is_integer() else value
