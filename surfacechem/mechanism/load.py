@@ -1,0 +1,234 @@
+"""Reading a mechanism: Cantera parses, converts units and balances; this lowers what it found to laws."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from surfacechem import data
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.mechanism.keys import Source, check
+from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
+from surfacechem.mechanism.rates import KILO, SurfaceReaction, kinds, plain
+from surfacechem.mechanism.thermo import lower
+from surfacechem.scene import BondingVariable, Sites
+from surfacechem.terms import Potential, RateLaw
+
+SUM_TOLERANCE = 1e-9
+"""How far initial coverages may miss one."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A Cantera surface mechanism as potentials, rate laws and coverages of an interface."""
+
+    potentials: tuple[Potential, ...]
+    reactions: tuple[RateLaw, ...]
+    variables: tuple[BondingVariable, ...]
+    bonds: tuple[str, ...]
+    """Names of the coverages that count as bonds."""
+    sites: Sites
+    """Density of possible bonds: the site density over the sites that a bond takes."""
+    text: str
+    """The mechanism file."""
+    species: Mapping[str, str]
+    """Name of the coverage of each species."""
+    phase: str
+    temperatures: tuple[float, float]
+    """Range in which the thermo of every species holds [K]."""
+
+    def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
+        """Initial values from coverages by species; those not given are zero, and all must sum to one."""
+        for name in given:
+            if name not in self.species:
+                raise InputError(f"coverages: no species '{name}'.{suggestion(name, self.species)}", place)
+        total = sum(given.values())
+        if abs(total - 1) > SUM_TOLERANCE:
+            raise InputError(f"coverages sum to {total:.12g}, not to 1.", place)
+        return {variable: float(given.get(name, 0.0)) for name, variable in self.species.items()}
+
+
+def load_mechanism(
+    path: Path, phase: str | None = None, bonds: Sequence[str] | None = None, place: Place | None = None
+) -> Mechanism:
+    """Read one surface phase of a Cantera mechanism.
+
+    ``phase`` may be left out where the file has one; ``bonds`` names the species that count as bonds. ``place`` is
+    where the case names the mechanism, for errors that are not in the mechanism file itself.
+    """
+    path = _find(Path(path), place)
+    source = Source(str(path), path.read_text(encoding="utf-8"))
+    entry = source.phase(phase, place)
+    _check_phase(source, entry)
+    check(source, entry)
+    surface = _cantera(source, str(entry["name"]))
+    species = _species(surface, source, entry)
+    chosen = _bonds(species, bonds, place)
+    density = surface.site_density * KILO * AVOGADRO
+    # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
+    possible = density / min((item.sites for item in chosen), default=1.0)
+    return Mechanism(
+        potentials=(IdealMixture(species=species, place=_law_place(source, entry, "mechanism")),),
+        reactions=_reactions(surface, source, entry, species),
+        variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
+        bonds=tuple(item.variable for item in chosen),
+        sites=Sites(possible, possible),
+        text=source.text,
+        species={item.name: item.variable for item in species},
+        phase=str(entry["name"]),
+        temperatures=(float(surface.min_temp), float(surface.max_temp)),
+    )
+
+
+def _find(path: Path, place: Place | None) -> Path:
+    """The file, or the one of that name that comes with the package."""
+    shipped = data.mechanisms() / path.name
+    for candidate in (path, shipped):
+        if candidate.is_file():
+            return candidate
+    known = [file.name for file in data.mechanisms().glob("*.yaml")]
+    raise InputError(f"no mechanism file {path}.{suggestion(path.name, known)}", place)
+
+
+def _check_phase(source: Source, entry: Any) -> None:
+    """Raise InputError for a phase that is no plain surface."""
+    model = entry.get("thermo")
+    if model != "ideal-surface":
+        remedies = {
+            "edge": "a contact line has rates per length; write the reactions on a surface.",
+            "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free "
+            "energy; use `ideal-surface`.",
+        }
+        remedy = remedies.get(str(model), "use `ideal-surface`.")
+        message = f"phase {entry.get('name')}: thermo '{model}' is not lowered: {remedy}"
+        raise InputError(message, source.place(entry, "thermo"))
+    if entry.get("kinetics", "surface") != "surface":
+        message = f"phase {entry.get('name')}: kinetics '{entry['kinetics']}' is not lowered; use `kinetics: surface`."
+        raise InputError(message, source.place(entry, "kinetics"))
+
+
+def _cantera(source: Source, phase: str) -> Any:
+    """The phase as Cantera reads it; its errors keep their line."""
+    import cantera
+
+    try:
+        return cantera.Interface(yaml=source.text, name=phase)
+    except cantera.CanteraError as error:
+        raise _translated(str(error), source) from None
+
+
+def _translated(text: str, source: Source) -> InputError:
+    lines = [line.strip() for line in text.splitlines()]
+    found = re.search(r"[Ee]rror on line (\d+)", text)
+    noise = re.compile(r"^(\*+|\||>|\^|$)|thrown by|[Ee]rror on line|^Line \d+")
+    message = next((line for line in lines if not noise.search(line)), "the mechanism cannot be read")
+    return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
+
+
+def _species(surface: Any, source: Source, phase: Any) -> tuple[Species, ...]:
+    entries = {str(entry["name"]): entry for entry in source.species(phase)}
+    names = identifiers(surface.species_names)
+    result = []
+    for item in surface.species():
+        gibbs = lower(item.thermo)
+        if gibbs is None:
+            message = f"species {item.name}: thermo of type {type(item.thermo).__name__} is not lowered."
+            raise InputError(message, source.place(entries.get(item.name)))
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs))
+    return tuple(result)
+
+
+def identifiers(names: Iterable[str]) -> dict[str, str]:
+    """A unique valid name of a coverage for each species.
+
+    >>> identifiers(["free(s)", "bond(s)", "free-s"])
+    {'free(s)': 'theta_free_s', 'bond(s)': 'theta_bond_s', 'free-s': 'theta_free_s_2'}
+    """
+    result: dict[str, str] = {}
+    for name in names:
+        base = "theta_" + (re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_") or "species")
+        taken = set(result.values())
+        result[name] = next(n for n in (base, *(f"{base}_{i}" for i in range(2, 10000))) if n not in taken)
+    return result
+
+
+def _bonds(species: tuple[Species, ...], bonds: Sequence[str] | None, place: Place | None) -> tuple[Species, ...]:
+    by_name = {item.name: item for item in species}
+    for name in bonds or ():
+        if name not in by_name:
+            raise InputError(f"bonds: no species '{name}' in the mechanism.{suggestion(name, by_name)}", place)
+    return tuple(by_name[name] for name in dict.fromkeys(bonds or ()))
+
+
+def _law_place(source: Source, node: Any, path: str) -> Place:
+    return Place(source.file, source.place(node).line, path)
+
+
+def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species, ...]) -> tuple[SurfaceReaction, ...]:
+    entries = _kept(source, phase, species)
+    paired = zip(surface.reactions(), entries, strict=True)
+    return tuple(
+        _reaction(reaction, f"R{number}", _law_place(source, entry, f"mechanism.R{number}"), species)
+        for number, (reaction, entry) in enumerate(paired, start=1)
+    )
+
+
+def _kept(source: Source, phase: Any, species: tuple[Species, ...]) -> list[Any]:
+    """The entries that Cantera keeps: with `reactions: declared-species` those of other species are left out."""
+    known = {item.name for item in species}
+    return [entry for entry in source.reactions(phase) if set(_names(str(entry["equation"]))) <= known]
+
+
+def _names(equation: str) -> list[str]:
+    """Species in an equation.
+
+    >>> _names("2 a(s) + b(s) <=> c(s)")
+    ['a(s)', 'b(s)', 'c(s)']
+    """
+    words = equation.split()
+    return [word for word in words if word not in ("+", "<=>", "=>", "=") and not re.fullmatch(r"[0-9.]+", word)]
+
+
+def _reaction(reaction: Any, number: str, place: Place, species: tuple[Species, ...]) -> SurfaceReaction:
+    known = kinds()
+    kind = reaction.rate.type
+    if kind not in known:
+        message = f"reaction {reaction.equation}: rate type '{kind}' is not lowered.{suggestion(kind, known)}"
+        raise InputError(message, place)
+    variables = {item.name: item.variable for item in species}
+    forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
+    _check_reaction(reaction, forward, variables, place)
+    law = known[kind]
+    return law(
+        number=number,
+        equation=reaction.equation,
+        orders=forward,
+        products={variables[name]: nu for name, nu in reaction.products.items()},
+        change=_change(reaction, variables),
+        species=tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders}),
+        reversible=bool(reaction.reversible),
+        place=place,
+        **law.parameters_of(reaction, variables, sum(forward.values())),
+    )
+
+
+def _check_reaction(reaction: Any, orders: Mapping[str, float], variables: Mapping[str, str], place: Place) -> None:
+    if any(order < 0 for order in orders.values()):
+        message = f"reaction {reaction.equation}: a negative order is infinite where the coverage vanishes; remove it."
+        raise InputError(message, place)
+    if reaction.rate.uses_electrochemistry:
+        message = f"reaction {reaction.equation}: charge transfer is not lowered; give the species no net charge."
+        raise InputError(message, place)
+    for name in reaction.rate.coverage_dependencies:
+        if name not in variables:
+            message = f"reaction {reaction.equation}: coverage-dependencies: no species '{name}'."
+            raise InputError(message + suggestion(name, variables), place)
+
+
+def _change(reaction: Any, variables: Mapping[str, str]) -> dict[str, float]:
+    names = dict.fromkeys((*reaction.reactants, *reaction.products))
+    change = {name: reaction.products.get(name, 0.0) - reaction.reactants.get(name, 0.0) for name in names}
+    return {variables[name]: plain(nu) for name, nu in change.items() if nu}

@@ -1,0 +1,81 @@
+"""Ideal mixture of surface species: what they are, and the free energy from which all their thermodynamics follows."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from surfacechem.expressions import Expression, log
+from surfacechem.mechanism.thermo import StandardGibbs
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.terms import Potential, option
+
+AVOGADRO = 6.02214076e23
+"""Avogadro constant [1/mol] (exact, SI 2019)."""
+
+
+class Formula:
+    """A formula whose arguments are only known once a mechanism is read."""
+
+    def __init__(self, names: Iterable[str], evaluate: Callable[[Mapping[str, Expression]], Expression]) -> None:
+        self.evaluate = evaluate
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        self.__signature__ = inspect.Signature([inspect.Parameter(name, keyword) for name in dict.fromkeys(names)])
+
+    def __call__(self, **values: Expression) -> Expression:
+        """Evaluate at the named values."""
+        return self.evaluate(values)
+
+
+@dataclass(frozen=True)
+class Species:
+    """A surface species: its name in the mechanism, its coverage's name here, the sites it takes and its thermo."""
+
+    name: str
+    variable: str
+    sites: float
+    gibbs: StandardGibbs
+
+    @property
+    def amount(self) -> str:
+        """Name of the amount per reference area at full coverage [1/m^2]."""
+        return f"N_{self.variable}"
+
+    @property
+    def concentration(self) -> str:
+        """Name of the amount per current area at full coverage [1/m^2]."""
+        return f"n_{self.variable}"
+
+    def standard(self, T: Expression) -> Expression:
+        """Standard Gibbs energy [J] of one molecule."""
+        return BOLTZMANN * self.gibbs(T)
+
+
+class IdealMixture(Potential):
+    r"""Free energy of species that share the sites of a surface and mix ideally.
+
+    .. math:: \Psi = \sum_k N_k \theta_k \left[ g_k(T) + k_B T (\ln \theta_k - 1) \right], \quad
+              \frac{1}{N_k} \frac{\partial \Psi}{\partial \theta_k} = g_k(T) + k_B T \ln \theta_k
+
+    :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes.
+    Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; the chemical potentials, enthalpies,
+    entropies and heat capacities of Cantera's ideal-surface phase. 0 <= theta_k <= 1.
+    """
+
+    species: tuple[Species, ...] = option("species of the surface phase")
+
+    @property
+    def energy(self) -> Formula:  # type: ignore[override]
+        """Free energy [J/m^2] as a function of temperature, coverages and amounts at full coverage."""
+        names = (name for species in self.species for name in (species.variable, species.amount))
+        return Formula(("T_c", *names), self._energy)
+
+    def _energy(self, values: Mapping[str, Expression]) -> Expression:
+        T = values["T_c"]
+        total: Expression = 0
+        for species in self.species:
+            theta = values[species.variable]
+            mixing = BOLTZMANN * T * (log(theta) - 1)
+            total += values[species.amount] * theta * (species.standard(T) + mixing)
+        return total

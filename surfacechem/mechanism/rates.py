@@ -1,0 +1,239 @@
+"""Rates of surface reactions: mass action whose reverse follows from the thermo, and one class per rate type.
+
+To add a rate type, subclass :class:`SurfaceReaction`, give it Cantera's name of the type as ``kind`` and state its
+``coefficient``. Nothing else is edited.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from surfacechem.expressions import Expression, exp, log, positive, where
+from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
+from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.terms import RateLaw, Spec, option, parameter
+
+KILO = 1000.0
+"""Moles in a kmol, in which Cantera counts."""
+
+COVERAGE_FLOOR = 1e-20
+"""Coverages below this count as this where a rate depends on their logarithm, as in Cantera."""
+
+
+@dataclass(frozen=True)
+class CoverageTerm:
+    """How a rate depends on one coverage: factor 10^(a theta) theta^m exp(-E(theta) / R T), E a polynomial [J/mol]."""
+
+    variable: str
+    a: float = 0.0
+    m: float = 0.0
+    E: tuple[float, ...] = ()
+
+    def exponent(self, theta: Expression, T: Expression) -> Expression:
+        """Logarithm of the factor."""
+        energy: Expression = 0
+        for coefficient in reversed(self.E):
+            energy = theta * (energy + coefficient)
+        value = self.a * LN10 * theta - energy / (GAS_CONSTANT * T)
+        if self.m:
+            value += self.m * log(where(theta > COVERAGE_FLOOR, theta, COVERAGE_FLOOR + 0 * theta))
+        return value
+
+
+LN10 = 2.302585092994046
+
+
+class SurfaceReaction(RateLaw):
+    r"""Mass action on a surface, per current area.
+
+    .. math:: R = k(T) \left[ \prod_k n_k^{\,r_k}
+              - e^{\Delta g / k_B T} \prod_k (n_k^\circ)^{-\nu_k} \prod_k n_k^{\,p_k} \right],
+              \quad n_k = n_k^\circ \theta_k
+
+    r are the orders, p the coefficients of the products, :math:`\nu = p - r`, and :math:`n_k^\circ = N_k / J_c` the
+    amount of species k per current area at full coverage. The bracket vanishes where the reaction's affinity does.
+    """
+
+    kind: ClassVar[str] = ""
+    """Cantera's name of the rate type."""
+
+    number: str = option("short name of the reaction")
+    equation: str = option("the reaction as the mechanism writes it")
+    orders: Mapping[str, float] = option("forward order of each coverage")
+    products: Mapping[str, float] = option("product coefficient of each coverage")
+    change: Mapping[str, float] = option("products less reactants, for each coverage")
+    species: tuple[Species, ...] = option("the species that take part")
+    reversible: bool = option("whether the reverse follows from the thermo", default=True)
+
+    @classmethod
+    @abstractmethod
+    def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
+        """Own fields of the class, in SI units per molecule, from a Cantera reaction of total order ``order``."""
+
+    @abstractmethod
+    def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
+        """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
+
+    def own_reads(self) -> tuple[str, ...]:
+        """Variables that the coefficient reads beside the temperature."""
+        return ()
+
+    @property
+    def label(self) -> str:
+        """Short name for the quantities of this reaction."""
+        return self.number
+
+    @property
+    def title(self) -> str:
+        """The reaction in words."""
+        return self.equation
+
+    def stoichiometry(self) -> Mapping[str, int | float]:
+        """Change of each coverage, in molecules."""
+        return {name: plain(nu) for name, nu in self.change.items() if nu}
+
+    @property
+    def rate(self) -> Formula:  # type: ignore[override]
+        """Net rate [1/(m^2 s)]."""
+        return self._formula(lambda values: self._forward(values) - self._reverse(values))
+
+    @property
+    def forward(self) -> Formula:
+        """Forward rate [1/(m^2 s)]."""
+        return self._formula(self._forward)
+
+    @property
+    def reverse(self) -> Formula:
+        """Reverse rate [1/(m^2 s)]; zero where the reaction is irreversible."""
+        return self._formula(self._reverse)
+
+    def _formula(self, evaluate: Any) -> Formula:
+        names = (name for item in self.species for name in (item.variable, item.concentration))
+        return Formula(("T_c", *names, *self.own_reads()), evaluate)
+
+    def _forward(self, values: Mapping[str, Expression]) -> Expression:
+        return self.coefficient(values, 0) * self._amounts(values, self.orders)
+
+    def _reverse(self, values: Mapping[str, Expression]) -> Expression:
+        if not self.reversible:
+            return 0
+        standard: Expression = 1
+        for item in self.species:
+            standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
+        affinity = self.standard_affinity(values["T_c"])
+        return self.coefficient(values, affinity) * standard * self._amounts(values, self.products)
+
+    def standard_affinity(self, T: Expression) -> Expression:
+        """Standard Gibbs energy of the reaction over k_B T."""
+        total: Expression = 0
+        for item in self.species:
+            nu = self.change.get(item.variable, 0)
+            if nu:
+                total += plain(nu) * item.gibbs(T)
+        return total / T
+
+    def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float]) -> Expression:
+        product: Expression = 1
+        for item in self.species:
+            order = orders.get(item.variable, 0)
+            if order:
+                product *= power(values[item.concentration] * values[item.variable], order)
+        return product
+
+
+class InterfaceArrhenius(SurfaceReaction):
+    r"""Modified Arrhenius rate of a surface reaction.
+
+    .. math:: k = A\,T^b \exp\left( -\frac{E_a}{R_g T} \right)
+              \prod_k 10^{a_k \theta_k}\,\theta_k^{m_k} \exp\left( -\frac{E_k(\theta_k)}{R_g T} \right)
+
+    Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; Cantera's interface-Arrhenius with
+    its coverage dependencies. Admissible where it is reversible; an irreversible reaction needs mu <= 0.
+    """
+
+    kind = "interface-Arrhenius"
+
+    A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
+    b: float = parameter("1", "temperature exponent", default=0.0)
+    Ea: float = parameter("J/mol", "activation energy", default=0.0)
+    coverage: tuple[CoverageTerm, ...] = option("dependence on coverages", default=())
+
+    @classmethod
+    def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
+        """A, b, Ea and the coverage terms."""
+        rate = reaction.rate
+        return {
+            "A": rate.pre_exponential_factor * (KILO * AVOGADRO) ** (1 - order),
+            "b": rate.temperature_exponent,
+            "Ea": rate.activation_energy / KILO,
+            "coverage": tuple(
+                _coverage_term(variables[name], terms) for name, terms in sorted(rate.coverage_dependencies.items())
+            ),
+        }
+
+    def refine(self, name: str, spec: Spec) -> Spec:
+        """The unit of A follows from the order of this reaction."""
+        return replace(spec, unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
+
+    def own_reads(self) -> tuple[str, ...]:
+        return tuple(term.variable for term in self.coverage)
+
+    def exponent(self, values: Mapping[str, Expression]) -> Expression:
+        """Exponent of the rate coefficient."""
+        T = values["T_c"]
+        value = -self.Ea / (GAS_CONSTANT * T)
+        for term in self.coverage:
+            value += term.exponent(values[term.variable], T)
+        return value
+
+    def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
+        """The rate coefficient times exp(shift)."""
+        return self.A * values["T_c"] ** self.b * exp(self.exponent(values) + shift)
+
+
+def _coverage_term(variable: str, terms: Mapping[str, Any]) -> CoverageTerm:
+    energies = terms["E"] if isinstance(terms["E"], list | tuple) else [terms["E"]]
+    return CoverageTerm(variable, float(terms["a"]), float(terms["m"]), tuple(float(e) / KILO for e in energies))
+
+
+def kinds() -> dict[str, type[SurfaceReaction]]:
+    """Every rate type that is lowered, by Cantera's name."""
+    found: dict[str, type[SurfaceReaction]] = {}
+    pending = list(SurfaceReaction.__subclasses__())
+    while pending:
+        law = pending.pop()
+        found[law.kind] = law
+        pending += law.__subclasses__()
+    return found
+
+
+def unit_of_rate(order: float) -> str:
+    """Unit of a rate coefficient for a total order.
+
+    >>> unit_of_rate(1), unit_of_rate(2), unit_of_rate(0)
+    ('1/s', 'm^2/s', '1/(m^2 s)')
+    """
+    exponent = 2 * order - 2
+    if exponent == 0:
+        return "1/s"
+    return f"m^{plain(exponent)}/s" if exponent > 0 else f"1/(m^{plain(-exponent)} s)"
+
+
+def plain(number: float) -> int | float:
+    """The integer where the number is one, so that powers stay powers.
+
+    >>> plain(2.0), plain(0.5)
+    (2, 0.5)
+    """
+    return int(number) if float(number).is_integer() else float(number)
+
+
+def power(amount: Expression, order: float) -> Expression:
+    """amount**order; a fractional order takes the positive part, so that rounding below zero stays harmless."""
+    exponent = plain(order)
+    if isinstance(exponent, int):
+        return amount**exponent
+    return where(amount > 0, positive(amount) ** exponent, 0 * amount)

@@ -1,0 +1,155 @@
+"""Mechanisms to test with: where they are, random ones, and their evaluation beside Cantera."""
+
+import json
+import math
+from itertools import combinations_with_replacement
+
+import cantera as ct
+import symengine
+from hypothesis import strategies as st
+
+from surfacechem.data import mechanisms
+from surfacechem.expressions import derivative
+from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.terms import reads
+
+KMOL = 1000 * AVOGADRO
+SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))
+
+
+def load(name, bonds=None):
+    return load_mechanism(mechanisms() / name, bonds=bonds)
+
+
+def cantera_of(mechanism):
+    return ct.Interface(yaml=mechanism.text, name=mechanism.phase)
+
+
+def values(mechanism, T, coverages, stretch=1.0):
+    """What the laws read, at a temperature and coverages in the order of the species."""
+    point = {"T_c": T}
+    for variable, theta in zip(mechanism.variables, coverages, strict=True):
+        point |= {
+            variable.name: theta,
+            f"N_{variable.name}": variable.density,
+            f"n_{variable.name}": variable.density / stretch,
+        }
+    return point
+
+
+def call(formula, point):
+    return formula(**{name: point[name] for name in reads(formula)})
+
+
+def partial_molar(mechanism, point):
+    """Chemical potential, enthalpy, entropy [J/mol, J/(mol K)] of each species, by differentiating the potential."""
+    symbols = {name: symengine.Symbol(name) for name in point}
+    (potential,) = mechanism.potentials
+    psi = call(potential.energy, symbols)
+    T = symbols["T_c"]
+    rows = []
+    for variable in mechanism.variables:
+        mu = AVOGADRO * derivative(psi, symbols[variable.name]) / symbols[f"N_{variable.name}"]
+        s = -derivative(mu, T)
+        rows += [mu, mu + T * s, s]
+    numbers = symengine.Lambdify(list(symbols.values()), rows)([point[name] for name in symbols])
+    return list(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True))
+
+
+def heat_capacity(mechanism, point):
+    """T ds/dT of the mixture [J/(m^2 K)]."""
+    symbols = {name: symengine.Symbol(name) for name in point}
+    T = symbols["T_c"]
+    psi = call(mechanism.potentials[0].energy, symbols)
+    expression = symengine.sympify(-T * derivative(derivative(psi, T), T))
+    return float(symengine.Lambdify(list(symbols.values()), [expression])([point[name] for name in symbols])[0])
+
+
+# -- random mechanisms ------------------------------------------------------------------------------------------------
+
+number = st.floats(-1, 1, allow_nan=False, allow_subnormal=False)
+
+
+@st.composite
+def thermo(draw):
+    model = draw(st.sampled_from(["constant-cp", "NASA7", "NASA9", "Shomate"]))
+    if model == "constant-cp":
+        return {
+            "model": model,
+            "T0": 298.15 + 20 * draw(number),
+            "h0": 8e7 * draw(number),
+            "s0": 1e5 * draw(number),
+            "cp0": 5e4 * abs(draw(number)),
+        }
+    scales = {
+        "NASA7": [4, 3e-3, 1e-6, 1e-9, 1e-13, 8e3, 10],
+        "NASA9": [1e4, 1e2, 4, 3e-3, 1e-6, 1e-9, 1e-13, 8e3, 10],
+        "Shomate": [30, 10, 5, 2, 0.1, 60, 100],
+    }[model]
+    ranges = draw(st.sampled_from([[250.0, 1500.0], [250.0, 500.0, 1500.0]]))
+    data = [[scale * draw(number) for scale in scales] for _ in ranges[1:]]
+    return {"model": model, "temperature-ranges": ranges, "data": data}
+
+
+@st.composite
+def reaction(draw, names, sizes):
+    """A reaction that keeps the sites, or None where the species allow none."""
+    sides = [c for n in (1, 2, 3) for c in combinations_with_replacement(range(len(names)), n)]
+    reactants = draw(st.sampled_from([side for side in sides if len(side) < 3]))
+    total = sum(sizes[i] for i in reactants)
+    products = [side for side in sides if side != reactants and sum(sizes[i] for i in side) == total]
+    if not products:
+        return None
+    chosen = draw(st.sampled_from(products))
+    reversible = draw(st.booleans())
+    left, right = (" + ".join(names[i] for i in side) for side in (reactants, chosen))
+    entry = {
+        "equation": f"{left} {'<=>' if reversible else '=>'} {right}",
+        "rate-constant": {
+            "A": 10 ** (6 + 4 * draw(number)),
+            "b": draw(st.sampled_from([0.0, 0.5, -1.3])),
+            "Ea": 6e7 * draw(number),
+        },
+        "duplicate": True,
+    }
+    if draw(st.booleans()):
+        terms = {
+            "a": draw(number),
+            "m": draw(number),
+            "E": [1e7 * draw(number) for _ in range(draw(st.integers(1, 4)))],
+        }
+        entry["coverage-dependencies"] = {draw(st.sampled_from(names)): terms}
+    if not reversible and draw(st.booleans()):
+        entry["orders"] = {names[reactants[0]]: draw(st.sampled_from([0.5, 1.0, 2.0, 1.7]))}
+    return entry
+
+
+@st.composite
+def mechanism_texts(draw):
+    sizes = draw(st.lists(st.sampled_from([1, 1, 2, 3]), min_size=2, max_size=5))
+    names = [f"X{i}(s)" for i in range(len(sizes))]
+    entries = [draw(reaction(names, sizes)) for _ in range(draw(st.integers(1, 5)))]
+    species = [
+        {"name": name, "composition": {}, "sites": size, "thermo": draw(thermo())}
+        for name, size in zip(names, sizes, strict=True)
+    ]
+    phase = {
+        "name": "surface",
+        "thermo": "ideal-surface",
+        "kinetics": "surface",
+        "species": "all",
+        "reactions": "all",
+        "site-density": 10 ** (-8 + 2 * draw(number)),
+        "state": {"T": 300.0, "coverages": {names[0]: 1.0}},
+    }
+    # Two of each kind, so that every reaction is the duplicate of another.
+    reactions = [entry for entry in entries if entry] * 2
+    return json.dumps({"phases": [phase], "species": species, "reactions": reactions})
+
+
+@st.composite
+def states(draw, n):
+    T = draw(st.floats(300.0, 1200.0))
+    weights = [math.exp(-12 * abs(draw(number))) for _ in range(n)]
+    return T, [weight / sum(weights) for weight in weights]

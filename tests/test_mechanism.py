@@ -1,0 +1,174 @@
+"""Mechanisms give Cantera's own rates and thermodynamics, at any temperature and coverages."""
+
+import cantera as ct
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mechanisms import (
+    KMOL,
+    SHIPPED,
+    call,
+    cantera_of,
+    heat_capacity,
+    load,
+    mechanism_texts,
+    partial_molar,
+    states,
+    values,
+)
+from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rates import InterfaceArrhenius, kinds
+
+TOLERANCE = 1e-12
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _quiet():
+    """Random polynomials jump where two ranges meet."""
+    ct.suppress_thermo_warnings(True)
+    yield
+    ct.suppress_thermo_warnings(False)
+
+
+def compare(mechanism, T, coverages):
+    surface = cantera_of(mechanism)
+    surface.TP = T, ct.one_atm
+    surface.coverages = coverages
+    coverages = surface.coverages.tolist()
+    point = values(mechanism, T, coverages)
+    compare_rates(mechanism, surface, point)
+    compare_thermo(mechanism, surface, point)
+
+
+def compare_rates(mechanism, surface, point):
+    forward = np.array([call(law.forward, point) for law in mechanism.reactions])
+    reverse = np.array([call(law.reverse, point) for law in mechanism.reactions])
+    net = np.array([call(law.rate, point) for law in mechanism.reactions])
+    gross = abs(forward) + abs(reverse)
+    np.testing.assert_allclose(forward, surface.forward_rates_of_progress * KMOL, rtol=TOLERANCE)
+    np.testing.assert_allclose(reverse, surface.reverse_rates_of_progress * KMOL, rtol=TOLERANCE)
+    assert np.all(abs(net - surface.net_rates_of_progress * KMOL) <= TOLERANCE * gross)
+    production = {variable.name: 0.0 for variable in mechanism.variables}
+    scale = dict.fromkeys(production, 0.0)
+    for law, rate, size in zip(mechanism.reactions, net, gross, strict=True):
+        for name in production:
+            nu = law.change.get(name, 0)
+            production[name] += nu * rate
+            scale[name] += abs(2 * law.products.get(name, 0) - nu) * size  # a catalyst is made and used
+    expected = surface.net_production_rates * KMOL
+    assert np.all(abs(np.array(list(production.values())) - expected) <= TOLERANCE * np.array(list(scale.values())))
+    for law, constant in zip(mechanism.reactions, surface.equilibrium_constants, strict=True):
+        if law.reversible:
+            assert equilibrium_constant(law, point) == pytest.approx(constant, rel=TOLERANCE)
+
+
+def equilibrium_constant(law, point):
+    """Of concentrations in kmol/m^2: forward over reverse coefficient."""
+    ones = point | {item.variable: 1.0 for item in law.species}
+    ratio = call(law.forward, ones) / call(law.reverse, ones)
+    for item in law.species:
+        ratio *= (point[item.concentration] / KMOL) ** law.change.get(item.variable, 0)
+    return ratio
+
+
+def compare_thermo(mechanism, surface, point):
+    T = point["T_c"]
+    mu, h, s = (np.array(column) for column in zip(*partial_molar(mechanism, point), strict=True))
+    size = abs(surface.partial_molar_enthalpies) + T * abs(surface.partial_molar_entropies) + ct.gas_constant * T
+    size /= 1000
+    assert np.all(abs(mu - surface.chemical_potentials / 1000) <= TOLERANCE * size)
+    assert np.all(abs(h - surface.partial_molar_enthalpies / 1000) <= TOLERANCE * size)
+    assert np.all(abs(s - surface.partial_molar_entropies / 1000) <= TOLERANCE * size / T)
+    amounts = np.array([v.density * point[v.name] for v in mechanism.variables]) / KMOL
+    cp = surface.standard_cp_R * ct.gas_constant
+    assert heat_capacity(mechanism, point) == pytest.approx(
+        amounts @ cp, rel=1e-10, abs=1e-10 * (amounts @ abs(size) / T)
+    )
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@given(data=st.data())
+@settings(max_examples=20)
+def test_shipped_mechanisms_agree_with_cantera(name, data):
+    mechanism = load(name)
+    compare(mechanism, *data.draw(states(len(mechanism.variables))))
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
+
+
+@given(data=st.data())
+@settings(max_examples=150)
+def test_random_mechanisms_agree_with_cantera(file, data):
+    file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
+    mechanism = load_mechanism(file)
+    compare(mechanism, *data.draw(states(len(mechanism.variables))))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@given(stretch=st.floats(0.5, 2.0), data=st.data())
+@settings(max_examples=10)
+def test_a_stretched_surface_is_one_with_fewer_sites(name, stretch, data):
+    mechanism = load(name)
+    T, coverages = data.draw(states(len(mechanism.variables)))
+    surface = cantera_of(mechanism)
+    surface.TP = T, ct.one_atm
+    surface.site_density = surface.site_density / stretch
+    surface.coverages = coverages
+    point = values(mechanism, T, surface.coverages.tolist(), stretch)
+    for i, law in enumerate(mechanism.reactions):
+        assert call(law.forward, point) == pytest.approx(surface.forward_rates_of_progress[i] * KMOL, rel=TOLERANCE)
+        assert call(law.reverse, point) == pytest.approx(surface.reverse_rates_of_progress[i] * KMOL, rel=TOLERANCE)
+
+
+def test_densities_count_molecules():
+    film = load("dna-film.yaml", ["AB(s)"])
+    by_name = {variable.name: variable.density for variable in film.variables}
+    assert by_name == pytest.approx(
+        {"theta_A_s": 1e-4 * AVOGADRO, "theta_B_s": 1e-4 * AVOGADRO, "theta_AB_s": 5e-5 * AVOGADRO}
+    )
+    assert film.sites.density == pytest.approx(by_name["theta_AB_s"])
+    assert film.sites.phi_max == 1
+    assert film.bonds == ("theta_AB_s",)
+    assert film.species["AB(s)"] == "theta_AB_s"
+
+
+def test_bond_of_one_site_is_counted_by_the_site_density():
+    tethers = load("dna-tethers.yaml", ["bond(s)"])
+    assert tethers.sites.density == pytest.approx(5e-5 * AVOGADRO)
+
+
+def test_parameters_have_paths_places_and_units():
+    (law,) = load("dna-film.yaml").reactions
+    assert law.path == "mechanism.R1"
+    assert law.place.line == load("dna-film.yaml").text.splitlines().index("- equation: A(s) + B(s) <=> AB(s)") + 1
+    specs = {name: law.refine(name, spec).unit for name, spec in law.specs()}
+    assert specs == {"A": "m^2/s", "b": "1", "Ea": "J/mol"}
+    assert pytest.approx(5.13e8 / AVOGADRO) == law.A
+
+
+def test_rate_types_are_found_by_their_name():
+    assert kinds()["interface-Arrhenius"] is InterfaceArrhenius
+
+
+def test_literature_numbers_come_back():
+    """The mechanisms' comments derive their numbers; here from the other end."""
+    tethers, film, selectin = (
+        cantera_of(load(name)) for name in ("dna-tethers.yaml", "dna-film.yaml", "selectin.yaml")
+    )
+    K = np.exp(-(-172380.8 + 298.15 * 482.8336) / (8.31446261815324 * 298.15))  # of 1 mol/L
+    for surface in (tethers, film, selectin):
+        surface.TP = 298.15, ct.one_atm
+    assert tethers.equilibrium_constants[0] == pytest.approx(K * 5e-3, rel=1e-6)
+    assert film.equilibrium_constants[0] == pytest.approx(K / (10e-6 * 1.0), rel=1e-6)  # m^2/kmol
+    assert selectin.reverse_rate_constants[0] == pytest.approx(4.4e6 * 320e-9, rel=1e-6)
+
+
+def test_coverages_sum_to_one():
+    mechanism = load("dna-tethers.yaml")
+    assert mechanism.coverages({"free(s)": 1}) == {"theta_free_s": 1.0, "theta_bond_s": 0.0}
