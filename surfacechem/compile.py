@@ -1,8 +1,8 @@
 """SymEngine expressions to machine code.
 
-Every function of a program shares one input layout, [t | y | ydot | p], so that a trajectory keeps one buffer and fills the
-parameters once. The machine code is SymEngine's own LLVM output: about 10 ms for a small scene, reached as a raw pointer by the
-stepper and as a vectorised function from Python.
+Every function of a program shares one input layout, [t | y | ydot | p], so that a trajectory keeps one buffer and
+fills the parameters once. The machine code is SymEngine's own LLVM output: about 10 ms for a small scene, reached as a
+raw pointer by the stepper and as a vectorised function from Python.
 """
 
 import ctypes
@@ -56,7 +56,7 @@ class Program:
 
     @cached_property
     def addresses(self) -> NDArray[np.int64]:
-        """Code and user data of residual, jacobian, ledger and margins, as the stepper reads them; zero where absent."""
+        """Code and user data of residual, jacobian, ledger and margins; zero where absent."""
         functions = (self.residual, self.jacobian, self.ledger, self.margins)
         return np.array([(f.address, f.user) if f else (0, 0) for f in functions], dtype=np.int64)
 

@@ -1,7 +1,7 @@
 """The folder that keeps the compiled stepper, and compiling with or without it.
 
-The folder's name holds a digest of the kernel's sources, the versions of Numba and Python and the processor, so that code is never
-reused where it does not fit. A cache that cannot be written or read costs compile time, never a result.
+The folder's name holds a digest of the kernel's sources, the versions of Numba and Python and the processor, so that
+code is never reused where it does not fit. A cache that cannot be written or read costs compile time, never a result.
 """
 
 import hashlib
@@ -40,6 +40,7 @@ def _processor() -> str:
 
 
 def kernel_folder(sources: Sequence[Path]) -> Path:
+    """Where code compiled from these sources, here, is kept."""
     digest = hashlib.sha256()
     for text in (version("numba"), sys.version, platform.machine(), _processor()):
         digest.update(text.encode())
@@ -49,6 +50,7 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
 
 
 def is_filled(folder: Path) -> bool:
+    """Whether the folder holds machine code."""
     return any(folder.glob("**/*.nbc"))
 
 
@@ -62,11 +64,13 @@ def _writable(folder: Path) -> None:
 def _settings(folder: Path | None) -> Iterator[None]:
     """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
 
-    Loops here run over a handful of states: vectorising and unrolling them doubles the compile time and slows them down.
+    Loops here run over a handful of states: vectorising and unrolling them doubles the compile time and slows them
+    down.
     """
     import numba
 
-    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0, "OPT": type(numba.config.OPT)(1)}
+    level = type(getattr(numba.config, "OPT"))  # noqa: B009 - Numba sets it dynamically
+    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0, "OPT": level(1)}
     usual = {name: getattr(numba.config, name) for name in chosen}
     try:
         for name, value in chosen.items():
@@ -92,7 +96,7 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) 
         return _compile(function, signature, folder)
     except OSError as error:
         problem = error
-    except Exception:  # noqa: BLE001 - unpickling damaged files can raise anything.
+    except Exception:
         if not is_filled(folder):
             raise
         shutil.rmtree(folder, ignore_errors=True)

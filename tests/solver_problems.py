@@ -12,11 +12,31 @@ CONDUCTANCE = (1e3, 1e12, 1e20)
 PARAMETERS = np.array([2.0, 300.0, 300.0, 1.0, 0.5])
 
 
-def problem(program: Program, y0, segments, rtol, *, atol=None, times=(), parameters=(), margins: tuple[Margin, ...] = (), **options):
+def problem(
+    program: Program,
+    y0,
+    segments,
+    rtol,
+    *,
+    atol=None,
+    times=(),
+    parameters=(),
+    margins: tuple[Margin, ...] = (),
+    **options,
+):
     """A problem of one parameter set, with weights that do not matter by default."""
     weights = np.full(program.n, rtol * 1e-2 if atol is None else atol)
-    return Problem(program, np.array(y0, dtype=float), np.asarray(times, dtype=float), np.array(segments), np.atleast_2d(
-        np.array(parameters, dtype=float)).reshape(1, program.n_parameters), rtol, weights, margins, **options)  # fmt: skip
+    return Problem(
+        program,
+        np.array(y0, dtype=float),
+        np.asarray(times, dtype=float),
+        np.array(segments),
+        np.atleast_2d(np.array(parameters, dtype=float)).reshape(1, program.n_parameters),
+        rtol,
+        weights,
+        margins,
+        **options,
+    )
 
 
 @cache
@@ -36,7 +56,15 @@ def exothermic_exact(t, parameters=PARAMETERS):
 
 def exothermic_problem(rtol: float, outputs: int = 200) -> Problem:
     times = np.linspace(0.0, 2.5, outputs + 1)[1:]
-    return Problem(exothermic(), np.array([300.0, 0.0]), times, np.array([0.0, 2.5]), PARAMETERS[None], rtol, np.array([3.0, 0.01]) * rtol)
+    return Problem(
+        exothermic(),
+        np.array([300.0, 0.0]),
+        times,
+        np.array([0.0, 2.5]),
+        PARAMETERS[None],
+        rtol,
+        np.array([3.0, 0.01]) * rtol,
+    )
 
 
 def _robertson_rows():

@@ -9,12 +9,16 @@ from surfacechem.compile import compile_function, compile_program
 
 def test_derivatives_and_layout() -> None:
     t, x, z, dx, dz, k = se.symbols("t x z dx dz k")
-    program = compile_program(t, [x, z], [dx, dz], [k], [x * dx + k * z, z**2 - t * x], ledger=[k * dx], margins=[x - 1])
+    program = compile_program(
+        t, [x, z], [dx, dz], [k], [x * dx + k * z, z**2 - t * x], ledger=[k * dx], margins=[x - 1]
+    )
     inputs = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0]
-    assert program.n_inputs == 6 and program.algebraic == (False, True)
+    assert program.n_inputs == 6
+    assert program.algebraic == (False, True)
     np.testing.assert_array_equal(program.residual(inputs), [21.0 + 65.0, 25.0 - 6.0])
     np.testing.assert_array_equal(program.jacobian(inputs), [7.0, 13.0, -2.0, 10.0, 3.0, 0.0, 0.0, 0.0])
-    assert program.ledger is not None and program.margins is not None
+    assert program.ledger is not None
+    assert program.margins is not None
     assert program.ledger([inputs, inputs]).shape == (2, 1)
     np.testing.assert_array_equal(program.margins(inputs), [2.0])
 

@@ -5,8 +5,16 @@ import numpy as np
 import pytest
 import symengine as se
 from solver_problems import (
-    CONDUCTANCE, coupled_nodes, exothermic, exothermic_exact, exothermic_problem, linear_decay, problem, robertson, robertson_dae,
-)  # fmt: skip
+    CONDUCTANCE,
+    coupled_nodes,
+    exothermic,
+    exothermic_exact,
+    exothermic_problem,
+    linear_decay,
+    problem,
+    robertson,
+    robertson_dae,
+)
 
 from surfacechem.compile import compile_program
 from surfacechem.solvers import names, solver
@@ -29,14 +37,17 @@ def test_order_conditions(k: int) -> None:
     np.testing.assert_allclose(a @ INVERSE[k, :s, :s], np.eye(s), atol=1e-13)
     pairs = PAIR_VALUES[k, : (s - 1) // 2]
     values = np.concatenate(([GAMMA[k]], pairs, pairs.conj()))
-    np.testing.assert_allclose(np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10)
+    np.testing.assert_allclose(
+        np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10
+    )
 
 
 @pytest.mark.parametrize("name", names)
 def test_every_solver_on_exothermic_bonding(name: str) -> None:
     result = solver(name).solve(exothermic_problem(1e-8))
     assert result.status == Status.FINISHED
-    assert result.t == 2.5 and len(result.times) == 200
+    assert result.t == 2.5
+    assert len(result.times) == 200
     np.testing.assert_allclose(result.outputs, exothermic_exact(result.times), rtol=1e-6)
 
 
@@ -55,7 +66,8 @@ def test_output_rates_come_from_the_equations() -> None:
 @pytest.mark.parametrize("make", [robertson, robertson_dae])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_robertson(make, rtol: float) -> None:
-    """Reference: Hairer & Wanner II, IV.10, at t = 1e11, where cancelling rates of 1e-9 over 1e11 s leave eight digits."""
+    """Reference: Hairer & Wanner II, IV.10, at t = 1e11, where cancelling rates of 1e-9 over 1e11 s leave eight
+    digits."""
     result = radau.solve(problem(make(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10))
     assert result.status == Status.FINISHED
     np.testing.assert_allclose(result.y[:2], [2.083340149701255e-08, 8.333360770334713e-14], rtol=20 * rtol)
@@ -82,9 +94,20 @@ def test_initial_layer_far_below_rounding() -> None:
     """y' = -(y - cos t) / 1e-200: the first step is of the layer's own size."""
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy + 1e200 * (y - se.cos(t))])
-    result = radau.solve(Problem(program, np.array([2.0]), np.zeros(0), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, np.array([1e-10]),
-                                 record_steps=True))  # fmt: skip
-    assert result.status == Status.FINISHED and result.steps is not None
+    result = radau.solve(
+        Problem(
+            program,
+            np.array([2.0]),
+            np.zeros(0),
+            np.array([0.0, 1.0]),
+            np.zeros((1, 0)),
+            1e-8,
+            np.array([1e-10]),
+            record_steps=True,
+        )
+    )
+    assert result.status == Status.FINISHED
+    assert result.steps is not None
     assert result.steps.t[1] < 1e-199
     assert result.y[0] == pytest.approx(np.cos(1.0), rel=1e-8)
 
@@ -92,7 +115,9 @@ def test_initial_layer_far_below_rounding() -> None:
 def test_vanishing_capacity_ends_at_zero_temperature() -> None:
     """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
     t, temperature, rate = se.symbols("t T dT")
-    program = compile_program(t, [temperature], [rate], [], [2.0 * temperature / 300 * rate + 600.0], margins=[temperature])
+    program = compile_program(
+        t, [temperature], [rate], [], [2.0 * temperature / 300 * rate + 600.0], margins=[temperature]
+    )
     result = radau.solve(problem(program, [300.0], [0.0, 2.0], 1e-10, margins=(Margin.stop(),)))
     assert result.status in (Status.EVENT, Status.STEP_UNDERFLOW)
     assert result.t == pytest.approx(0.5, rel=1e-9)
@@ -115,14 +140,23 @@ def test_algebraic_variable_and_ledger() -> None:
 def test_segments_change_parameters(name: str) -> None:
     t, y, dy, rate = se.symbols("t y dy rate")
     program = compile_program(t, [y], [dy], [rate], [dy - rate])
-    case = Problem(program, np.array([0.0]), np.array([0.5, 1.0, 1.5, 3.0]), np.array([0.0, 1.0, 3.0]), np.array([[1.0], [-2.0]]), 1e-8,
-                   np.array([1e-10]))  # fmt: skip
+    case = Problem(
+        program,
+        np.array([0.0]),
+        np.array([0.5, 1.0, 1.5, 3.0]),
+        np.array([0.0, 1.0, 3.0]),
+        np.array([[1.0], [-2.0]]),
+        1e-8,
+        np.array([1e-10]),
+    )
     np.testing.assert_allclose(solver(name).solve(case).outputs[:, 0], [0.5, 1.0, 0.0, -3.0], atol=1e-8)
 
 
 @pytest.mark.parametrize("name", names)
 def test_terminal_event(name: str) -> None:
-    result = solver(name).solve(problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Margin.stop(),), times=np.arange(11.0)))
+    result = solver(name).solve(
+        problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Margin.stop(),), times=np.arange(11.0))
+    )
     assert result.status == Status.EVENT
     assert result.t == pytest.approx(np.log(2), rel=1e-6 if name != "radau" else 1e-11)
     assert list(result.times) == [0.0]
@@ -143,10 +177,16 @@ def test_double_crossing_between_steps_is_seen() -> None:
 
 
 def test_coincident_events_are_both_reported() -> None:
-    case = problem(oscillator(lambda t, x, v: x, lambda t, x, v: 3 * x), [1.0, 0.0], [0.0, 3.0], 1e-10,
-                   margins=(Margin.restart(), Margin.stop()))  # fmt: skip
+    case = problem(
+        oscillator(lambda t, x, v: x, lambda t, x, v: 3 * x),
+        [1.0, 0.0],
+        [0.0, 3.0],
+        1e-10,
+        margins=(Margin.restart(), Margin.stop()),
+    )
     result = radau.solve(case)
-    assert result.status == Status.EVENT and sorted(result.events.index) == [0, 1]
+    assert result.status == Status.EVENT
+    assert sorted(result.events.index) == [0, 1]
     assert result.t == pytest.approx(np.pi / 2, rel=1e-10)
 
 
@@ -176,7 +216,8 @@ def test_blow_up_ends_with_a_status() -> None:
     for name in names:
         result = solver(name).solve(problem(program, [1.0], [0.0, 2.0], 1e-6, max_steps=20_000))
         assert not result.success, name
-        assert result.t <= 1.0 + 1e-5 and np.all(np.isfinite(result.y))
+        assert result.t <= 1.0 + 1e-5
+        assert np.all(np.isfinite(result.y))
 
 
 def test_no_consistent_state() -> None:
@@ -190,19 +231,27 @@ def test_singular_capacity() -> None:
     t, x, y, dx, dy = se.symbols("t x y dx dy")
     program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
     result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
-    assert result.status == Status.SINGULAR and "singular" in result.message
+    assert result.status == Status.SINGULAR
+    assert "singular" in result.message
 
 
 def test_steps_and_seconds_are_limited() -> None:
     case = oscillator()
     assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e9], 1e-10, max_steps=50)).status == Status.MAX_STEPS
-    assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)).status == Status.STOPPED
+    assert (
+        radau.solve(problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)).status
+        == Status.STOPPED
+    )
 
 
 def test_recorded_steps_are_consistent() -> None:
-    case = problem(exothermic(), [300.0, 0.0], [0.0, 2.5], 1e-8, parameters=[2.0, 300.0, 300.0, 1.0, 0.5], record_steps=True)
+    case = problem(
+        exothermic(), [300.0, 0.0], [0.0, 2.5], 1e-8, parameters=[2.0, 300.0, 300.0, 1.0, 0.5], record_steps=True
+    )
     steps = radau.solve(case).steps
-    assert steps is not None and steps.t[0] == 0.0 and steps.t[-1] == 2.5
+    assert steps is not None
+    assert steps.t[0] == 0.0
+    assert steps.t[-1] == 2.5
     np.testing.assert_allclose(steps.ydot[:, 1], 2.0 * np.exp(-2.0 * steps.t), rtol=1e-5)
 
 
@@ -211,11 +260,23 @@ def test_batch_is_deterministic_and_equals_single_runs() -> None:
     parameters = np.array([2.0, 300.0, 300.0, 1.0, 0.5]) * rng.uniform(0.5, 1.5, (600, 1, 5))
     y0 = np.stack([parameters[:, 0, 2], np.zeros(600)], axis=1)
     one, two = (
-        solve_many(exothermic(), y0, parameters, [0.0, 2.5], 1e-8, [1e-8, 1e-10], times=[1.0, 2.5], threads=threads) for threads in (1, 2)
+        solve_many(exothermic(), y0, parameters, [0.0, 2.5], 1e-8, [1e-8, 1e-10], times=[1.0, 2.5], threads=threads)
+        for threads in (1, 2)
     )
-    assert one.y.tobytes() == two.y.tobytes() and one.outputs.tobytes() == two.outputs.tobytes()
+    assert one.y.tobytes() == two.y.tobytes()
+    assert one.outputs.tobytes() == two.outputs.tobytes()
     assert np.all(one.status == Status.FINISHED)
-    single = radau.solve(Problem(exothermic(), y0[7], np.array([1.0, 2.5]), np.array([0.0, 2.5]), parameters[7], 1e-8, np.array([1e-8, 1e-10])))
+    single = radau.solve(
+        Problem(
+            exothermic(),
+            y0[7],
+            np.array([1.0, 2.5]),
+            np.array([0.0, 2.5]),
+            parameters[7],
+            1e-8,
+            np.array([1e-8, 1e-10]),
+        )
+    )
     assert single.y.tobytes() == one.y[7].tobytes()
     for i in (0, 599):
         np.testing.assert_allclose(one.y[i], exothermic_exact(2.5, parameters[i, 0]), rtol=1e-7)

@@ -1,4 +1,5 @@
-"""The cache of the compiled stepper: found, absent, damaged, shared. The kernels here are tiny; the mechanism is the same."""
+"""The cache of the compiled stepper: found, absent, damaged, shared. The kernels here are tiny; the mechanism is the
+same."""
 
 import os
 import subprocess
@@ -38,7 +39,9 @@ def start(tmp_path: Path):
     def run(cache: Path) -> subprocess.Popen[str]:
         environment = {**os.environ, "SURFACECHEM_CACHE": str(cache)}
         code = USE.format(here=str(tmp_path))
-        return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
     return run
 
@@ -77,5 +80,5 @@ def test_damaged_files_are_replaced(start, tmp_path: Path, suffix: str) -> None:
 
 
 def test_importing_solvers_is_light() -> None:
-    code = "import surfacechem.solvers, surfacechem.solvers.radau, sys; assert not {'numba', 'scipy', 'sksundae'} & set(sys.modules)"
+    code = "import surfacechem.solvers.radau, sys; assert not {'numba', 'scipy', 'sksundae'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,7 +1,8 @@
-"""Consistent states: the derivatives of the differential variables and the values of the algebraic ones from G(t, y, ydot) = 0.
+"""Consistent states: the derivatives of the differential variables and the values of the algebraic ones from G(t, y,
+ydot) = 0.
 
-The unknowns enter one damped Newton iteration whose matrix has the column of G_ydot for a differential variable and that of G_y for
-an algebraic one; it is regular exactly when the system has index one.
+The unknowns enter one damped Newton iteration whose matrix has the column of G_ydot for a differential variable and
+that of G_y for an algebraic one; it is regular exactly when the system has index one.
 """
 
 from typing import Any
@@ -10,8 +11,19 @@ import numpy as np
 
 from surfacechem.solvers.lu import factor, solve
 from surfacechem.solvers.native import (
-    COLUMNS, DELTA, ERROR, JACOBIAN, RESIDUAL, RHS, TRIAL, TRIAL_DOT, compiled, evaluate, finite, set_inputs,
-)  # fmt: skip
+    COLUMNS,
+    DELTA,
+    ERROR,
+    JACOBIAN,
+    RESIDUAL,
+    RHS,
+    TRIAL,
+    TRIAL_DOT,
+    compiled,
+    evaluate,
+    finite,
+    set_inputs,
+)
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 60

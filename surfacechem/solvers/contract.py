@@ -1,8 +1,8 @@
 """What a solver is given and what it hands back.
 
-A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own parameters.
-Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures is integrated beside the
-state, outside the error norm. A result always carries a status and its reason in words.
+A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own
+parameters. Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures
+is integrated beside the state, outside the error norm. A result always carries a status and its reason in words.
 """
 
 from abc import ABC, abstractmethod
@@ -92,15 +92,23 @@ class Problem:
     def __post_init__(self) -> None:
         n, segments = self.program.n, len(self.segments) - 1
         _require(self.y0.shape == (n,), f"y0 has shape {self.y0.shape}; the program has {n} states.")
-        _require(self.atol.shape == (n,), f"atol has shape {self.atol.shape}; it needs one entry for each of {n} states.")
-        _require(segments >= 1 and bool(np.all(np.diff(self.segments) > 0)), "segments must be increasing breakpoints, at least two.")
+        _require(
+            self.atol.shape == (n,), f"atol has shape {self.atol.shape}; it needs one entry for each of {n} states."
+        )
+        _require(
+            segments >= 1 and bool(np.all(np.diff(self.segments) > 0)),
+            "segments must be increasing breakpoints, at least two.",
+        )
         shape = (segments, self.program.n_parameters)
         _require(self.parameters.shape == shape, f"parameters have shape {self.parameters.shape}; {shape} is needed.")
         _require(bool(np.all(np.diff(self.times) > 0)), "output times must increase strictly.")
         inside = len(self.times) == 0 or (self.times[0] >= self.segments[0] and self.times[-1] <= self.segments[-1])
         _require(inside, "output times must lie within the segments.")
         _require(len(self.margins) == self.program.n_margins, f"{self.program.n_margins} margins need as many kinds.")
-        _require(0.0 < self.rtol < 1.0 and bool(np.all(self.atol >= 0.0)), "rtol must lie in (0, 1) and atol must not be negative.")
+        _require(
+            0.0 < self.rtol < 1.0 and bool(np.all(self.atol >= 0.0)),
+            "rtol must lie in (0, 1) and atol must not be negative.",
+        )
 
 
 def _require(condition: bool, message: str) -> None:
@@ -164,7 +172,9 @@ class Result:
 
     @cached_property
     def output_rates(self) -> Array:
-        """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
+        """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less
+        accurate.
+        """
         from surfacechem.solvers.radau import consistent
 
         segment = np.searchsorted(self.problem.segments[1:-1], self.times, side="left")
@@ -179,7 +189,9 @@ class Solver(ABC):
 
     @abstractmethod
     def solve(self, problem: Problem) -> Result:
-        """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong number."""
+        """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong
+        number.
+        """
 
 
 def explain(status: Status, t: float, margins: Array, index: int | None = None) -> str:

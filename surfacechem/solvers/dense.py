@@ -1,14 +1,25 @@
 """State, rate and ledger inside a step.
 
-The collocation polynomial has only the order of the stages. The defect of its derivative at the start of the step, which is the
-error estimate, fixes its leading error term; adding that term gains one order at no cost.
+The collocation polynomial has only the order of the stages. The defect of its derivative at the start of the step,
+which is the error estimate, fixes its leading error term; adding that term gains one order at no cost.
 """
 
 from typing import Any
 
 from surfacechem.solvers.native import (
-    CORRECTION, ERROR, LEDGER, MEMBER, Q, Q_CORRECTION, Q_TRIAL, TRIAL, TRIAL_DOT, Y, compiled, evaluate,
-)  # fmt: skip
+    CORRECTION,
+    ERROR,
+    LEDGER,
+    MEMBER,
+    Q_CORRECTION,
+    Q_TRIAL,
+    TRIAL,
+    TRIAL_DOT,
+    Q,
+    Y,
+    compiled,
+    evaluate,
+)
 from surfacechem.solvers.radau_stages import lagrange, set_stage, stage_count
 from surfacechem.solvers.radau_tables import COLLOCATION, DEFECT, GAMMA, INVERSE, LAGRANGE, NODES, START_RATE
 

@@ -1,16 +1,30 @@
 """Events: zeros of margins inside a step.
 
-Margins are examined at interior points of the step, since a high order steps over double crossings. The first zero is bracketed on
-the corrected polynomial, then the step is repeated onto it with the full order of the method.
+Margins are examined at interior points of the step, since a high order steps over double crossings. The first zero is
+bracketed on the corrected polynomial, then the step is repeated onto it with the full order of the method.
 """
 
 from typing import Any
 
 from surfacechem.solvers.dense import interpolate, interpolate_rate
 from surfacechem.solvers.native import (
-    BASE, H_FACTORED, H_LAST, M_BEFORE, M_LARGEST, M_NOW, M_SIDE, MARGINS, MEMBER, TAU, TRIAL, TRIAL_DOT, Y, YDOT, compiled, evaluate,
+    BASE,
+    H_FACTORED,
+    M_BEFORE,
+    M_LARGEST,
+    M_NOW,
+    M_SIDE,
+    MARGINS,
+    MEMBER,
+    TAU,
+    TRIAL,
+    TRIAL_DOT,
+    YDOT,
+    Y,
+    compiled,
+    evaluate,
     set_inputs,
-)  # fmt: skip
+)
 from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
@@ -142,7 +156,9 @@ def _margins_at_end(w: Any, size: float) -> None:
 
 @compiled
 def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
-    """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated step fails."""
+    """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
+    step fails.
+    """
     side = w.margin[M_SIDE, m]
     size = x * h
     store_polynomial(w, h, 0.0)
@@ -176,7 +192,9 @@ def _mark_coincident(w: Any, h: float, size: float, kinds: Any, fired: Any, slop
 
 @compiled
 def find_event(w: Any, h: float, kinds: Any, fired: Any, slopes: Any) -> float:
-    """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be repeated."""
+    """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
+    repeated.
+    """
     end = _scan(w, h, kinds, fired)
     if end == 0.0:
         return h

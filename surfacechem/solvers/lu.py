@@ -1,7 +1,8 @@
 """LU decomposition of small dense real or complex matrices, with scaled partial pivoting.
 
-Rows may differ by forty decades (a capacity of 1e-15 beside a conductance of 1e20). A row is therefore judged by its largest
-entry, in units of the columns' typical sizes; the entries themselves are not scaled, so that a row which is a sum stays exact.
+Rows may differ by forty decades (a capacity of 1e-15 beside a conductance of 1e20). A row is therefore judged by its
+largest entry, in units of the columns' typical sizes; the entries themselves are not scaled, so that a row which is a
+sum stays exact.
 """
 
 from typing import Any
@@ -48,7 +49,9 @@ def _pivot(a: Any, rows: Any, k: int) -> int:
 
 @compiled
 def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> bool:
-    """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the threshold."""
+    """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
+    threshold.
+    """
     n = a.shape[0]
     if not _row_scales(a, columns, rows):
         return False

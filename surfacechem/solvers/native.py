@@ -14,7 +14,12 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 
-compiled: Any = numba.njit(error_model="numpy", _nrt=False)
+_njit: Any = numba.njit
+_intrinsic: Any = intrinsic
+_borrowed: Any = impl_ret_borrowed
+_Constant: Any = ir.Constant
+
+compiled: Any = _njit(error_model="numpy", _nrt=False)
 """Nothing is allocated inside a step; without reference counts the code compiles and runs about twice as fast."""
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
@@ -28,7 +33,8 @@ M_NOW, M_SIDE, M_BEFORE, M_LARGEST, M_SLOPE = range(5)
 """Rows of the vectors of length n_margins: value, side of zero it was last seen on, value before, largest
 size so far, its slope."""
 BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = range(10)
-"""Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of t."""
+"""Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
+t."""
 STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS, MEMBER, LAST_MEMBER, TRIES, CALM, FRESH = range(11)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
 iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state."""
@@ -59,7 +65,7 @@ class Work(NamedTuple):
     fired: Any
 
 
-class WorkType(types.Type):  # type: ignore[misc]
+class WorkType(types.Type):
     """Pointer to a Work. By value its twenty arrays would be 140 arguments of every call."""
 
     def __init__(self, content: Any) -> None:
@@ -68,16 +74,16 @@ class WorkType(types.Type):  # type: ignore[misc]
 
 
 @register_model(WorkType)
-class _WorkModel(models.PrimitiveModel):  # type: ignore[misc]
+class _WorkModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.IntType(8).as_pointer())
+        super().__init__(manager, kind, ir.IntType(8).as_pointer())  # type: ignore[no-untyped-call]
 
 
 @infer_getattr
-class _WorkFields(AttributeTemplate):  # type: ignore[misc]
+class _WorkFields(AttributeTemplate):
     key = WorkType
 
-    def generic_resolve(self, work: Any, name: str) -> Any:
+    def generic_resolve(self, work: Any, name: str) -> Any:  # type: ignore[override]
         return work.content.types[work.content.fields.index(name)]
 
 
@@ -85,33 +91,34 @@ def _load(builder: Any, pointer: Any, kind: Any) -> Any:
     """Load a structure leaf by leaf, so that unused leaves are dropped."""
     if not isinstance(kind, ir.Aggregate):
         return builder.load(pointer)
-    value = ir.Constant(kind, ir.Undefined)
+    value = _Constant(kind, ir.Undefined)
     for i in range(len(kind)):
         leaf = builder.gep(pointer, [ir.IntType(32)(0), ir.IntType(32)(i)], inbounds=True)
-        value = builder.insert_value(value, _load(builder, leaf, kind.gep(ir.Constant(ir.IntType(32), i))), i)
+        value = builder.insert_value(value, _load(builder, leaf, kind.gep(_Constant(ir.IntType(32), i))), i)
     return value
 
 
-@lower_getattr_generic(WorkType)
+@lower_getattr_generic(WorkType)  # type: ignore[no-untyped-call]
 def _load_field(context: Any, builder: Any, work: Any, value: Any, name: str) -> Any:
     kind = context.get_value_type(work.content)
     index = ir.IntType(32)(work.content.fields.index(name))
     pointer = builder.gep(builder.bitcast(value, kind.as_pointer()), [ir.IntType(32)(0), index], inbounds=True)
     field = work.content.types[work.content.fields.index(name)]
-    return impl_ret_borrowed(context, builder, field, _load(builder, pointer, pointer.type.pointee))
+    return _borrowed(context, builder, field, _load(builder, pointer, pointer.type.pointee))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_intrinsic
 def reference(_context: Any, content: Any) -> Any:
     """Pointer to a copy on the caller's stack; the caller keeps the arrays alive."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        return builder.bitcast(cgutils.alloca_once_value(builder, args[0]), ir.IntType(8).as_pointer())
+        slot = cgutils.alloca_once_value(builder, args[0])  # type: ignore[no-untyped-call]
+        return builder.bitcast(slot, ir.IntType(8).as_pointer())
 
     return WorkType(content)(content), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_intrinsic
 def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> Any:
     signature = types.void(types.intp, types.intp, types.intp, types.intp)
 
@@ -133,6 +140,7 @@ def evaluate(w: Any, which: int, out: int) -> None:
 
 @compiled
 def set_inputs(w: Any, y: Any, ydot: Any) -> None:
+    """State and rates of the next call."""
     n = y.shape[0]
     for j in range(n):
         w.inputs[1 + j] = y[j]
@@ -141,20 +149,23 @@ def set_inputs(w: Any, y: Any, ydot: Any) -> None:
 
 @compiled
 def copy(source: Any, target: Any) -> None:
+    """Copy entry by entry; a slice assignment would allocate."""
     for j in range(source.shape[0]):
         target[j] = source[j]
 
 
 @compiled
 def finite(values: Any) -> bool:
+    """Whether no entry is infinite or NaN."""
     total = 0.0
     for value in values.flat:
         total += 0.0 * value
     return total == 0.0
 
 
-@numba.njit
+@_njit
 def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_margins: int) -> Work:
+    """Workspace of a trajectory."""
     n = algebraic.shape[0]
     return Work(
         code,
@@ -180,7 +191,7 @@ def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_marg
     )
 
 
-@numba.njit  # type: ignore[untyped-decorator]
+@_njit
 def keep_alive(work: Work) -> None:
     """A last use: Numba releases an array after the last statement that names it."""
     work.clock[0] = 0.0

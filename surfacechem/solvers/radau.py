@@ -10,7 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile import Program
 from surfacechem.solvers import stepper
-from surfacechem.solvers.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, Status, explain
+from surfacechem.solvers.contract import (
+    Array,
+    Counters,
+    Events,
+    Margin,
+    Points,
+    Problem,
+    Result,
+    Solver,
+    Status,
+    explain,
+)
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
@@ -23,9 +34,19 @@ class _Tables:
     """Input and output arrays of a batch of runs, in the order of the compiled entry point."""
 
     def __init__(
-        self, program: Program, y0: Array, parameters: Array, segments: Array, times: Array, rtol: float, atol: Array,
-        margins: tuple[Margin, ...], max_steps: int, step_rows: int, event_rows: int,
-    ) -> None:  # fmt: skip
+        self,
+        program: Program,
+        y0: Array,
+        parameters: Array,
+        segments: Array,
+        times: Array,
+        rtol: float,
+        atol: Array,
+        margins: tuple[Margin, ...],
+        max_steps: int,
+        step_rows: int,
+        event_rows: int,
+    ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
         self.stop = np.zeros(1, np.int64)
         self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
@@ -37,9 +58,23 @@ class _Tables:
         kinds = np.array([(margin.terminal, margin.direction) for margin in margins], np.int64).reshape(-1, 2)
         limits = np.array([max_steps, q], np.int64)
         self.arguments = (
-            program.addresses, program.algebraic_mask, limits, self.stop, np.array([rtol, *atol]), kinds, y0, parameters, segments, times,
-            self.ends, self.counts, self.counters, self.outputs, self.steps, self.events,
-        )  # fmt: skip
+            program.addresses,
+            program.algebraic_mask,
+            limits,
+            self.stop,
+            np.array([rtol, *atol]),
+            kinds,
+            y0,
+            parameters,
+            segments,
+            times,
+            self.ends,
+            self.counts,
+            self.counters,
+            self.outputs,
+            self.steps,
+            self.events,
+        )
 
     def run(self, first: int, last: int) -> None:
         stepper.run_batch()(first, last, *self.arguments)
@@ -51,9 +86,18 @@ def _contiguous(values: ArrayLike) -> Array:
 
 def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
     return _Tables(
-        problem.program, _contiguous(problem.y0)[None], _contiguous(problem.parameters)[None], _contiguous(problem.segments),
-        _contiguous(problem.times), problem.rtol, problem.atol, problem.margins, problem.max_steps, step_rows, event_rows,
-    )  # fmt: skip
+        problem.program,
+        _contiguous(problem.y0)[None],
+        _contiguous(problem.parameters)[None],
+        _contiguous(problem.segments),
+        _contiguous(problem.times),
+        problem.rtol,
+        problem.atol,
+        problem.margins,
+        problem.max_steps,
+        step_rows,
+        event_rows,
+    )
 
 
 def _run_timed(tables: _Tables, seconds: float | None) -> None:
@@ -147,11 +191,15 @@ def solve_many(
     max_steps: int = 100_000,
     threads: int = 1,
 ) -> Batch:
-    """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number of threads."""
+    """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number
+    of threads.
+    """
     states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
     weights = np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))
     if len(states) != len(table):
-        raise ValueError(f"{len(states)} initial values but {len(table)} parameter tables; a batch needs one of each a run.")
+        raise ValueError(
+            f"{len(states)} initial values but {len(table)} parameter tables; a batch needs one of each a run."
+        )
     if len(states):
         # All runs share shapes, so the checks of one problem are those of the batch.
         Problem(program, states[0], outputs, breaks, table[0], rtol, weights, tuple(margins), max_steps)
@@ -192,8 +240,8 @@ class Consistent:
 def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, parameters: ArrayLike) -> Consistent:
     """Keep the differential variables; find their derivatives and the algebraic variables.
 
-    For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses; parameters are
-    one vector or one for each state.
+    For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses;
+    parameters are one vector or one for each state.
     """
     values = np.array(y, dtype=float)
     shape = values.shape

@@ -2,17 +2,52 @@
 
 from typing import Any
 
+from surfacechem.solvers.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
 from surfacechem.solvers.contract import Status
 from surfacechem.solvers.dense import integrate_ledger, keep_correction
 from surfacechem.solvers.native import (
-    BASE, CALM, CONTRACTION, FRESH, H_FACTORED, H_LAST, LAST_MEMBER, LEDGER, MEMBER, OFFSET, Q, REJECTED, RTOL, STEPS, TAU, THETA,
-    TRIAL, TRIAL_DOT, Y, YDOT, compiled, evaluate, set_inputs,
-)  # fmt: skip
-from surfacechem.solvers.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
+    BASE,
+    CALM,
+    CONTRACTION,
+    FRESH,
+    H_FACTORED,
+    H_LAST,
+    LAST_MEMBER,
+    LEDGER,
+    MEMBER,
+    OFFSET,
+    REJECTED,
+    RTOL,
+    STEPS,
+    TAU,
+    THETA,
+    TRIAL,
+    TRIAL_DOT,
+    YDOT,
+    Q,
+    Y,
+    compiled,
+    evaluate,
+    set_inputs,
+)
 from surfacechem.solvers.radau_stages import (
-    CONVERGED, NOT_FINITE, differentiate_system, factor_newton, predict, set_stage, solve_stages, stage_count,
-)  # fmt: skip
-from surfacechem.solvers.radau_step import TINIEST, choose_member, estimate_error, next_size, preferred_member, set_weights
+    CONVERGED,
+    NOT_FINITE,
+    differentiate_system,
+    factor_newton,
+    predict,
+    set_stage,
+    solve_stages,
+    stage_count,
+)
+from surfacechem.solvers.radau_step import (
+    TINIEST,
+    choose_member,
+    estimate_error,
+    next_size,
+    preferred_member,
+    set_weights,
+)
 
 INVALID, OLD, CURRENT = range(3)
 """Whether the Jacobian in the workspace was taken nowhere, at an earlier state, or at the current one."""
@@ -71,11 +106,14 @@ def _prepare(w: Any, h: float) -> int:
 
 @compiled
 def too_small(w: Any, h: float) -> bool:
+    """Whether the step no longer moves time."""
     return not (h > TINIEST and h > 4e-16 * w.clock[TAU])
 
 
 @compiled
-def advance(w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
+def advance(
+    w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
+) -> tuple[int, float, float, float]:
     """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
     repeated = w.clock[H_LAST] == 0.0
     singular = 0

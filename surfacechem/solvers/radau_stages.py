@@ -1,7 +1,8 @@
-"""The nonlinear system of one Radau IIA step, solved for the stage increments Z_i = Y_i - y_n by a simplified Newton method.
+"""The nonlinear system of one Radau IIA step, solved for the stage increments Z_i = Y_i - y_n by a simplified Newton
+method.
 
-Each stage asks G(t_i, y_n + Z_i, (1/h) sum_j (A^-1)_ij Z_j) = 0. In the eigenbasis of A^-1 the Newton matrix falls apart into one
-real and (s-1)/2 complex matrices (lambda/h) G_ydot + G_y of the size of the state.
+Each stage asks G(t_i, y_n + Z_i, (1/h) sum_j (A^-1)_ij Z_j) = 0. In the eigenbasis of A^-1 the Newton matrix falls
+apart into one real and (s-1)/2 complex matrices (lambda/h) G_ydot + G_y of the size of the state.
 """
 
 from typing import Any
@@ -10,12 +11,43 @@ import numpy as np
 
 from surfacechem.solvers.lu import factor, solve
 from surfacechem.solvers.native import (
-    BASE, CONTRACTION, DELTA, FACTORIZATIONS, H_LAST, ITERATIONS, JACOBIAN, JACOBIANS, LAST_MEMBER, MEMBER, OFFSET, RESIDUAL, RESIDUALS,
-    ROUNDING, SCALE, TAU, THETA, TRIES, WEIGHT, Y, YDOT, compiled, evaluate, finite, set_inputs,
-)  # fmt: skip
+    BASE,
+    CONTRACTION,
+    DELTA,
+    FACTORIZATIONS,
+    H_LAST,
+    ITERATIONS,
+    JACOBIAN,
+    JACOBIANS,
+    LAST_MEMBER,
+    MEMBER,
+    OFFSET,
+    RESIDUAL,
+    RESIDUALS,
+    ROUNDING,
+    SCALE,
+    TAU,
+    THETA,
+    TRIES,
+    WEIGHT,
+    YDOT,
+    Y,
+    compiled,
+    evaluate,
+    finite,
+    set_inputs,
+)
 from surfacechem.solvers.radau_tables import (
-    GAMMA, INVERSE, LAGRANGE, NODES, PAIR_COLUMNS, PAIR_ROWS, PAIR_VALUES, REAL_COLUMN, REAL_ROW,
-)  # fmt: skip
+    GAMMA,
+    INVERSE,
+    LAGRANGE,
+    NODES,
+    PAIR_COLUMNS,
+    PAIR_ROWS,
+    PAIR_VALUES,
+    REAL_COLUMN,
+    REAL_ROW,
+)
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
@@ -23,11 +55,13 @@ TIGHT = 0.05
 """Newton error allowed, in units of the tolerance."""
 
 SLOWEST_KNOWN = 0.02
-"""Contraction never assumed better than this: a component that converges at once hides a slower one behind its first correction."""
+"""Contraction never assumed better than this: a component that converges at once hides a slower one behind its first
+correction."""
 
 
 @compiled
 def stage_count(k: int) -> int:
+    """Stages of member k of the family."""
     return 2 * k + 3
 
 
@@ -43,6 +77,7 @@ def differentiate_system(w: Any) -> bool:
 
 @compiled
 def factor_newton(w: Any, h: float) -> bool:
+    """Factor the real and the complex Newton matrices for this step size."""
     k = w.count[MEMBER]
     n = w.algebraic.shape[0]
     mass, stiffness = w.jacobian[1], w.jacobian[0]
@@ -153,7 +188,9 @@ def _correct(w: Any) -> float:
 
 @compiled
 def solve_stages(w: Any, h: float) -> int:
-    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the contraction rate in the clock."""
+    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the contraction rate in the
+    clock.
+    """
     limit = 7 + 2 * w.count[MEMBER]
     contraction = max(w.clock[CONTRACTION], 1e-16) ** 0.8
     rounding = w.clock[ROUNDING]

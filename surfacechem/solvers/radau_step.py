@@ -1,7 +1,8 @@
 """Error estimate and choice of step size and order of the Radau IIA family.
 
-The estimate compares the derivative of the collocation polynomial at the start of the step with the true one, filtered through the
-real Newton matrix (Hairer & Wanner II, IV.8). It has order s while the method has order 2s - 1, hence the loosened tolerance.
+The estimate compares the derivative of the collocation polynomial at the start of the step with the true one,
+filtered through the real Newton matrix (Hairer & Wanner II, IV.8). It has order s while the method has order 2s - 1,
+hence the loosened tolerance.
 """
 
 from typing import Any
@@ -11,9 +12,31 @@ import numpy as np
 from surfacechem.solvers.consistency import CONSISTENT, find_consistent
 from surfacechem.solvers.lu import solve
 from surfacechem.solvers.native import (
-    ATOL, BASE, CALM, DELTA, ERROR, LOOSE, MEMBER, RESIDUAL, RESIDUALS, ROUNDING, RTOL, SCALE, TAU, THETA, TRIAL, TRIAL_DOT, TRIES,
-    WEIGHT, Y, YDOT, compiled, evaluate, finite, set_inputs,
-)  # fmt: skip
+    ATOL,
+    BASE,
+    CALM,
+    DELTA,
+    ERROR,
+    LOOSE,
+    MEMBER,
+    RESIDUAL,
+    RESIDUALS,
+    ROUNDING,
+    RTOL,
+    SCALE,
+    TAU,
+    THETA,
+    TRIAL,
+    TRIAL_DOT,
+    TRIES,
+    WEIGHT,
+    YDOT,
+    Y,
+    compiled,
+    evaluate,
+    finite,
+    set_inputs,
+)
 from surfacechem.solvers.radau_stages import stage_count
 from surfacechem.solvers.radau_tables import START_SLOPE
 

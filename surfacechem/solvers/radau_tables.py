@@ -1,8 +1,9 @@
 """Radau IIA coefficients for 3, 5 and 7 stages, rounded from 60 digits.
 
-The nodes c are the zeros of P_{s-1} - P_s shifted to (0, 1]; A is the collocation matrix; A^-1 = T diag(lambda) T^-1 is kept as one
-real eigenvector and (s-1)/2 complex pairs, of which only the member with positive imaginary part is stored (PAIR_COLUMNS carries
-the factor 2 of its conjugate). Tables are padded to seven stages; the first index is the family member k = (s - 3) / 2.
+The nodes c are the zeros of P_{s-1} - P_s shifted to (0, 1]; A is the collocation matrix; A^-1 = T diag(lambda) T^-1
+is kept as one real eigenvector and (s-1)/2 complex pairs, of which only the member with positive imaginary part is
+stored (PAIR_COLUMNS carries the factor 2 of its conjugate). Tables are padded to seven stages; the first index is the
+family member k = (s - 3) / 2.
 
 Source: Hairer & Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
 """
@@ -17,13 +18,15 @@ STAGES = (3, 5, 7)
 
 def _padded(shape: tuple[int, ...], *members: tuple[Any, ...]) -> NDArray[Any]:
     """Stack the three tables, each s by s, s by p, ... in its own size, into one zero-padded array."""
-    table = np.zeros((3, *shape), dtype=np.asarray(members[0]).dtype)
+    table: NDArray[Any] = np.zeros((3, *shape), dtype=np.asarray(members[0]).dtype)
     for k, member in enumerate(members):
-        size = tuple({7: s, 3: (s - 1) // 2}[axis] for axis, s in zip(shape, (STAGES[k],) * len(shape), strict=True))
-        table[(k, *(slice(count) for count in size))] = np.reshape(member, size)
+        s = STAGES[k]
+        size = tuple(s if axis == 7 else (s - 1) // 2 for axis in shape)
+        table[k][tuple(slice(count) for count in size)] = np.reshape(member, size)
     return table
 
 
+# fmt: off
 GAMMA = np.array([3.637834252744496, 6.2867047517292765, 8.936832788405216])
 """The real eigenvalue of A^-1."""
 
@@ -193,6 +196,8 @@ PAIR_COLUMNS = _padded(
 )
 
 
+# fmt: on
+
 
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     """1 / (c_j prod_{k != j} (c_j - c_k)): barycentric weights of the nodes 0, c_1, ..., c_s without the node 0."""
@@ -213,6 +218,7 @@ LAGRANGE = np.array([np.pad(_lagrange(c), (0, 7 - len(c))) for c in _members])
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
 """Value at 0 of the Lagrange polynomials on c_1, ..., c_s: extrapolates stage rates to the start of the step."""
 START_SLOPE = np.array([np.pad(-_lagrange(c) * np.prod(-c) / c, (0, 7 - len(c))) for c in _members])
-"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference to the true rate is the error estimate."""
+"""Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference to the true rate is the error
+estimate."""
 DEFECT = np.array([np.pad(_defect(c), (0, 7 - len(c))) for c in _members])
 """Shape of the error of the collocation polynomial, per unit defect of its derivative at 0."""

@@ -23,7 +23,9 @@ class Reduced:
         return np.concatenate((ydot[~self.mask], self.view.ledger_rates(t, y, ydot)))
 
     def jacobian(self, t: float, x: Array) -> Array:
-        """From G_x dx + G_u du = 0 with u the derivatives and algebraic variables. The ledger does not act back: its rows stay 0."""
+        """From G_x dx + G_u du = 0 with u the derivatives and algebraic variables. The ledger does not act back: its
+        rows stay 0.
+        """
         y, ydot = self.view.complete(t, x[: self.n])
         by_state, by_rate = self.view.matrices(t, y, ydot)
         unknown = np.where(self.mask, by_state, by_rate)

@@ -8,7 +8,7 @@ from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.reduced import Reduced
-from surfacechem.solvers.stepping import Method, StepFailure, SteppingSolver, View
+from surfacechem.solvers.stepping import Method, StepError, SteppingSolver, View
 
 SMALLEST_RTOL = 100 * np.finfo(float).eps
 """SciPy raises smaller tolerances to this with a warning."""
@@ -17,11 +17,15 @@ SMALLEST_RTOL = 100 * np.finfo(float).eps
 class _Stretch(Method):
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array, ledger: Array) -> None:
         system = Reduced(view)
-        options: dict[str, Any] = {"rtol": max(view.problem.rtol, SMALLEST_RTOL), "atol": system.atol, "jac": system.jacobian}
+        options: dict[str, Any] = {
+            "rtol": max(view.problem.rtol, SMALLEST_RTOL),
+            "atol": system.atol,
+            "jac": system.jacobian,
+        }
         try:
             self.solver = kind(system.rates, t, system.start(y, ledger), end, **options)
         except (ValueError, ArithmeticError) as error:
-            raise StepFailure(str(error)) from error
+            raise StepError(str(error)) from error
         self.dense: Any = None
 
     def advance(self) -> float:
@@ -30,9 +34,9 @@ class _Stretch(Method):
             try:
                 message = self.solver.step()
             except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-                raise StepFailure(str(error)) from error
+                raise StepError(str(error)) from error
         if self.solver.status == "failed":
-            raise StepFailure(str(message))
+            raise StepError(str(message))
         self.dense = self.solver.dense_output()
         return float(self.solver.t)
 
@@ -52,12 +56,15 @@ class SciPySolver(SteppingSolver):
 
 
 def lsoda() -> SciPySolver:
+    """Adams and BDF with switching, from ODEPACK."""
     return SciPySolver("lsoda", LSODA)
 
 
 def bdf() -> SciPySolver:
+    """BDF of variable order."""
     return SciPySolver("bdf", BDF)
 
 
 def radau() -> SciPySolver:
+    """Radau IIA of order 5."""
     return SciPySolver("scipy-radau", Radau)

@@ -10,8 +10,19 @@ from typing import Any
 
 from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
 
-_SOURCES = ("contract", "native", "lu", "radau_tables", "radau_stages", "radau_step", "radau_advance", "consistency", "dense", "locate",
-            "trajectory")  # fmt: skip
+_SOURCES = (
+    "contract",
+    "native",
+    "lu",
+    "radau_tables",
+    "radau_stages",
+    "radau_step",
+    "radau_advance",
+    "consistency",
+    "dense",
+    "locate",
+    "trajectory",
+)
 _LOCK = threading.Lock()
 
 
@@ -33,9 +44,25 @@ def _run_batch() -> Any:
 
     real, table, cube, count = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[:, ::1]
     signature = void(
-        int64, int64, count, boolean[::1], int64[::1], int64[::1], real, count, table, cube, real, real, table, count, count, cube, cube,
+        int64,
+        int64,
+        count,
+        boolean[::1],
+        int64[::1],
+        int64[::1],
+        real,
+        count,
+        table,
         cube,
-    )  # fmt: skip
+        real,
+        real,
+        table,
+        count,
+        count,
+        cube,
+        cube,
+        cube,
+    )
     return compile_kernel(run_batch, signature, _folder("run"))
 
 
@@ -51,11 +78,13 @@ def _make_consistent() -> Any:
 
 
 def run_batch() -> Any:
+    """The compiled loop over a batch of runs."""
     with _LOCK:
         return _run_batch()
 
 
 def make_consistent() -> Any:
+    """The compiled search for consistent states."""
     with _LOCK:
         return _make_consistent()
 

@@ -1,4 +1,6 @@
-"""Runs with a library's method: its single steps, and around them the segments, events, outputs and checks of the contract."""
+"""Runs with a library's method: its single steps, and around them the segments, events, outputs and checks of the
+contract.
+"""
 
 import time
 from abc import ABC, abstractmethod
@@ -16,11 +18,11 @@ LEDGER_ATOL = 1e100
 """Takes the ledger out of the library's error norm."""
 
 
-class StepFailure(Exception):
+class StepError(Exception):
     """The library could not take a step."""
 
 
-class NoState(Exception):
+class NoStateError(Exception):
     """No consistent state exists at a point the run needs."""
 
 
@@ -75,7 +77,7 @@ class Method(ABC):
 
     @abstractmethod
     def at(self, t: float) -> Array:
-        """x inside the last step."""
+        """X inside the last step."""
 
 
 @dataclass
@@ -122,16 +124,23 @@ class SteppingSolver(Solver):
         program = problem.program
         empty = np.zeros(0)
         progress = Progress(
-            problem, time.monotonic(), float(problem.segments[0]), problem.y0, np.zeros(program.n), np.zeros(program.n_ledger), empty, empty
+            problem,
+            time.monotonic(),
+            float(problem.segments[0]),
+            problem.y0,
+            np.zeros(program.n),
+            np.zeros(program.n_ledger),
+            empty,
+            empty,
         )
         status = Status.FINISHED
         for parameters, end in zip(problem.parameters, problem.segments[1:], strict=True):
             view = View(problem, parameters, progress.y)
             try:
                 status = self._segment(view, progress, float(end))
-            except NoState:
+            except NoStateError:
                 status = Status.NO_CONSISTENT_STATE
-            except StepFailure:
+            except StepError:
                 status = Status.STEP_UNDERFLOW if np.all(np.isfinite(progress.y)) else Status.NOT_FINITE
             progress.residuals += view.residuals
             progress.jacobians += view.jacobians
@@ -154,7 +163,7 @@ class SteppingSolver(Solver):
             start = progress.t
             progress.y, progress.ydot = view.complete(start, progress.y[~view.problem.program.algebraic_mask])
             if not np.all(np.isfinite(progress.y)):
-                raise NoState
+                raise NoStateError
             progress.margins = view.margins(start, progress.y, progress.ydot)
             progress.restart_sides(fired)
             _start_tables(progress)
@@ -172,14 +181,14 @@ class SteppingSolver(Solver):
         while progress.t < end and progress.over_budget() is None:
             reached = min(method.advance(), end)
             if not reached > progress.t:
-                raise StepFailure("the step size fell to zero")
+                raise StepError("the step size fell to zero")
             fired: set[int] = set()
             if view.problem.margins:
                 reached, fired = self._find_event(view, progress, method, reached)
             self._write_outputs(view, progress, method, reached)
             y, ydot, ledger = self._split(view, reached, method.at(reached))
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
-                raise StepFailure("a state is not finite")
+                raise StepError("a state is not finite")
             progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
             progress.margins = view.margins(reached, y, ydot)
             progress.count += 1
@@ -198,7 +207,11 @@ class SteppingSolver(Solver):
         low = progress.t
         for t in np.linspace(progress.t, reached, POINTS + 1)[1:]:
             values = self._margins(view, method, t)
-            crossing = [i for i, kind in enumerate(view.problem.margins) if _crosses(progress.sides[i], values[i], kind.direction)]
+            crossing = [
+                i
+                for i, kind in enumerate(view.problem.margins)
+                if _crosses(progress.sides[i], values[i], kind.direction)
+            ]
             if crossing:
                 zeros = {i: _zero(lambda s, i=i: float(self._margins(view, method, s)[i]), low, t) for i in crossing}  # type: ignore[misc]
                 first = min(zeros.values())
@@ -214,7 +227,7 @@ class SteppingSolver(Solver):
             t = float(times[len(progress.outputs)])
             y, _, ledger = self._split(view, t, method.at(t))
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ledger))):
-                raise StepFailure("an output is not finite")
+                raise StepError("an output is not finite")
             progress.outputs.append(np.concatenate((y, ledger)))
 
 
@@ -241,7 +254,9 @@ def _zero(margin: Callable[[float], float], low: float, high: float) -> float:
 def _rows(rows: list[tuple[float, Array, Array, Array]], problem: Problem) -> tuple[Array, Array, Array, Array]:
     widths = (problem.program.n, problem.program.n, problem.program.n_ledger)
     t = np.array([row[0] for row in rows])
-    y, ydot, ledger = (np.array([row[1 + i] for row in rows]).reshape(len(rows), width) for i, width in enumerate(widths))
+    y, ydot, ledger = (
+        np.array([row[1 + i] for row in rows]).reshape(len(rows), width) for i, width in enumerate(widths)
+    )
     return t, y, ydot, ledger
 
 

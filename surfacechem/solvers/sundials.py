@@ -8,7 +8,7 @@ from sksundae.ida import IDA
 
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.reduced import Reduced
-from surfacechem.solvers.stepping import LEDGER_ATOL, Method, StepFailure, SteppingSolver, View
+from surfacechem.solvers.stepping import LEDGER_ATOL, Method, StepError, SteppingSolver, View
 
 
 class _Stretch(Method):
@@ -25,9 +25,9 @@ class _Stretch(Method):
         try:
             answer = action()
         except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, SystemError) as error:
-            raise StepFailure(str(error)) from error
+            raise StepError(str(error)) from error
         if not answer.success:
-            raise StepFailure(str(answer.message))
+            raise StepError(str(answer.message))
         return answer
 
     def advance(self) -> float:
@@ -45,7 +45,7 @@ class _Stretch(Method):
             return self.x
         answer = self._call(lambda: self.library.step(t, method="normal", tstop=self.end))
         if not abs(answer.t - t) <= 1e-12 * abs(t):
-            raise StepFailure(f"asked for t = {t}, given t = {answer.t}")
+            raise StepError(f"asked for t = {t}, given t = {answer.t}")
         return np.array(answer.y)
 
 
@@ -89,8 +89,12 @@ class IDASolver(SteppingSolver):
 
         atol = np.concatenate((view.problem.atol, np.full(program.n_ledger, LEDGER_ATOL)))
         library = IDA(
-            residual, rtol=view.problem.rtol, atol=atol, jacfn=jacobian, max_num_steps=100_000,
+            residual,
+            rtol=view.problem.rtol,
+            atol=atol,
+            jacfn=jacobian,
+            max_num_steps=100_000,
             algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
-        )  # fmt: skip
+        )
         start = np.concatenate((y, ledger))
         return _Stretch(library, t, end, start, np.concatenate((ydot, view.ledger_rates(t, y, ydot))))

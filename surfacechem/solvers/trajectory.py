@@ -7,10 +7,37 @@ from surfacechem.solvers.contract import Status
 from surfacechem.solvers.dense import interpolate
 from surfacechem.solvers.locate import find_event, start_margins
 from surfacechem.solvers.native import (
-    ATOL, BASE, FRESH, H_FACTORED, LOOSE, M_NOW, M_SLOPE, Q, Q_TRIAL, RTOL, TAU, TRIAL, TRIAL_DOT, Y, YDOT, allocate, compiled,
-    copy, keep_alive, reference,
-)  # fmt: skip
-from surfacechem.solvers.radau_advance import GOOD, INVALID, accept, advance, finish_step, keep_matrices, restart, store_polynomial
+    ATOL,
+    BASE,
+    FRESH,
+    H_FACTORED,
+    LOOSE,
+    M_NOW,
+    M_SLOPE,
+    Q_TRIAL,
+    RTOL,
+    TAU,
+    TRIAL,
+    TRIAL_DOT,
+    YDOT,
+    Q,
+    Y,
+    allocate,
+    compiled,
+    copy,
+    keep_alive,
+    reference,
+)
+from surfacechem.solvers.radau_advance import (
+    GOOD,
+    INVALID,
+    accept,
+    advance,
+    finish_step,
+    keep_matrices,
+    restart,
+    store_polynomial,
+)
 from surfacechem.solvers.radau_step import first_size, loosening
 
 FINISHED = int(Status.FINISHED)
@@ -94,9 +121,19 @@ def _next_try(h: float, remaining: float) -> float:
 
 @compiled
 def _run_segment(
-    w: Any, end: float, kinds: Any, fired: Any, slopes: Any, limits: Any, stop: Any, times: Any, outputs: Any, steps: Any, events: Any,
+    w: Any,
+    end: float,
+    kinds: Any,
+    fired: Any,
+    slopes: Any,
+    limits: Any,
+    stop: Any,
+    times: Any,
+    outputs: Any,
+    steps: Any,
+    events: Any,
     counts: Any,
-) -> int:  # fmt: skip
+) -> int:
     """Integrate to the end of a segment; GOOD, or the status that ends the run."""
     outcome = restart(w)
     if outcome != GOOD:
@@ -154,9 +191,21 @@ def _run_segment(
 
 @compiled
 def _run(
-    w: Any, y0: Any, parameters: Any, segments: Any, times: Any, kinds: Any, limits: Any, stop: Any, end: Any, counts: Any, counters: Any,
-    outputs: Any, steps: Any, events: Any,
-) -> None:  # fmt: skip
+    w: Any,
+    y0: Any,
+    parameters: Any,
+    segments: Any,
+    times: Any,
+    kinds: Any,
+    limits: Any,
+    stop: Any,
+    end: Any,
+    counts: Any,
+    counters: Any,
+    outputs: Any,
+    steps: Any,
+    events: Any,
+) -> None:
     n = w.algebraic.shape[0]
     n_margins = kinds.shape[0]
     fired = w.fired
@@ -174,7 +223,18 @@ def _run(
         w.clock[TAU] = 0.0
         copy(parameters[segment], w.inputs[1 + 2 * n :])
         status = _run_segment(
-            w, segments[segment + 1], kinds, fired, w.margin[M_SLOPE], limits, stop, times, outputs, steps, events, counts
+            w,
+            segments[segment + 1],
+            kinds,
+            fired,
+            w.margin[M_SLOPE],
+            limits,
+            stop,
+            times,
+            outputs,
+            steps,
+            events,
+            counts,
         )
         if status != GOOD:
             break
@@ -189,10 +249,28 @@ def _run(
 
 
 def run_batch(
-    first: int, last: int, code: Any, algebraic: Any, limits: Any, stop: Any, tolerances: Any, kinds: Any, y0: Any, parameters: Any,
-    segments: Any, times: Any, ends: Any, counts: Any, counters: Any, outputs: Any, steps: Any, events: Any,
-) -> None:  # fmt: skip
-    """Runs first to last - 1 of a batch; every run writes to its own rows, so the result does not depend on the threads."""
+    first: int,
+    last: int,
+    code: Any,
+    algebraic: Any,
+    limits: Any,
+    stop: Any,
+    tolerances: Any,
+    kinds: Any,
+    y0: Any,
+    parameters: Any,
+    segments: Any,
+    times: Any,
+    ends: Any,
+    counts: Any,
+    counters: Any,
+    outputs: Any,
+    steps: Any,
+    events: Any,
+) -> None:
+    """Runs first to last - 1 of a batch; every run writes to its own rows, so the result does not depend on the
+    threads.
+    """
     work = allocate(code, algebraic, parameters.shape[2], limits[1], kinds.shape[0])
     w = reference(work)
     w.clock[RTOL] = tolerances[0]
@@ -200,8 +278,21 @@ def run_batch(
     w.vector[ATOL] = tolerances[1:]
     for i in range(first, last):
         _run(
-            w, y0[i], parameters[i], segments, times, kinds, limits, stop, ends[i], counts[i], counters[i], outputs[i], steps[i], events[i]
-        )  # fmt: skip
+            w,
+            y0[i],
+            parameters[i],
+            segments,
+            times,
+            kinds,
+            limits,
+            stop,
+            ends[i],
+            counts[i],
+            counters[i],
+            outputs[i],
+            steps[i],
+            events[i],
+        )
     keep_alive(work)
 
 

@@ -1,0 +1,215 @@
+"""Time against achieved error of every solver, in one interleaved run, and the throughput of a sweep.
+
+    python benchmarks/steppers.py [output folder]
+
+P1 is exothermic bonding with 200 outputs (exact solution), P4 is Robertson's problem to 1e11 s. The solvers
+"scipy-LSODA" and "scikit-sundae-CVODE" are the libraries called directly with a Python right-hand side, as a user would
+write it today.
+"""
+
+import csv
+import statistics
+import sys
+import time
+import timeit
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from scipy.integrate import solve_ivp
+from sksundae.cvode import CVODE
+
+matplotlib.use("Agg")
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from matplotlib import pyplot as plt
+from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_dae
+
+from surfacechem.solvers import names, solver
+from surfacechem.solvers.contract import Problem, Result
+from surfacechem.solvers.radau import solve_many
+
+REPEATS = 5
+ROBERTSON_END = np.array([2.083340149701255e-08, 8.333360770334713e-14])
+Run = Callable[[], np.ndarray]
+
+
+@dataclass
+class Curve:
+    """One solver on one problem: a run for each tolerance and the error of its answer."""
+
+    case: str
+    name: str
+    rtol: float
+    run: Run
+    error: Callable[[np.ndarray], float]
+    seconds: list[float]
+    achieved: float = np.nan
+
+
+def finished(result: Result) -> Result:
+    """The result, its numbers void where the run failed."""
+    if not result.success:
+        result.y[:] = np.nan
+        result.outputs[:] = np.nan
+    return result
+
+
+def outputs_of(name: str, case: Problem) -> Run:
+    """Outputs of a solver of ours."""
+    method = solver(name)
+    return lambda: finished(method.solve(case)).outputs
+
+
+def end_of(name: str, case: Problem) -> Run:
+    """End state of a solver of ours."""
+    method = solver(name)
+    return lambda: finished(method.solve(case)).y
+
+
+def p1_error(outputs: np.ndarray) -> float:
+    """Largest relative error at the outputs."""
+    times = np.linspace(0.0, 2.5, 201)[1:]
+    return float(np.max(np.abs(outputs / exothermic_exact(times) - 1))) if len(outputs) == 200 else np.nan
+
+
+def p4_error(y: np.ndarray) -> float:
+    """Largest relative error of the two small concentrations at the end."""
+    return float(np.max(np.abs(y[:2] / ROBERTSON_END - 1)))
+
+
+def p1_rates(_t: float, y: np.ndarray) -> list[float]:
+    """P1 as an explicit system."""
+    c, k, t0, _, tau = PARAMETERS.tolist()
+    growth = (1 - y[1]) / tau
+    return [k * (1 - y[1]) * growth * t0 / (c * y[0]), growth]
+
+
+def p4_rates(_t: float, y: np.ndarray) -> list[float]:
+    """P4 as an explicit system."""
+    a, b, c = y.tolist()
+    slow, fast, last = 0.04 * a, 1e4 * b * c, 3e7 * b * b
+    return [fast - slow, slow - fast - last, last]
+
+
+def direct_lsoda(
+    rates: Callable, y0: list[float], end: float, times: np.ndarray | None, rtol: float, atol: float
+) -> np.ndarray:
+    """SciPy as a user calls it."""
+    answer = solve_ivp(rates, (0.0, end), y0, method="LSODA", t_eval=times, rtol=rtol, atol=atol).y.T
+    return answer if times is not None else answer[-1]
+
+
+def direct_cvode(
+    rates: Callable, y0: list[float], end: float, times: np.ndarray | None, rtol: float, atol: float
+) -> np.ndarray:
+    """scikit-sundae as a user calls it."""
+
+    def fill(t: float, y: np.ndarray, out: np.ndarray) -> None:
+        out[:] = rates(t, y)
+
+    span = np.concatenate(([0.0], times)) if times is not None else np.array([0.0, end])
+    answer = CVODE(fill, rtol=rtol, atol=atol, max_num_steps=100_000).solve(span, np.array(y0)).y
+    return answer[1:] if times is not None else answer[-1]
+
+
+def p1_curves(rtol: float) -> list[Curve]:
+    """Every solver on P1."""
+    times = np.linspace(0.0, 2.5, 201)[1:]
+    case = exothermic_problem(rtol)
+    curves = [Curve("P1", name, rtol, outputs_of(name, case), p1_error, []) for name in names]
+    for name, direct in (("scipy-LSODA", direct_lsoda), ("scikit-sundae-CVODE", direct_cvode)):
+        run = lambda d=direct: d(p1_rates, [300.0, 0.0], 2.5, times, rtol, 0.01 * rtol)  # noqa: E731
+        curves.append(Curve("P1", name, rtol, run, p1_error, []))
+    return curves
+
+
+def p4_curves(rtol: float) -> list[Curve]:
+    """Every solver on P4."""
+    case = problem(robertson_dae(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10)
+    curves = [Curve("P4", name, rtol, end_of(name, case), p4_error, []) for name in names]
+    for name, direct in (("scipy-LSODA", direct_lsoda), ("scikit-sundae-CVODE", direct_cvode)):
+        run = lambda d=direct: d(p4_rates, [1.0, 0.0, 0.0], 1e11, None, rtol, rtol * 1e-10)  # noqa: E731
+        curves.append(Curve("P4", name, rtol, run, p4_error, []))
+    return curves
+
+
+def calls(once: float) -> int:
+    """Repetitions that fill about a millisecond, so that short runs are timed as warm as long ones."""
+    return max(1, min(30, int(1e-3 / once)))
+
+
+def measure(curves: list[Curve]) -> None:
+    """Interleaved, so that a busy moment of the machine hits all alike; the first round warms up."""
+    for repeat in range(REPEATS + 1):
+        for curve in curves:
+            start = time.perf_counter()
+            answer = curve.run()
+            once = time.perf_counter() - start
+            if repeat:
+                curve.seconds.append(timeit.timeit(curve.run, number=calls(once)) / calls(once))
+                curve.achieved = curve.error(answer)
+
+
+def sweep(rtol: float, threads: int = 2, runs: int = 10_000) -> tuple[float, float]:
+    """Trajectories a second on randomised P1 and the largest relative error at the end."""
+    rng = np.random.default_rng(0)
+    parameters = PARAMETERS * rng.uniform(0.5, 1.5, (runs, 1, 5))
+    y0 = np.stack([parameters[:, 0, 2], np.zeros(runs)], axis=1)
+    rates = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        batch = solve_many(
+            exothermic(), y0, parameters, [0.0, 2.5], rtol, np.array([300.0, 1.0]) * rtol, threads=threads
+        )
+        rates.append(runs / (time.perf_counter() - start))
+    exact = np.array([exothermic_exact(2.5, p) for p in parameters[:, 0]])
+    return statistics.median(rates), float(np.max(np.abs(batch.y / exact - 1)))
+
+
+def report(curves: list[Curve], folder: Path) -> None:
+    """Table in the terminal and as CSV."""
+    with (folder / "steppers.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["case", "solver", "rtol", "error", "microseconds"])
+        for curve in curves:
+            micro = 1e6 * statistics.median(curve.seconds)
+            rows.writerow([curve.case, curve.name, curve.rtol, curve.achieved, micro])
+            print(
+                f"{curve.case}  {curve.name:20s} rtol {curve.rtol:7.0e}  error {curve.achieved:9.1e}  {micro:12.1f} us"
+            )
+
+
+def plot(curves: list[Curve], folder: Path) -> None:
+    """Time against achieved error."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 5))
+    for axis, case in zip(axes, ("P1", "P4"), strict=True):
+        for name in dict.fromkeys(curve.name for curve in curves):
+            mine = [
+                curve for curve in curves if (curve.case, curve.name) == (case, name) and np.isfinite(curve.achieved)
+            ]
+            axis.loglog([c.achieved for c in mine], [statistics.median(c.seconds) for c in mine], "o-", label=name)
+        axis.set(title=case, xlabel="achieved relative error", ylabel="time [s]")
+        axis.invert_xaxis()
+    axes[0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(folder / "steppers.png", dpi=150)
+
+
+def main() -> None:
+    """Run everything."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    curves = [curve for rtol in (1e-4, 1e-6, 1e-8, 1e-10) for curve in p1_curves(rtol)]
+    curves += [curve for rtol in (1e-4, 1e-6, 1e-8) for curve in p4_curves(rtol)]
+    measure(curves)
+    report(curves, folder)
+    plot(curves, folder)
+    for rtol in (1e-3, 1e-4, 1e-5, 1e-6):
+        rate, error = sweep(rtol)
+        print(f"sweep of P1, 2 threads, rtol {rtol:7.0e}: {rate:9.0f} trajectories/s, largest error {error:.1e}")
+
+
+if __name__ == "__main__":
+    main()
