@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.mechanism.rates import kinds
 
 PHASE = frozenset(
     [
@@ -184,8 +185,9 @@ def check(source: Source, phase: Any) -> None:
         _keys(source, phase["state"], STATE, "state")
     for entry in source.species(phase):
         _check_species(source, entry)
+    species = frozenset(str(entry.get("name")) for entry in source.species(phase))
     for entry in source.reactions(phase):
-        _check_reaction(source, entry)
+        _check_reaction(source, entry, species)
 
 
 def _check_file(source: Source) -> None:
@@ -211,15 +213,28 @@ def _check_species(source: Source, entry: Any) -> None:
     _keys(source, thermo, THERMO[model], f"{title}: thermo")
 
 
-def _check_reaction(source: Source, entry: Any) -> None:
+def _check_reaction(source: Source, entry: Any, species: frozenset[str]) -> None:
     title = f"reaction {entry.get('equation')}"
     _keys(source, entry, REACTION, title)
+    _check_type(source, entry, title)
     if not isinstance(entry.get("rate-constant"), Mapping):
         raise InputError(f"{title} has no `rate-constant: {{A, b, Ea}}`.", source.place(entry))
     _keys(source, entry["rate-constant"], RATE_CONSTANT, f"{title}: rate-constant")
     for name, terms in (entry.get("coverage-dependencies") or {}).items():
+        if name not in species:
+            message = f"{title}: coverage-dependencies: no species '{name}'.{suggestion(str(name), species)}"
+            raise InputError(message, source.place(entry["coverage-dependencies"], name))
         if isinstance(terms, Mapping):
             _keys(source, terms, COVERAGE, f"{title}: coverage-dependencies: {name}")
+
+
+def _check_type(source: Source, entry: Any, title: str) -> None:
+    """Cantera writes a type with or without its prefix; a plain rate needs none."""
+    kind = str(entry.get("type", "Arrhenius"))
+    known = kinds()
+    if kind not in known and f"interface-{kind}" not in known and kind != "elementary":
+        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, known)}"
+        raise InputError(message, source.place(entry, "type"))
 
 
 def _keys(source: Source, node: Any, known: Sequence[str] | frozenset[str], title: str) -> None:

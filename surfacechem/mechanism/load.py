@@ -121,10 +121,11 @@ def _cantera(source: Source, phase: str) -> Any:
 
 
 def _translated(text: str, source: Source) -> InputError:
-    lines = [line.strip() for line in text.splitlines()]
+    """Cantera's message without its frame, at the line it names."""
     found = re.search(r"[Ee]rror on line (\d+)", text)
-    noise = re.compile(r"^(\*+|\||>|\^|$)|thrown by|[Ee]rror on line|^Line \d+")
-    message = next((line for line in lines if not noise.search(line)), "the mechanism cannot be read")
+    noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on line")
+    lines = [line.strip() for line in text.splitlines()]
+    message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
     return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
 
 
@@ -200,7 +201,7 @@ def _reaction(reaction: Any, number: str, place: Place, species: tuple[Species, 
         raise InputError(message, place)
     variables = {item.name: item.variable for item in species}
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
-    _check_reaction(reaction, forward, variables, place)
+    _check_reaction(reaction, forward, place)
     law = known[kind]
     return law(
         number=number,
@@ -215,17 +216,13 @@ def _reaction(reaction: Any, number: str, place: Place, species: tuple[Species, 
     )
 
 
-def _check_reaction(reaction: Any, orders: Mapping[str, float], variables: Mapping[str, str], place: Place) -> None:
+def _check_reaction(reaction: Any, orders: Mapping[str, float], place: Place) -> None:
     if any(order < 0 for order in orders.values()):
         message = f"reaction {reaction.equation}: a negative order is infinite where the coverage vanishes; remove it."
         raise InputError(message, place)
     if reaction.rate.uses_electrochemistry:
         message = f"reaction {reaction.equation}: charge transfer is not lowered; give the species no net charge."
         raise InputError(message, place)
-    for name in reaction.rate.coverage_dependencies:
-        if name not in variables:
-            message = f"reaction {reaction.equation}: coverage-dependencies: no species '{name}'."
-            raise InputError(message + suggestion(name, variables), place)
 
 
 def _change(reaction: Any, variables: Mapping[str, str]) -> dict[str, float]:

@@ -1,0 +1,139 @@
+"""What a mechanism file may not hold is refused with file, line and a way out; Cantera would ignore most of it."""
+
+import re
+
+import pytest
+
+from surfacechem.data import mechanisms
+from surfacechem.errors import InputError, Place
+from surfacechem.mechanism import load_mechanism
+
+TEXT = (mechanisms() / "dna-film.yaml").read_text(encoding="utf-8")
+
+# What to replace in the file by what, the line of the error ("+n" after the replaced one) and its words.
+REFUSED = {
+    "a key of the phase": ("site-density: 1.0e-4", "site-densty: 1.0e-4", "Did you mean 'site-density'?"),
+    "a key of the rate": ("b: 0, Ea: 0", "b: 0, E: 0", "unknown key 'E'"),
+    "a key of the species": ("  sites: 2", "  site: 2", "Did you mean 'sites'?"),
+    "a key of the thermo": ("s0: -515", "S: -515", "unknown key 'S'"),
+    "a key of the state": ("state: {T: 298.15 K, cov", "state: {T: 298.15 K, Cov", "Did you mean 'coverages'?"),
+    "a key of the reaction": ("  rate-constant:", "  rate-constants:", "Did you mean 'rate-constant'?"),
+    "a key of the file": ("units: {length: m", "unit: {length: m", "Did you mean 'units'?"),
+    "a thermo model": ("model: constant-cp, T0: 298.15 K, h0: -", "model: constant_cp, T0: 298.15 K, h0: -", "Did you"),
+    "an unknown thermo model": (
+        "{model: constant-cp, T0: 298.15 K, h0: -",
+        "{model: Mu0, h0: -",
+        "'Mu0' is not lowered",
+    ),
+    "a phase model": ("thermo: ideal-surface", "thermo: edge", "'edge' is not lowered: a contact line"),
+    "coverage-dependent thermo": (
+        "thermo: ideal-surface",
+        "thermo: coverage-dependent-surface",
+        "need not follow from one free energy",
+    ),
+    "neighbours": (
+        "  reactions: all",
+        "  reactions: all\n  adjacent-phases: [gas]",
+        "'adjacent-phases' cannot be used",
+    ),
+    "coverage dependence of a species": ("  sites: 2", "  sites: 2\n  coverage-dependencies: {}", "activation energy"),
+    "sticking": ("  rate-constant:", "  sticking-coefficient:", "needs a gas"),
+    "charge transfer": (
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}\n  beta: 0.5",
+        "charge",
+    ),
+    "Blowers-Masel": (
+        "  rate-constant: {A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "  type: Blowers-Masel\n  rate-constant: {A: 1e8 m^2/mol/s, b: 0, Ea0: 0, w: 1e9}",
+        "rate type 'Blowers-Masel' is not lowered",
+    ),
+    "a dependence on nothing": (
+        "  rate-constant:",
+        "  coverage-dependencies: {C(s): {a: 0, m: 0, E: 1}}\n  rate-constant:",
+        "no species 'C(s)'",
+    ),
+    "a negative order": (
+        TEXT[TEXT.index("- equation") :],
+        (
+            "- equation: A(s) + B(s) => AB(s)\n  orders: {A(s): -1, B(s): 1}\n  negative-orders: true\n"
+            "  rate-constant: {A: 1.0 mol/m^2/s, b: 0, Ea: 0}\n"
+        ),
+        "negative order",
+    ),
+    "a missing site density": ("  site-density: 1.0e-4 mol/m^2\n", "", "no `site-density`"),
+    "another file": ("  species: [A(s), B(s), AB(s)]", "  species: [{gri30.yaml/species: [H2]}]", "one file"),
+    "broken YAML": ("units: {length: m,", "units: {length: m", "expected"),
+    "a unit of the wrong kind": ("1.0e-4 mol/m^2", "1.0e-4 mol/m^3", "Cantera: "),
+    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "Cantera: "),
+    "lost sites": ("  sites: 2\n", "", "Cantera: "),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_refused(what, tmp_path):
+    old, new, words = REFUSED[what]
+    assert TEXT.count(old) >= 1
+    file = tmp_path / "film.yaml"
+    file.write_text(TEXT.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_mechanism(file)
+    changed = TEXT[: TEXT.index(old)].count("\n") + 1
+    place = caught.value.place
+    assert place.file == str(file)
+    assert abs(place.line - changed) <= 6, f"{caught.value} is not near line {changed}"
+    assert "*" not in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"phase": "flim"}, "Did you mean 'film'? Known: film."),
+        ({"bonds": ["AB(g)"]}, "bonds: no species 'AB(g)' in the mechanism. Did you mean 'AB(s)'?"),
+    ],
+)
+def test_errors_of_the_case_stand_in_the_case(arguments, message):
+    place = Place("cases/x.yaml", 7, "interface.mechanism")
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        load_mechanism(mechanisms() / "dna-film.yaml", place=place, **arguments)
+    assert str(caught.value).startswith("cases/x.yaml:7: interface.mechanism: ")
+
+
+def test_a_missing_file_names_what_there_is(tmp_path):
+    with pytest.raises(InputError, match=r"no mechanism file .*\. Did you mean 'selectin.yaml'\?"):
+        load_mechanism(tmp_path / "selectins.yaml")
+
+
+def test_the_mechanisms_of_the_package_are_found_by_name():
+    assert load_mechanism("selectin.yaml").phase == "contact"
+
+
+@pytest.mark.parametrize(
+    ("coverages", "message"),
+    [
+        ({"A(s)": 0.5, "AB(g)": 0.5}, "coverages: no species 'AB(g)'. Did you mean 'AB(s)'?"),
+        ({"A(s)": 0.5, "B(s)": 0.4}, "coverages sum to 0.9, not to 1."),
+    ],
+)
+def test_coverages_are_checked(coverages, message):
+    mechanism = load_mechanism(mechanisms() / "dna-film.yaml")
+    with pytest.raises(InputError, match=re.escape(message)):
+        mechanism.coverages(coverages)
+
+
+def test_several_phases_must_be_named(tmp_path):
+    phase = TEXT[TEXT.index("- name: film") : TEXT.index("\nspecies:\n")]
+    file = tmp_path / "two.yaml"
+    file.write_text(TEXT.replace(phase, phase + phase.replace("name: film", "name: brush")), encoding="utf-8")
+    with pytest.raises(InputError, match=r"several phases, name one.* Known: brush, film\."):
+        load_mechanism(file)
+    assert load_mechanism(file, "brush").phase == "brush"
+
+
+def test_reactions_of_other_species_are_left_out(tmp_path):
+    extra = "- equation: A(s) + E(s) <=> AE(s)\n  rate-constant: {A: 1 m^2/mol/s, b: 0, Ea: 0}\n"
+    text = TEXT.replace("reactions: all", "reactions: declared-species")
+    file = tmp_path / "declared.yaml"
+    file.write_text(text.replace("reactions:\n- eq", f"reactions:\n{extra}- eq"), encoding="utf-8")
+    (law,) = load_mechanism(file).reactions
+    assert file.read_text(encoding="utf-8").splitlines()[law.place.line - 1].endswith(law.equation)
