@@ -387,7 +387,7 @@ class Build:
 
     def _share(self, heat: Expression) -> None:
         for body, share in zip(self.scene.bodies, self.shares(), strict=True):
-            self.node_of[body.name].heat += share * heat
+            self.node_of[body.name].inflow.append(share * heat)
             self.from_interface[body.name] += share * heat
 
     def _heat_path(self, law: HeatTransfer) -> None:
@@ -401,8 +401,8 @@ class Build:
         quantity = Quantity(self.label_path(law), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
         difference = nodes[0].T - nodes[1].T
         flux = self.name(quantity, area * h * difference)
-        nodes[0].heat -= flux
-        nodes[1].heat += flux
+        nodes[0].inflow.append(-flux)
+        nodes[1].inflow.append(flux)
         production = area * h * difference**2 / (nodes[0].T * nodes[1].T)
         self._production(quantity.name, f"heat flow from {a} to {b}", production)
         for end, sign in ((a, -1), (b, 1)):
@@ -434,7 +434,7 @@ class Build:
         Q = self.variables.get(name, "the energy balance")
         text = f"external heat into {member}"
         if member in self.node_of:
-            self.node_of[member].heat += Q
+            self.node_of[member].inflow.append(Q)
             self._supply(f"H_{name[2:]}", text, Q, self.node_of[member].T)
         else:
             self._supply(f"H_{name[2:]}", text, Q, self.variables.get("T_c", "External heat"))
@@ -487,7 +487,7 @@ class Build:
 
     def _give_power(self, power: Expression) -> None:
         if "interface" in self.node_of:
-            self.node_of["interface"].power += power
+            self.node_of["interface"].inflow.append(power)
 
     def _dissipation(self) -> None:
         for label, power in self.dissipation.items():

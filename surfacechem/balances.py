@@ -26,15 +26,15 @@ from surfacechem.expressions import Expression, depends, derivative
 
 @dataclass
 class Node:
-    """A temperature node: free energy, heat and power that flow in. Rates are per reference area [W/m^2]."""
+    """A temperature node: free energies of its members and what flows in, per reference area [W/m^2]."""
 
     name: str
     T: Expression
     T_dot: Expression
     energies: dict[str, Expression] = field(default_factory=dict)
     """Free energies of the members, by member name: a body's name or 'interface'."""
-    heat: Expression = 0
-    power: Expression = 0
+    inflow: list[Expression] = field(default_factory=list)
+    """Heat and mechanical power that flow in; a list, so that a flux between two nodes cancels from their sum."""
     prescribed: bool = False
 
     @property
@@ -105,9 +105,9 @@ def site_balance(rate: Expression, variable_dot: Expression, density: Expression
 
 
 def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]) -> Expression:
-    """Energy balance of one node as a residual: dU/dt - power - heat."""
+    """Energy balance of one node as a residual: dU/dt minus what flows in."""
     rate = energy_rate(node.free_energy, node.T, node.T_dot, rates, about)
-    return rate - node.power - node.heat
+    return symengine.Add(rate, *(-flow for flow in node.inflow))
 
 
 def energy_rows(
@@ -116,5 +116,5 @@ def energy_rows(
     """One energy balance per free node; that of ``centre`` is the sum over all of them."""
     rows = {node.name: node_row(node, rates, about) for node in nodes}
     if centre is not None:
-        rows[centre.name] = sum(rows.values(), symengine.Integer(0))
+        rows[centre.name] = symengine.Add(*rows.values())
     return rows

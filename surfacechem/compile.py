@@ -15,6 +15,8 @@ import numpy as np
 import symengine
 from numpy.typing import ArrayLike, NDArray
 
+from surfacechem.expressions import derivative
+
 
 @dataclass(frozen=True)
 class Function:
@@ -91,7 +93,7 @@ def compile_program(
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
-    by_state, by_rate = ([symengine.diff(g, x) for g in residual for x in over] for over in (states, derivatives))
+    by_state, by_rate = ([derivative(g, x) for g in residual for x in over] for over in (states, derivatives))
     n = len(states)
     return Program(
         n=n,

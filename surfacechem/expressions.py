@@ -35,7 +35,7 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
 
     >>> import symengine
     >>> x, T = symengine.symbols("x T")
-    >>> derivative(derivative(T * log(x), T), T)
+    >>> derivative(derivative(T * log_fraction(x), T), T)
     0
     """
     import symengine
@@ -91,17 +91,22 @@ def expm1(x: Expression) -> Expression:
     return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
 
 
-LOGARITHM_FLOOR = 1e-300
-"""Arguments of a logarithm below this count as this, as Cantera does for vanished species."""
-
-
 def log(x: Expression) -> Expression:
-    """Natural logarithm, finite at zero."""
+    """Natural logarithm of a positive number."""
+    return _engine(x).log(x)
+
+
+FRACTION_FLOOR = 1e-300
+"""Fractions below this count as this in a logarithm, as Cantera does for vanished species."""
+
+
+def log_fraction(x: Expression) -> Expression:
+    """Natural logarithm of a fraction, finite at zero."""
     if not is_symbolic(x):
-        return math.log(max(x, LOGARITHM_FLOOR))
+        return math.log(max(x, FRACTION_FLOOR))
     import symengine
 
-    return where(x > LOGARITHM_FLOOR, symengine.log(x), math.log(LOGARITHM_FLOOR))
+    return where(x > FRACTION_FLOOR, symengine.log(x), math.log(FRACTION_FLOOR))
 
 
 def sqrt(x: Expression) -> Expression:

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from surfacechem.expressions import Expression, log
+from surfacechem.expressions import Expression, log_fraction
 from surfacechem.mechanism.thermo import StandardGibbs
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import Potential, option
@@ -76,6 +76,6 @@ class IdealMixture(Potential):
         total: Expression = 0
         for species in self.species:
             theta = values[species.variable]
-            mixing = BOLTZMANN * T * (log(theta) - 1)
+            mixing = BOLTZMANN * T * (log_fraction(theta) - 1)
             total += values[species.amount] * theta * (species.standard(T) + mixing)
         return total
