@@ -12,13 +12,13 @@ import surfacechem.data
 
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
-    "words": ["quantities", "expressions", "units", "errors", "data"],
+    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
     "contracts": ["terms", "scene"],
     "core": ["balances", "variables", "system", "assembly", "compile"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
     "studies": ["references.*", "sweep", "precision", "stability", "plots"],
-    "doors": ["case", "reactor", "cli", "__init__", "__main__"],
+    "doors": ["case.*", "schema", "reactor", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*"]

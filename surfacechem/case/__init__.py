@@ -1,0 +1,133 @@
+"""Case files: a YAML document becomes a scene, a run and, optionally, an exact solution to compare with.
+
+>>> case = load("endothermic", ["run.until=2 s"])
+>>> case.run.t_end, [body.name for body in case.scene.bodies]
+(2.0, ['lower', 'upper'])
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from surfacechem import data, document, overrides
+from surfacechem.assembly import assemble
+from surfacechem.case.fields import mapping, text
+from surfacechem.case.run import Reference, Run, read_reference, read_run
+from surfacechem.case.scene import SceneReader, Source
+from surfacechem.document import Tree
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.scene import Scene
+from surfacechem.system import System
+
+__all__ = ["TOP_KEYS", "Case", "Reference", "Run", "load", "load_text", "names"]
+
+TOP_KEYS = (
+    *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
+    *("loading", "initial", "run", "reference"),
+)
+
+Overrides = Sequence[str] | Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case as read; ``text`` (with ``mechanism_text``) is all that is needed to read it again."""
+
+    name: str
+    title: str
+    source: str
+    description: str
+    scene: Scene
+    run: Run
+    reference: Reference | None
+    text: str
+    mechanism_text: str | None
+    places: Mapping[str, Place]
+    file: str
+
+    def system(self) -> System:
+        """The assembled scene; errors have their place in the case file."""
+        try:
+            return assemble(self.scene)
+        except InputError as error:
+            raise self.located(error) from None
+
+    def located(self, error: InputError) -> InputError:
+        """The error at the place that it speaks of, at least with the file."""
+        if error.place is not None:
+            return error
+        section = re.match(r"(initial) (\w+) =|(initial|loading|heat|interface)\b", error.message)
+        path = ".".join(part for part in section.groups() if part) if section else ""
+        return error.at(self.places.get(path, Place(self.file)))
+
+
+def load(name: str | Path, overrides: Overrides = ()) -> Case:
+    """Read a case from a file, or one of the shipped ones by its name.
+
+    ``overrides`` are texts "path=value" or a mapping from path to value, put into the document before it is read.
+    """
+    path, shown = _find(str(name))
+    return load_text(document.read(path, shown), path.stem, path.parent, overrides=overrides, file=shown)
+
+
+def load_text(
+    text: str,
+    name: str = "case",
+    base: str | Path = ".",
+    mechanism_text: str | None = None,
+    overrides: Overrides = (),
+    file: str = "",
+) -> Case:
+    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given."""
+    tree = document.parse(text, file or f"{name}.yaml")
+    if overrides:
+        tree = _overridden(tree, overrides)
+        text = document.dump(tree)
+    return _read(tree, text, name, Source({}, str(base), mechanism_text))
+
+
+def names() -> list[str]:
+    """Names of the cases that come with surfacechem."""
+    return sorted(path.stem for path in data.cases().glob("*.yaml"))
+
+
+def _find(name: str) -> tuple[Path, str]:
+    """The file of a case, and how messages call it."""
+    path = Path(name)
+    if path.is_file():
+        return path, name
+    if name in names():
+        return data.cases() / f"{name}.yaml", f"cases/{name}.yaml"
+    if "\0" not in name and path.exists():
+        return path, name
+    raise InputError(f"no file and no case '{name}'.{suggestion(path.stem, names())}")
+
+
+def _overridden(tree: Tree, values: Overrides) -> Tree:
+    return overrides.apply(tree, values)
+
+
+def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
+    top = mapping(tree, TOP_KEYS)
+    for key, example in (("bodies", "bodies: {lower: {...}, upper: {...}}"), ("run", "run: {until: 5 s}")):
+        if key not in top:
+            raise tree.error(f"the case needs `{key}`, for example `{example}`.")
+    places = dict(tree.places())
+    reader = SceneReader(Source(top, source.base, source.mechanism_text), places)
+    titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
+    return Case(
+        name=name,
+        title=titles.get("title", name),
+        source=titles.get("source", ""),
+        description=titles.get("description", ""),
+        scene=reader.scene(),
+        run=read_run(top["run"]),
+        reference=read_reference(top["reference"]) if "reference" in top else None,
+        text=content,
+        mechanism_text=reader.mechanism.text if reader.mechanism else None,
+        places=places,
+        file=tree.place.file,
+    )

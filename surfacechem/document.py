@@ -1,0 +1,278 @@
+"""A YAML document as a tree in which every value knows its place: file, line and dotted path.
+
+Documents are data from outside: size, depth and number of nodes are limited, tags and repeated keys are refused, and
+nothing is evaluated. In a list of laws an item's path is its name, ``interface.friction.coulomb``, and
+``interface.friction.coulomb[2]`` for the second of that name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from io import StringIO
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+from surfacechem.errors import InputError, Place
+
+LARGEST = 1_000_000
+"""Bytes of a document."""
+
+DEEPEST = 24
+"""Mappings and lists inside each other."""
+
+MOST = 50_000
+"""Values of a document, with what its aliases repeat."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
+_INTEGER = re.compile(r"[-+]?[0-9]{1,15}")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NOT_FINITE = {".inf": "inf", "+.inf": "inf", "-.inf": "-inf", ".nan": "nan"}
+_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A value and its place: a scalar, a list of trees or a mapping of trees."""
+
+    value: Any
+    place: Place
+
+    def plain(self) -> Any:
+        """The value without places."""
+        if isinstance(self.value, dict):
+            return {key: tree.plain() for key, tree in self.value.items()}
+        if isinstance(self.value, list):
+            return [tree.plain() for tree in self.value]
+        return self.value
+
+    def error(self, message: str) -> InputError:
+        """An input error at this place."""
+        return InputError(message, self.place)
+
+    def places(self) -> Iterator[tuple[str, Place]]:
+        """The place of every path below and including this one."""
+        yield self.place.path, self.place
+        children = self.value.values() if isinstance(self.value, dict) else self.value
+        for child in children if isinstance(self.value, dict | list) else ():
+            yield from child.places()
+
+
+def read(path: Path, name: str = "") -> str:
+    """The text of a file; ``name`` stands for it in messages."""
+    place = Place(name or str(path))
+    try:
+        if not path.is_file():
+            kind = "a folder" if path.is_dir() else "no file" if not path.exists() else "no ordinary file"
+            raise InputError(f"this is {kind}; a YAML file is needed.", place)
+        with path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}.", place) from None
+    if len(data) > LARGEST:
+        raise InputError(f"larger than {LARGEST} bytes.", place)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("no text in UTF-8.", place) from None
+
+
+def parse(text: str, file: str = "") -> Tree:
+    """The tree of a YAML document.
+
+    >>> parse("bodies: {lower: {C: 1e3}}").plain()
+    {'bodies': {'lower': {'C': 1000.0}}}
+    """
+    if len(text) > LARGEST:
+        raise InputError(f"larger than {LARGEST} bytes.", Place(file))
+    return with_paths(_Builder(text, file).document())
+
+
+def dump(tree: Tree) -> str:
+    """The tree as YAML text."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.allow_unicode = True
+    yaml.width = 120
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    stream = StringIO()
+    yaml.dump(tree.plain(), stream)
+    return stream.getvalue()
+
+
+def scalar(text: str) -> Any:
+    """The value of an unquoted scalar by the core schema of YAML 1.2.
+
+    >>> scalar("1e18"), scalar("no"), scalar("3 m")
+    (1e+18, 'no', '3 m')
+    """
+    low = text.lower()
+    if low in _WORDS:
+        return _WORDS[low]
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    return float(_NOT_FINITE[low]) if low in _NOT_FINITE else text
+
+
+class _Builder:
+    """Builds a tree from the events of the parser, so that limits hold before anything is expanded."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.file = file
+        self.events = self._events(text)
+        self.anchors: dict[str, Tree] = {}
+        self.sizes: dict[str, int] = {}
+        self.count = 0
+
+    def _events(self, text: str) -> Iterator[Any]:
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import MarkedYAMLError
+        from ruamel.yaml.reader import ReaderError
+
+        try:
+            yield from YAML(typ="safe", pure=True).parse(StringIO(text))
+        except ReaderError as error:
+            line = text.count("\n", 0, error.position) + 1
+            raise InputError("a control character, which YAML does not allow.", Place(self.file, line)) from None
+        except MarkedYAMLError as error:
+            raise self._syntax(error) from None
+        except Exception as error:  # only the parser runs in here, and it also fails by assertions
+            raise InputError(f"not YAML: {_one_line(str(error))}.", Place(self.file)) from None
+
+    def _syntax(self, error: Any) -> InputError:
+        mark = error.problem_mark or error.context_mark
+        message = _one_line(", ".join(part for part in (error.context, error.problem) if part))
+        return InputError(f"not YAML: {message}.", Place(self.file, mark.line + 1 if mark else 0))
+
+    def document(self) -> Tree:
+        """The only document of the text."""
+        import ruamel.yaml.events as kinds
+
+        next(self.events)
+        if isinstance(next(self.events), kinds.StreamEndEvent):
+            raise InputError("the file is empty.", Place(self.file))
+        tree = self._value(next(self.events), 0)
+        next(self.events)
+        extra = next(self.events)
+        if not isinstance(extra, kinds.StreamEndEvent):
+            raise InputError("more than one document.", self._place(extra))
+        return tree
+
+    def _place(self, event: Any) -> Place:
+        return Place(self.file, event.start_mark.line + 1)
+
+    def _value(self, event: Any, depth: int) -> Tree:
+        place = self._place(event)
+        self._limits(event, depth, place)
+        match type(event).__name__:
+            case "AliasEvent":
+                return self._alias(event, place)
+            case "ScalarEvent":
+                tree = Tree(scalar(event.value) if event.implicit[0] else event.value, place)
+            case "SequenceStartEvent":
+                tree = Tree(list(self._items(depth)), place)
+            case _:
+                tree = Tree(self._mapping(depth), place)
+        return tree
+
+    def _limits(self, event: Any, depth: int, place: Place) -> None:
+        self.count += 1
+        if self.count > MOST:
+            raise InputError(f"more than {MOST} values.", place)
+        if depth > DEEPEST:
+            raise InputError(f"nested deeper than {DEEPEST} levels.", place)
+        if getattr(event, "tag", None) is not None:
+            raise InputError(f"a tag ({event.tag}), which is not allowed.", place)
+
+    def _items(self, depth: int) -> Iterator[Tree]:
+        while type(event := next(self.events)).__name__ != "SequenceEndEvent":
+            yield self._anchored(event, depth + 1)
+
+    def _mapping(self, depth: int) -> dict[str, Tree]:
+        result: dict[str, Tree] = {}
+        while type(event := next(self.events)).__name__ != "MappingEndEvent":
+            place = self._place(event)
+            if type(event).__name__ != "ScalarEvent":
+                raise InputError("a key must be a name.", place)
+            if event.value in result:
+                first = result[event.value].place.line
+                raise InputError(f"the key '{event.value}' is given twice, first in line {first}.", place)
+            result[event.value] = replace(self._anchored(next(self.events), depth + 1), place=place)
+        return result
+
+    def _anchored(self, event: Any, depth: int) -> Tree:
+        before = self.count
+        tree = self._value(event, depth)
+        if type(event).__name__ != "AliasEvent" and event.anchor is not None:
+            self.anchors[event.anchor] = tree
+            self.sizes[event.anchor] = self.count - before
+        return tree
+
+    def _alias(self, event: Any, place: Place) -> Tree:
+        if event.anchor not in self.anchors:
+            raise InputError(f"the alias *{event.anchor} has no anchor before it.", place)
+        self.count += self.sizes[event.anchor]
+        if self.count > MOST:
+            raise InputError(f"aliases repeat more than {MOST} values.", place)
+        return replace(self.anchors[event.anchor], place=place)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split()).rstrip(".")
+
+
+def labels(items: Iterable[Tree]) -> list[str | None]:
+    """What each item of a list is called in paths: the name of a law, numbered if it is not the first; else None."""
+    seen: dict[str, int] = {}
+    result: list[str | None] = []
+    for item in items:
+        name = item.value
+        if isinstance(name, dict):
+            name = next(iter(name)) if len(name) == 1 else None
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+            result.append(None)
+            continue
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if seen[name] == 1 else f"{name}[{seen[name]}]")
+    return result
+
+
+def with_paths(tree: Tree, path: str = "") -> Tree:
+    """The tree with the path of every value."""
+    place = replace(tree.place, path=path)
+    if isinstance(tree.value, dict):
+        return Tree({key: with_paths(child, join(path, key)) for key, child in tree.value.items()}, place)
+    if isinstance(tree.value, list):
+        pairs = enumerate(zip(tree.value, labels(tree.value), strict=True), start=1)
+        return Tree([_with_label(item, path, label or f"[{i}]") for i, (item, label) in pairs], place)
+    return Tree(tree.value, place)
+
+
+def _with_label(item: Tree, path: str, label: str) -> Tree:
+    own = join(path, label)
+    if isinstance(item.value, dict) and len(item.value) == 1:
+        ((name, inner),) = item.value.items()
+        return Tree({name: with_paths(inner, own)}, replace(item.place, path=own))
+    return with_paths(item, own)
+
+
+def join(path: str, key: str) -> str:
+    """The path of a key below a path."""
+    return path + key if key.startswith("[") or not path else f"{path}.{key}"
+
+
+def from_plain(value: object, place: Place) -> Tree:
+    """A tree of plain Python data, all at one place."""
+    if isinstance(value, Mapping):
+        return Tree({str(key): from_plain(item, place) for key, item in value.items()}, place)
+    if isinstance(value, list | tuple):
+        return Tree([from_plain(item, place) for item in value], place)
+    if isinstance(value, Real) and not isinstance(value, bool):  # NumPy's numbers too
+        return Tree(int(value) if isinstance(value, Integral) else float(value), place)
+    return Tree(value, place)

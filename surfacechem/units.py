@@ -1,0 +1,209 @@
+"""Quantities with units: ``"10 pN"`` to SI, with the dimension checked.
+
+A number is in SI units already; a text is "value unit". Pint does the conversion and is imported when the first unit is
+met.
+
+>>> parse("1 kJ/m^2/K", "J/(m^2 K)")
+1000.0
+>>> parse("25 degC", "K")
+298.15
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import lru_cache
+from typing import Any
+
+from surfacechem.errors import InputError, Place, suggestion
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)", re.DOTALL)
+_NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan)", re.IGNORECASE)
+
+_EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
+_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
+"""Powers of powers, such as 9^9^9, which would never end."""
+
+_LONGEST = 100
+"""Characters of a quantity; longer texts are no quantities."""
+
+WORDS = {
+    "a pure number": "1",
+    "an angle": "rad",
+    "a length": "m",
+    "an area": "m^2",
+    "a volume": "m^3",
+    "a time": "s",
+    "a rate": "1/s",
+    "a velocity": "m/s",
+    "an acceleration": "m/s^2",
+    "a mass": "kg",
+    "a force": "N",
+    "a pressure": "Pa",
+    "a pressure rate": "Pa/s",
+    "a stiffness per area": "Pa/m",
+    "a viscosity": "Pa s",
+    "a temperature": "K",
+    "a temperature rate": "K/s",
+    "an inverse temperature": "1/K",
+    "an energy": "J",
+    "a power": "W",
+    "an energy per area": "J/m^2",
+    "a molar energy": "J/mol",
+    "a heat flux": "W/m^2",
+    "a heat capacity": "J/K",
+    "a heat capacity per area": "J/(m^2 K)",
+    "a thermal conductance": "W/(m^2 K)",
+    "a thermal conductivity": "W/(m K)",
+    "a number per area": "1/m^2",
+    "a molar amount per area": "mol/m^2",
+    "a rate per area": "1/(m^2 s)",
+    "a rate constant per energy": "1/(J s)",
+    "a rate constant per energy and area": "1/(J s m^2)",
+    "an inverse length": "1/m",
+    "an amount of substance": "mol",
+    "an electric charge": "coulomb",
+    "a capacitance": "farad",
+}
+"""Dimensions in words, for messages, each with a unit that has it."""
+
+_HINT = ' Write it like "J/(m^2 K)" or "1/um^2".'
+
+COMMON = (
+    *("K", "degC", "degF", "m", "mm", "um", "nm", "pm", "s", "ms", "us", "ns", "min", "h", "day", "kg", "g", "percent"),
+    *("N", "mN", "uN", "nN", "pN", "Pa", "kPa", "MPa", "GPa", "bar", "J", "kJ", "MJ", "mJ", "uJ", "eV", "meV", "kcal"),
+    *("W", "kW", "MW", "mW", "mol", "kmol", "rad", "deg", "Hz", "kHz", "meter", "second", "kelvin", "joule", "watt"),
+)
+"""Units for the guess after a misspelt one."""
+
+
+def parse(
+    value: object, unit: str, place: Place | None = None, name: str = "the value", *, difference: bool = False
+) -> float:
+    """The value in SI; InputError unless it is a finite number, or a text with a number and a unit that fits ``unit``.
+
+    ``name`` is what needs the value, for the message. ``difference`` marks an interval, for which a temperature scale
+    with an offset has no meaning.
+
+    >>> parse("3 nm/s", "m", name="g_n")
+    Traceback (most recent call last):
+        ...
+    surfacechem.errors.InputError: 3 nm/s is a velocity; g_n needs a length [m].
+    """
+    try:
+        number = _number(value, unit, name, difference)
+    except InputError as error:
+        raise (error.at(place) if place else error) from None
+    if not math.isfinite(number):
+        raise InputError(f"{name} must be finite, got {_short(str(value)[:60])}.", place)
+    return number
+
+
+def _number(value: object, unit: str, name: str, difference: bool) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return _as_float(value)
+    if not isinstance(value, str):
+        raise InputError(f"{name} needs {needed(unit)}, got {_kind(value)}.")
+    text = value.strip()
+    if _NOT_FINITE.fullmatch(text):
+        raise InputError(f"{name} must be finite, got {text}.")
+    found = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    if found is None:
+        raise InputError(f"{_short(text)} is not a number with a unit; {name} needs {needed(unit)}.")
+    return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
+
+
+def _as_float(value: float | Decimal) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _kind(value: object) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return {"dict": "a mapping", "list": "a list"}.get(type(value).__name__, f"a {type(value).__name__}")
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _converted(number: str, given: str, unit: str, name: str, difference: bool) -> float:
+    registry, target, shown = _registry(), _unit(unit), f"{number} {given}"
+    if given in ("C", "F") and target.is_compatible_with("K"):
+        kelvin = float(registry.Quantity(Decimal(number), f"deg{given}").m_as("K"))
+        raise InputError(f'{shown} is {_described(_unit(given))}; write "{number} deg{given}" or {kelvin:.10g} K.')
+    try:
+        source = _per_particle(_unit(given), target)
+        if difference and source in (registry.degC, registry.degF):
+            raise InputError(f"{shown} is a temperature, {name} a difference of temperatures; give it in K.")
+        if not source.is_compatible_with(target):
+            raise InputError(f"{shown} is {_described(source)}; {name} needs {needed(unit)}.")
+        return _as_float(registry.Quantity(Decimal(number), source).m_as(target))
+    except ArithmeticError:
+        raise InputError(f"{shown} is too large or too small to convert to {unit}.") from None
+
+
+def _per_particle(source: Any, target: Any) -> Any:
+    """The same unit per mole where it is meant per particle, and the other way round: eV for J/mol, kJ/mol for J."""
+    registry = _registry()
+    if target.is_compatible_with("J/mol") and source.is_compatible_with("J") and "electron_volt" in str(source):
+        return source / registry.particle
+    if target.is_compatible_with("J") and source.is_compatible_with("J/mol"):
+        return source * registry.particle
+    return source
+
+
+@lru_cache(maxsize=1024)
+def _unit(text: str) -> Any:
+    """Pint's unit of a text; InputError where it has none."""
+    import pint
+
+    bare = _EXPONENT.sub("", text)
+    numbers = re.findall(r"(?<!\w)[\d.]+", bare)
+    if _TOWER.search(text) or any(number != "1" for number in numbers):
+        raise InputError(f"{_short(text)} is not a unit.{_HINT}")
+    try:
+        return _registry().parse_units(f"1{text}" if text.startswith("/") else text)
+    except pint.UndefinedUnitError as error:
+        names: Any = error.unit_names
+        unknown = names if isinstance(names, str) else names[0]
+        guess = suggestion(unknown, COMMON).partition(" Known")[0]
+        raise InputError(f"no unit '{unknown}'.{guess or _HINT}") from None
+    except Exception:  # its parser is Python's tokenizer, which fails in many ways
+        raise InputError(f"{_short(text)} is not a unit.{_HINT}") from None
+
+
+def needed(unit: str) -> str:
+    """What a unit measures, in words: ``a length [m]``."""
+    exact = next((words for words, known in WORDS.items() if known == unit), None)
+    return f"{exact or _described(_unit(unit))} [{unit}]" if unit != "1" else "a pure number"
+
+
+def _described(unit: Any) -> str:
+    """The dimension of a unit in words, else the unit in SI."""
+    words = _words().get(unit.dimensionality)
+    return words or f"a quantity in {_registry().Quantity(1, unit).to_base_units().units:~}"
+
+
+@lru_cache(maxsize=1)
+def _words() -> dict[Any, str]:
+    return {_unit(unit).dimensionality: words for words, unit in reversed(WORDS.items())}
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    """Pint's registry, from a file in the user's cache folder if possible; in decimals, so that 1/um^2 is 1e12."""
+    import pint
+
+    try:
+        return pint.UnitRegistry(cache_folder=":auto:", non_int_type=Decimal)
+    except Exception:  # the folder may be read-only, the file half written by another process
+        return pint.UnitRegistry(non_int_type=Decimal)
