@@ -77,7 +77,7 @@ def _check_complete(kind: type[Law], given: Mapping[str, Tree], tree: Tree) -> N
 
 
 def _default(kind: type[Law], name: str) -> Any:
-    return next(item.default for item in dataclasses.fields(kind) if item.name == name)  # type: ignore[arg-type]
+    return next(item.default for item in dataclasses.fields(kind) if item.name == name)
 
 
 def _resolved(spec: Spec, x: str) -> Spec:
