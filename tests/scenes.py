@@ -9,7 +9,7 @@ from surfacechem.laws.heat import Conductance
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.scene import Body, Interface, Scene, Sites
-from surfacechem.terms import Varying
+from surfacechem.terms import Varying, parameter  # noqa: F401 - scenes may define laws
 
 SITES = Sites(1e18, 1e18)
 

@@ -1,0 +1,168 @@
+"""Dangerous regimes end as theory says they do: refused, stopped with the true reason, or solved."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import scenes
+import tables
+from scenes import SITES, bodies, path, varying
+
+from surfacechem.assembly import assemble
+from surfacechem.errors import InputError
+from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.contact import InterfaceCapacity
+from surfacechem.laws.factors import Exponential
+from surfacechem.laws.friction import Coulomb, Viscous
+from surfacechem.laws.kinetics import LinearAffinity, Relaxation
+from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.scene import Body, Interface, Scene, Sites
+
+
+def run(scene: Scene, end: float, outputs: int = 11, **settings) -> Trajectory:
+    return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, end, outputs), **settings))
+
+
+def capacity_scene(regime: str, C_c: float, K_2: float, phi: float) -> Scene:
+    potentials = ([BondEnergy(K_2=K_2)] if K_2 else []) + ([InterfaceCapacity(C_c=C_c)] if C_c else [])
+    reactions = [Relaxation(tau=1.0)] if K_2 else []
+    if regime == "perfect":
+        return scenes.perfect_contact(potentials, reactions, phi)
+    heat = [path("interface", "lower", 100.0), path("interface", "upper", 100.0)]
+    initial = (
+        {"T_1": 300.0, "T_2": 300.0} | ({"T_c": 300.0} if potentials else {}) | ({"phi": phi} if reactions else {})
+    )
+    return Scene(
+        bodies(C_1=1.0, C_2=1.0), Interface("T_c", potentials, (), reactions, SITES), heat, {}, None, 300.0, initial
+    )
+
+
+def capacity_rows():
+    data = json.loads((tables.FOLDER / "x02_capacity_validity.json").read_text())
+    return [pytest.param(*row[1:2], *map(float, row[2:5]), row[6], id=row[0]) for row in data["rows"]]
+
+
+@pytest.mark.parametrize(("regime", "C_c", "K_2", "phi", "verdict"), capacity_rows())
+def test_a_capacity_must_be_positive(regime, C_c, K_2, phi, verdict):
+    scene = capacity_scene(regime, C_c, K_2, phi)
+    if verdict.startswith("accept"):
+        trajectory = run(scene, 1.0)
+        assert trajectory.status == "finished"
+        assert any(state.algebraic for state in trajectory.model.system.states) == ("algebraic" in verdict)
+    else:
+        with pytest.raises(InputError, match=r"at the start the heat capacity at T(_c)? was lost"):
+            run(scene, 1.0)
+
+
+@pytest.mark.parametrize(("energy", "end"), [(Quadratic, 300.0), (Constant, 600.0)])
+def test_cooling_stops_where_the_temperature_reaches_zero(energy, end):
+    loading = {"Q_1": Hold(level=-30.0), "Q_2": Hold(level=-20.0)}
+    scene = scenes.perfect_contact([], C_1=50.0, C_2=50.0, energy=energy, loading=loading)
+    trajectory = run(scene, 1000.0, 101)
+    assert trajectory.status == "stopped"
+    assert "the temperature T reached zero" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(end, rel=1e-9)
+    t = trajectory.result.times
+    warm = t < 0.999 * end
+    exact = 300 * (np.sqrt(1 - t / 300) if energy is Quadratic else 1 - t / 600)[warm]
+    assert end - t[-1] <= 10.0
+    assert np.max(np.abs(trajectory.result.outputs[warm, 0] / exact - 1)) < 1e-8
+
+
+def semenov(D: float, ramp: bool = False) -> Scene:
+    """Film friction that grows exponentially with the temperature of a medium without capacity."""
+    H, beta, T_0, gap, v = 50.0, 0.05, 300.0, 1e-6, 0.1
+    eta = varying(D * gap / v**2, Exponential(beta=-beta))
+    speed = Ramp(rate=v) if ramp else Hold(level=v)
+    pair = Body("lower", Hold(level=T_0)), Body("upper", Hold(level=T_0))
+    heat = [path("interface", "lower", H / 2), path("interface", "upper", H / 2)]
+    return Scene(pair, Interface("T_c", [], [Viscous(eta=eta)]), heat, {"v": speed, "g_n": Hold(level=gap)}, None, T_0)
+
+
+def test_algebraic_temperature_before_the_fold():
+    columns = tables.read("e_semenov_fold")[1]
+    critical = 50.0 / (math.e * 0.05)
+    for part, T in zip(columns["D0_over_Dcrit"], columns["Tc_lower"], strict=True):
+        if part < 0.9999:
+            trajectory = run(semenov(part * critical), 1.0, 2)
+            assert trajectory.status == "finished"
+            assert trajectory.result.y[0] == pytest.approx(T, rel=1e-9)
+
+
+def test_ignition_beyond_the_fold_is_reported():
+    trajectory = run(semenov(1.01 * 50.0 / (math.e * 0.05)), 1.0, 2)
+    assert trajectory.status == "stopped"
+    assert "ignition: no temperature T_c balances the heat" in trajectory.reason
+
+
+def test_ignition_is_located_where_the_load_passes_the_fold():
+    """The dissipation grows as v^2 = (v t)^2, so the fold is passed at sqrt(D_crit / D_0)."""
+    factor = 4.0
+    trajectory = run(semenov(factor * 50.0 / (math.e * 0.05), ramp=True), 1.0, 21)
+    assert trajectory.status == "stopped"
+    assert "ignition" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(factor**-0.5, rel=1e-6)
+
+
+def test_a_capacity_that_vanishes_on_the_way_ends_the_run():
+    """Bonds that break, pushed by a prescribed phi, take more capacity than the bodies have: K_2 (1 - phi)^2 / T_0."""
+    scene = scenes.perfect_contact([BondEnergy(K_2=1200.0)], loading={"phi": Ramp(start=0.9, rate=-0.1)})
+    trajectory = run(scene, 9.0)
+    lost = 1 - math.sqrt(0.5)
+    assert trajectory.status == "stopped"
+    assert "the heat capacity at T was lost" in trajectory.reason
+    assert trajectory.result.t == pytest.approx((0.9 - lost) / 0.1, rel=1e-3)
+
+
+def test_bonding_ends_at_the_sites_of_the_poorer_side():
+    sites = Sites(1e18, 4e17, 1)
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+    interface = Interface(Hold(level=300.0), [BondEnergy(K_0=1.0)], (), [Relaxation(tau=1.0)], sites)
+    trajectory = run(Scene(pair, interface, initial={"phi": 0.0}, T_0=300.0), 10.0)
+    assert "phi rose above its bound 0.4" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(-math.log(0.6), rel=1e-7)
+
+
+def test_the_choice_of_the_reference_side_changes_phi_but_not_the_bonds():
+    def bonds(reference: int) -> float:
+        sites = Sites(1e18, 2e18, reference)
+        pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+        scale = sites.density / 1e18  # the same energy as a function of the number of bonds
+        potential = BondEnergy(K_0=2.0 * scale**2, phi_eq=0.3 / scale)
+        interface = Interface(Hold(level=300.0), [potential], (), [LinearAffinity(c_r=1e17 / scale)], sites)
+        return run(Scene(pair, interface, initial={"phi": 0.0}, T_0=300.0), 1.0).result.y[0] * sites.density
+
+    assert bonds(2) == pytest.approx(bonds(1), rel=1e-9)
+
+
+@pytest.mark.parametrize("phi", [-0.1, 1.1])
+def test_phi_outside_its_range_is_refused(phi):
+    with pytest.raises(InputError, match=r"initial phi = .* is outside its range: 0 to 1"):
+        run(scenes.perfect_contact([BondEnergy(K_0=1.0)], [Relaxation(tau=1.0)], phi), 1.0)
+
+
+@pytest.mark.parametrize("T", [0.0, -1.0])
+def test_temperature_must_be_absolute(T):
+    with pytest.raises(InputError, match="is not an absolute temperature above zero"):
+        run(scenes.perfect_contact([], T=T), 1.0)
+
+
+def test_a_film_that_closes_stops_the_run_where_the_gap_is_zero():
+    loading = {"v": Hold(level=0.1), "g_n": Ramp(start=1e-6, rate=-1e-7)}
+    trajectory = run(
+        scenes.perfect_contact([], C_1=5.0, C_2=5.0, frictions=[Viscous(eta=0.1)], loading=loading), 20.0, 41
+    )
+    assert trajectory.status == "stopped"
+    assert "g_n reached zero" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
+
+
+def test_a_negative_pressure_is_seen_in_the_audit():
+    from surfacechem.audit import audit
+
+    loading = {"v": Hold(level=0.1), "p": Hold(level=-1e3)}
+    trajectory = run(scenes.perfect_contact([], frictions=[Coulomb(mu=0.3)], loading=loading), 0.1)
+    assert audit(trajectory).violations == ("coulomb",)
