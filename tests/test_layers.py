@@ -17,8 +17,8 @@ FLOORS = {
     "core": ["balances", "variables", "system", "assembly", "compile"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
-    "studies": ["references.*", "sweep", "precision", "stability", "plots"],
-    "doors": ["case.*", "schema", "reactor", "cli", "__init__", "__main__"],
+    "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
+    "doors": ["case.*", "schema", "reactor", "rerun", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*"]

@@ -1,0 +1,301 @@
+"""The command line. Every command imports what it needs when it is called."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+from typer.core import TyperGroup
+
+from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
+
+if TYPE_CHECKING:
+    from surfacechem.integrate import Run
+    from surfacechem.simulation import Simulation
+    from surfacechem.solution import Solution
+
+R = TypeVar("R")
+
+STATUS = {"finished": 0, "stopped": 3, "failed": 4}
+"""Exit code of each way in which a run ends."""
+
+BAD_INPUT, DIFFERENT, INTERRUPTED = 2, 1, 130
+
+EXIT_CODES = """\b
+Exit codes:
+  0    finished
+  1    rerun: the new values are not bit for bit those of the file
+  2    bad input; nothing was computed
+  3    the run was stopped by physics; what it reached is written, with the reason
+  4    the run failed numerically; what it reached is written
+  130  interrupted; nothing was written
+"""
+
+
+class Commands(TyperGroup):
+    """Commands whose errors are one message on stderr and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(ctx)
+        except SurfacechemError as error:
+            typer.echo(f"surfacechem: {error}", err=True)
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt:
+            typer.echo("surfacechem: interrupted; nothing was written.", err=True)
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)  # compiled code may still be running in another thread, which would be waited for
+
+
+app = typer.Typer(
+    cls=Commands,
+    help="Contact interfaces that bond, slide, break and heat.",
+    epilog=EXIT_CODES,
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
+]
+SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
+Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"surfacechem {version('surfacechem')}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Contact interfaces that bond, slide, break and heat."""
+
+
+@app.command(epilog=EXIT_CODES)
+def run(
+    case: CaseName,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>.nc if not given.")
+    ] = None,
+    changes: Changes = None,
+    solver: SolverName = None,
+    rtol: Tolerance = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a case, write its dataset and print a summary."""
+    from surfacechem.simulation import load
+    from surfacechem.solution import replacing
+
+    simulation = load(case, changes or ())
+    settings = _settings(simulation, solver, rtol)
+    target = output or Path(f"{simulation.case.name}.nc")
+    with replacing(target) as temporary:  # refuses a place that cannot be written before anything is computed
+        solution = _solved(simulation, settings, quiet)
+        solution.write(temporary)
+    _conclude(solution, target, quiet)
+
+
+def _settings(simulation: Simulation, solver: str | None, rtol: float | None) -> Run:
+    """The case's settings with those of the command line."""
+    from surfacechem.solvers import names
+
+    if solver is not None and solver not in names:
+        raise InputError(f"no solver '{solver}'.{suggestion(solver, names)}", Place(path="--solver"))
+    if rtol is not None and not 0 < rtol <= 0.1:
+        raise InputError(f"{rtol:g} is outside its range: > 0 and <= 0.1.", Place(path="--rtol"))
+    given = {name: value for name, value in (("solver", solver), ("rtol", rtol)) if value is not None}
+    return replace(simulation.case.run, **given)  # type: ignore[arg-type]
+
+
+def _solved(simulation: Simulation, settings: Run, quiet: bool) -> Solution:
+    """The solution, its dataset's columns and audit included, so that what follows only writes."""
+    from surfacechem.solvers import stepper
+
+    if not (quiet or stepper.is_compiled()):
+        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
+
+    def work() -> Solution:
+        stepper.compile_stepper()  # apart from the run, so that the run's time is its own
+        return simulation.run(run=settings)
+
+    return interruptible(work)
+
+
+def interruptible(work: Callable[[], R]) -> R:
+    """Do the work in another thread, so that an interrupt is answered while compiled code runs."""
+    done: list[R] = []
+    failed: list[BaseException] = []
+
+    def task() -> None:
+        try:
+            done.append(work())
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=task, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(0.5)
+    if failed:
+        raise failed[0]
+    return done[0]
+
+
+def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
+    from surfacechem.report import run_summary
+
+    code = STATUS[solution.status]
+    if not quiet:
+        typer.echo(run_summary(solution, written))
+    elif code:
+        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+    if code:
+        raise typer.Exit(code)
+
+
+@app.command(epilog=EXIT_CODES)
+def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rtol: Tolerance = None) -> None:
+    """Say a case back in words, without running it."""
+    from surfacechem.check import groups, warnings
+    from surfacechem.report import check_summary
+    from surfacechem.simulation import load
+
+    simulation = load(case, changes or ())
+    settings = _settings(simulation, solver, rtol)
+    system, scene, model = simulation.system, simulation.case.scene, simulation.model
+    values = model.values()
+    try:
+        model.problem(settings, values)
+    except InputError as error:
+        raise simulation.case.located(error) from None
+    numbers = groups(model, scene, values, settings.times[-1])
+    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, warnings(system, scene)))
+
+
+@app.command()
+def equations(
+    case: CaseName,
+    form: Annotated[str, typer.Option("--format", help="python (runs) or latex.")] = "python",
+    changes: Changes = None,
+) -> None:
+    """Print the equations of a case, as Python that runs or as LaTeX."""
+    if form not in ("python", "latex"):
+        raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex'))}", Place(path="--format"))
+    from surfacechem import case as cases
+    from surfacechem import printing
+
+    read = cases.load(case, changes or ())
+    typer.echo(getattr(printing, form)(read.system(), read.title), nl=False)
+
+
+@app.command()
+def laws(name: Annotated[str | None, typer.Argument(help="Show all about this law.")] = None) -> None:
+    """List the laws, or show one."""
+    from surfacechem.listing import law_page, law_table
+
+    typer.echo(law_page(name) if name else law_table())
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files."""
+    import json
+
+    from surfacechem.schema import schema as document
+
+    typer.echo(json.dumps(document(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+def cases() -> None:
+    """List the cases that come with the package."""
+    from surfacechem.listing import case_table
+
+    typer.echo(case_table())
+
+
+@app.command(epilog=EXIT_CODES)
+def plot(
+    source: Annotated[str, typer.Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help=".png, .svg or .pdf; <name>.png if not given.")
+    ] = None,
+    variables: Annotated[
+        str | None, typer.Option("--variables", help="Variables to plot, with commas between.")
+    ] = None,
+    changes: Changes = None,
+) -> None:
+    """Plot a dataset or a case over time."""
+    is_file = source.endswith((".nc", ".nc4", ".cdf"))
+    target = output or Path(f"{Path(source).stem}.png")
+    kind = target.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    if is_file and changes:
+        raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
+    from surfacechem import plots
+    from surfacechem.solution import replacing
+
+    with replacing(target) as temporary:
+        solution = None if is_file else _solved_case(source, changes)
+        chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
+        plots.save(plots.figure(solution.dataset if solution else Path(source), chosen), temporary, kind)
+    typer.echo(str(target))
+    if solution and STATUS[solution.status]:
+        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+        raise typer.Exit(STATUS[solution.status])
+
+
+def _solved_case(name: str, changes: list[str] | None) -> Solution:
+    from surfacechem.simulation import load
+
+    simulation = load(name, changes or ())
+    return _solved(simulation, simulation.case.run, quiet=False)
+
+
+@app.command(epilog=EXIT_CODES)
+def rerun(
+    file: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the new dataset here.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a dataset from itself and compare bit for bit."""
+    from contextlib import nullcontext
+
+    from surfacechem import rerun as again
+    from surfacechem.solution import replacing
+
+    record = again.read(file)
+    simulation, settings = again.simulation(record)
+    with replacing(output) if output else nullcontext() as temporary:
+        solution = _solved(simulation, settings, quiet)
+        if temporary:
+            solution.write(temporary)
+    different = again.differences(record, solution)
+    if different:
+        typer.echo(f"surfacechem: {file}: {len(different)} variables differ: {', '.join(different)}", err=True)
+        raise typer.Exit(DIFFERENT)
+    if not quiet:
+        typer.echo(f"{file}: all {len(record.variables)} variables are bit for bit the same")
+        if output:
+            typer.echo(f"written to {output}")

@@ -1,0 +1,293 @@
+"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one.
+
+Only Matplotlib's object-oriented interface is used: nothing here opens windows or changes global settings.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError, Place, suggestion
+
+Array = NDArray[np.float64]
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
+"""The palette of Okabe and Ito, which colour-blind readers can tell apart."""
+
+STYLE: Any = {
+    "axes.grid": True,
+    "axes.linewidth": 0.7,
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "font.size": 9.0,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.6,
+    "mathtext.fontset": "dejavusans",
+    "svg.hashsalt": "surfacechem",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+}
+DECADES = 1e3
+"""Times that span more than this go on a logarithmic axis, unless they are evenly spaced."""
+
+FLAT = 1e-9
+"""A curve that changes by less than this part of its size is constant."""
+
+LEAST = 1e-18
+"""Residuals below this are drawn as this."""
+
+GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
+
+
+class Plot(Figure):
+    """A figure that notebooks show by themselves."""
+
+    def _repr_png_(self) -> bytes:
+        from io import BytesIO
+
+        buffer = BytesIO()
+        save(self, buffer, "png")
+        return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves that share an axis."""
+
+    title: str
+    unit: str
+    names: tuple[str, ...]
+
+
+KINDS: tuple[tuple[str, str, str], ...] = (
+    ("Temperature", "K", r"(?!.*_exact$).*"),
+    ("Bonding", "1", r"(?!formed_|.*_residual$|.*_exact$|J_c$|n_c$).*"),
+    ("Gap", "m", r"g_\w+"),
+    ("Velocity", "m s-1", r"\w+"),
+    ("Traction", "Pa", r"(?!.*_exact$|.*_nominal$).*"),
+    ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_exact$|.*_nominal$)\w+"),
+    ("Dissipation", "W m-2", r"D_\w+"),
+)
+"""Panels of the default figure: title, unit and pattern of the names."""
+
+RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
+"""Residuals and the attributes that hold their largest relative values."""
+
+
+def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None) -> Figure:
+    """A figure of a run, from its dataset or its netCDF file; ``variables`` instead of the usual choice."""
+    dataset = _opened(data)
+    panels = _chosen(dataset, variables) if variables else _usual(dataset)
+    balances = not variables and any(name in dataset for name in RESIDUALS)
+    rows = len(panels) + balances
+    if rows == 0 or dataset.sizes.get("time", 0) == 0:
+        raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
+    with matplotlib.rc_context(STYLE):
+        plot = Plot(figsize=(6.4, 0.9 + 1.55 * rows), layout="constrained")
+        FigureCanvasAgg(plot)
+        axes = plot.subplots(rows, 1, sharex=True, squeeze=False)[:, 0].tolist()
+        for ax, panel in zip(axes, panels, strict=False):
+            _draw(ax, dataset, panel)
+        if balances:
+            _draw_balances(axes[-1], dataset)
+        _time_axis(axes, dataset)
+        _headings(plot, axes[0], dataset)
+    return plot
+
+
+def save(plot: Figure, target: Any, kind: str) -> None:
+    """Write a figure as png, svg or pdf; the same figure gives the same bytes."""
+    metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    with matplotlib.rc_context(STYLE):
+        plot.savefig(target, format=kind, dpi=160, metadata=metadata)
+
+
+def _opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+    if isinstance(data, xarray.Dataset):
+        return data
+    try:
+        with xarray.open_dataset(data, engine="netcdf4") as file:
+            return file.load()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(data))) from error
+
+
+def _curves(dataset: xarray.Dataset) -> list[str]:
+    """Variables that are functions of time alone."""
+    return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("time",)]
+
+
+def _unit(dataset: xarray.Dataset, name: str) -> str:
+    return str(dataset[name].attrs.get("units", "1"))
+
+
+def _usual(dataset: xarray.Dataset) -> list[Panel]:
+    panels = []
+    for title, unit, pattern in KINDS:
+        names = [n for n in _curves(dataset) if _unit(dataset, n) == unit and re.fullmatch(pattern, n)]
+        if title == "Heat flux" and {"q_1", "q_2"} & set(names):
+            names = [n for n in names if n in ("q_1", "q_2")]
+        if any(_varies(dataset[n].values) for n in names):
+            panels.append(Panel(title, unit, tuple(names)))
+    return panels
+
+
+def _varies(values: Array) -> bool:
+    """Whether a curve is more than a constant with rounding."""
+    finite = values[np.isfinite(values)]
+    return len(finite) == 1 or bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))
+
+
+def _chosen(dataset: xarray.Dataset, variables: Sequence[str]) -> list[Panel]:
+    known = _curves(dataset)
+    for name in variables:
+        if name not in known:
+            raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
+    units = dict.fromkeys(_unit(dataset, name) for name in variables)
+    groups = {unit: tuple(n for n in dict.fromkeys(variables) if _unit(dataset, n) == unit) for unit in units}
+    return [Panel(_title(dataset, names), unit, names) for unit, names in groups.items()]
+
+
+def _title(dataset: xarray.Dataset, names: Sequence[str]) -> str:
+    if len(names) > 1:
+        return ""
+    text = str(dataset[names[0]].attrs.get("long_name", names[0])).split(":")[0]
+    return text[:1].upper() + text[1:] if len(text) < 26 else ""
+
+
+def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> None:
+    t = dataset["time"].values
+    for names in merged(dataset, panel.names):
+        ax.plot(t, dataset[names[0]].values, label=" = ".join(map(symbol, names)), marker="o" if len(t) == 1 else "")
+    exact = [name for name in panel.names if f"{name}_exact" in dataset]
+    for j, name in enumerate(exact):
+        values = dataset[f"{name}_exact"].values
+        ax.plot(t, values, "--", color="black", linewidth=0.9, label="exact" if j == 0 else "_")
+    unit = unit_text(panel.unit)
+    ax.set_ylabel(f"{panel.title} [{unit}]" if panel.title else f"[{unit}]")
+    ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
+    _margins(ax, dataset, panel.names)
+    _legend(ax)
+
+
+def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
+    """The names in groups whose curves coincide, so that none hides another."""
+    groups: list[list[str]] = []
+    for name in names:
+        values = dataset[name].values
+        twin = next((g for g in groups if np.allclose(dataset[g[0]].values, values, rtol=1e-9, atol=0.0)), None)
+        if twin is not None:
+            twin.append(name)
+        else:
+            groups.append([name])
+    return groups
+
+
+def _margins(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
+    """A curve that is constant up to rounding is drawn as a line, not as noise blown up to the panel's height."""
+    values = np.concatenate([dataset[name].values for name in names])
+    values = values[np.isfinite(values)]
+    if len(values) and not _varies(values):
+        middle = float(values.mean())
+        ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
+
+
+def _legend(ax: Axes) -> None:
+    _, labels = ax.get_legend_handles_labels()
+    if labels:
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
+
+
+def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
+    t = dataset["time"].values
+    for name, attribute in RESIDUALS.items():
+        if name not in dataset:
+            continue
+        relative = np.abs(dataset[name].values)
+        worst = float(np.max(relative, initial=0.0))
+        if worst > 0:
+            relative = relative / worst * float(dataset.attrs.get(attribute, worst))
+        ax.plot(t, np.maximum(relative, LEAST), label=name.partition("_")[0], linewidth=1.2)
+    ax.set_yscale("log")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, LEAST), max(high, 1e-12))
+    ax.set_ylabel("Balance residual [1]")
+    _legend(ax)
+
+
+def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    times = dataset["time"].values
+    axes[-1].set_xlabel("Time [s]")
+    if logarithmic(times):
+        for ax in axes:
+            ax.set_xscale("log")
+            ax.set_xlim(times[times > 0][0], times[-1])
+    for moment in np.unique(dataset["event_time"].values) if "event_time" in dataset else ():
+        for ax in axes:
+            ax.axvline(moment, color="black", linewidth=0.7, linestyle=":")
+
+
+def logarithmic(times: Array) -> bool:
+    """Whether the times want a logarithmic axis: they span decades and most of them are not in the last one.
+
+    >>> logarithmic(np.logspace(-6, 2, 50)), logarithmic(np.linspace(0, 5, 100_001))
+    (True, False)
+    """
+    after = times[times > 0]
+    if len(after) < 2 or after[-1] / after[0] <= DECADES:
+        return False
+    return bool(np.mean(after > 0.1 * after[-1]) < 0.6)
+
+
+def _headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+    attributes = dataset.attrs
+    plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
+    facts = [str(attributes.get("reason", ""))]
+    if "error" in attributes:
+        source = "exact solution" if any(str(n).endswith("_exact") for n in dataset) else "estimate"
+        facts.append(f"error {attributes['error']:.1e} ({source})")
+    if "solver" in attributes:
+        facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
+    ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
+
+
+def symbol(name: str) -> str:
+    r"""A variable's name in mathematics.
+
+    >>> symbol("T_1"), symbol("phi"), symbol("D_coulomb"), symbol("R_linear_affinity")
+    ('$T_{1}$', '$\\phi$', '$D_{\\mathrm{coulomb}}$', '$R_{\\mathrm{linear\\ affinity}}$')
+    """
+    head, _, subscript = name.partition("_")
+    base = f"\\{head}" if head in GREEK else (head if len(head) == 1 else rf"\mathrm{{{head}}}")
+    if not subscript:
+        return f"${base}$"
+    words = subscript.replace("_", r"\ ")
+    inside = words if len(words) <= 2 else r"\mathrm{" + words + "}"
+    return f"${base}_{{{inside}}}$"
+
+
+def unit_text(unit: str) -> str:
+    """A CF unit with its powers raised.
+
+    >>> unit_text("W m-2 K-1")
+    'W m$^{-2}$ K$^{-1}$'
+    """
+    return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit)

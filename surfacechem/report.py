@@ -1,0 +1,154 @@
+"""What the command line prints about a run and about a scene: plain text, one fact a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from surfacechem.audit import Audit
+    from surfacechem.check import Group
+    from surfacechem.integrate import Run
+    from surfacechem.scene import Scene
+    from surfacechem.solution import Solution
+    from surfacechem.system import System
+
+REGIMES = {
+    "perfect contact": "both bodies and the interface share one temperature; the heat fluxes follow from the balances.",
+    "one-sided perfect contact": "the interface shares the temperature of one body; heat passes to the other by laws.",
+    "separate interface temperature": "the interface has its own temperature; heat passes to the bodies by laws.",
+    "no medium": "the bodies touch directly; interface heat goes into them in fixed shares.",
+    "perfect contact without a medium": "the bodies share one temperature and there is no medium between them.",
+}
+
+
+def labelled(label: str, text: str) -> str:
+    """A fact under its label."""
+    return f"  {label:<10} {text}"
+
+
+def columns(rows: Iterable[Sequence[str]]) -> list[str]:
+    """Rows as text in columns."""
+    table = [list(row) for row in rows]
+    widths = [max(len(cell) for cell in column) for column in zip(*table, strict=True)]
+    return ["  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
+
+
+def duration(seconds: float) -> str:
+    """A time with a unit that fits.
+
+    >>> duration(0.00123), duration(75.0)
+    ('1.23 ms', '75 s')
+    """
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.1g} s"
+
+
+def states(system: System) -> str:
+    """The states by name; algebraic ones say so."""
+    names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in system.states]
+    return ", ".join(names) or "nothing: everything is prescribed"
+
+
+def run_summary(solution: Solution, written: Path | None) -> str:
+    """What was solved, how it ended, how accurate and how fast it was, and where it is."""
+    trajectory = solution.trajectory
+    system, counters = trajectory.model.system, trajectory.result.counters
+    work = f"{counters.steps} steps, {counters.rejected} rejected, {counters.residuals} residuals"
+    lines = [
+        solution.title or "untitled",
+        labelled("solved", f"{states(system)}; {system.regime}; {_method(trajectory.run)}"),
+        labelled(solution.status, solution.reason),
+        *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
+        labelled("time", f"{_time(solution)}; {work}"),
+        labelled("balances", _balances(solution.audit)),
+        *([labelled("written", str(written))] if written else []),
+    ]
+    return "\n".join(lines)
+
+
+def _method(run: Run) -> str:
+    return f"{run.solver} at rtol {run.rtol:g}"
+
+
+def _time(solution: Solution) -> str:
+    trajectory = solution.trajectory
+    return f"run {duration(trajectory.seconds)}, compile {duration(trajectory.model.compile_seconds)}"
+
+
+def _accuracy(solution: Solution) -> str:
+    accuracy = solution.accuracy
+    assert accuracy is not None
+    worst = max(accuracy.variables, key=lambda name: accuracy.variables[name], default="")
+    where = f" in {worst}" if worst else ""
+    return f"{accuracy.error:.2g}{where} ({accuracy.source})"
+
+
+def _balances(books: Audit) -> str:
+    residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
+    if not books.least:
+        return f"{residuals}; nothing dissipates"
+    if books.violations:
+        worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
+        return f"{residuals}; ENTROPY DESTROYED by {worst}"
+    return f"{residuals}; every law dissipates (least {min(books.least.values()):.2g} W/(m^2 K))"
+
+
+def check_summary(
+    title: str, system: System, scene: Scene, run: Run, groups: Sequence[Group], warnings: Sequence[str]
+) -> str:
+    """A scene said back in words, with its numbers and what is odd about it."""
+    sections = [
+        title or "untitled",
+        labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"),
+        labelled("run", _plan(system, run)),
+        _section("States", _state_rows(system)),
+        _section("Roles", [(role.variable, role.role, role.by) for role in system.roles]),
+        _section("Laws", _law_rows(scene)),
+        _section("Numbers", [(g.name, _value(g), g.text) for g in groups]),
+        _section("Warnings", [(warning,) for warning in warnings]),
+    ]
+    return "\n".join(section for section in sections if section)
+
+
+def _plan(system: System, run: Run) -> str:
+    parts = [f"{_method(run)}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
+    inside = [t for t in system.breakpoints if 0 < t < run.times[-1]]
+    if inside:
+        parts.append(f"{len(inside)} breakpoints")
+    if any(not margin.terminal for margin in system.margins):
+        parts.append("kinks: " + ", ".join(m.reason for m in system.margins if not m.terminal))
+    return "; ".join(parts)
+
+
+def _section(heading: str, rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join([heading, *(f"  {line}" for line in columns(rows))]) if rows else ""
+
+
+def _state_rows(system: System) -> list[tuple[str, ...]]:
+    kinds = {True: "algebraic", False: "evolved"}
+    return [
+        (
+            s.name,
+            f"[{s.quantity.unit}]",
+            kinds[s.algebraic],
+            f"{'guess' if s.algebraic else 'from'} {s.initial:g}",
+            s.quantity.long_name,
+        )
+        for s in system.states
+    ]
+
+
+def _law_rows(scene: Scene) -> list[tuple[str, str]]:
+    from surfacechem.check import laws_of
+
+    return [(law.contract, law.name()) for law in laws_of(scene)]
+
+
+def _value(group: Group) -> str:
+    from surfacechem.check import significant
+
+    return significant(group.value) + ("" if group.unit == "1" else f" {group.unit}")
