@@ -137,3 +137,14 @@ def test_reactions_of_other_species_are_left_out(tmp_path):
     file.write_text(text.replace("reactions:\n- eq", f"reactions:\n{extra}- eq"), encoding="utf-8")
     (law,) = load_mechanism(file).reactions
     assert file.read_text(encoding="utf-8").splitlines()[law.place.line - 1].endswith(law.equation)
+
+
+def test_sections_of_the_file_may_have_names(tmp_path):
+    text = TEXT.replace("species: [A(s), B(s), AB(s)]", "species: [{strands: all}]").replace("\nspecies:", "\nstrands:")
+    text = text.replace("  reactions: all", "  reactions: [zipping]").replace("\nreactions:", "\nzipping:")
+    file = tmp_path / "named.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert [law.equation for law in load_mechanism(file).reactions] == ["A(s) + B(s) <=> AB(s)"]
+    file.write_text(text.replace("  rate-constant", "  rate-constent"), encoding="utf-8")
+    with pytest.raises(InputError, match="Did you mean 'rate-constant'"):
+        load_mechanism(file)

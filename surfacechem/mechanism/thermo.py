@@ -46,10 +46,6 @@ class StandardGibbs:
             value = where(below, form(piece.coefficients, T), value)
         return value
 
-    def molar(self, T: Expression) -> Expression:
-        """Standard molar Gibbs energy [J/mol]."""
-        return GAS_CONSTANT * self(T)
-
 
 def constant_cp(c: Sequence[float], T: Expression) -> Expression:
     """From (T0, h0/R, s0/R, cp/R): h = h0 + cp (T - T0), s = s0 + cp ln(T/T0)."""
