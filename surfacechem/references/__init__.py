@@ -13,11 +13,13 @@ from surfacechem.references.base import Reference
 
 __all__ = ["Reference", "all", "get", "names"]
 
+NO_SOLUTIONS = ("base", "matching")
+
 
 def names() -> list[str]:
     """Names of all exact solutions, read off the file names."""
     files = [module.name for module in pkgutil.iter_modules(__path__)]
-    return sorted(file.replace("_", "-") for file in files if file != "base" and not file.startswith("_"))
+    return sorted(file.replace("_", "-") for file in files if file not in NO_SOLUTIONS and not file.startswith("_"))
 
 
 def get(name: str) -> type[Reference]:

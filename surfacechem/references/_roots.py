@@ -27,8 +27,10 @@ def increasing_root(function: Callable[[Array], tuple[Array, Array]], target: Ar
             newton = x - error / slope
         inside = (newton > low) & (newton < high)
         following = np.where(inside, newton, 0.5 * (low + high))
-        settled = (error == 0.0) | (np.minimum(np.abs(following - x), high - low) <= ROUNDING * np.abs(x))
-        x = np.where(error == 0.0, x, following)
+        reached = np.abs(error) <= ROUNDING * np.abs(target)
+        step = np.minimum(np.abs(following - x), high - low)
+        settled = reached | (step <= ROUNDING * np.abs(x))
+        x = np.where((error == 0.0) | (reached & ~inside), x, following)
         if settled.all():
             return x
     raise ArithmeticError(f"no root found between {low} and {high}")

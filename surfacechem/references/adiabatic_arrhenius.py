@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.references._quadrature import short_integral
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
 from surfacechem.terms import parameter
@@ -53,7 +54,8 @@ class AdiabaticArrhenius(Reference):
         """Rate constant [1/s] at the initial temperature; the exponent's rounding would cost s_i roundings of t."""
         exact = Fraction(self.E_a) / (Fraction(str(GAS_CONSTANT)) * Fraction(self.T_i))
         lost = float(exact - Fraction(self._initial_exponent))
-        return self.A * math.exp(-self._initial_exponent) * (1.0 - lost)
+        half = math.exp(-0.5 * self._initial_exponent)
+        return half * self.A * half * (1.0 - lost)
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         scaled, span = self.initial_rate * t, self._initial_exponent * self.delta_T / (self.T_i + self.delta_T)
@@ -66,12 +68,17 @@ class AdiabaticArrhenius(Reference):
 
     def _scaled_time(self, unreacted: Array) -> tuple[Array, Array]:
         r""":math:`Ae^{-s_i}t` as a function of :math:`-\ln(1-\phi)`, and its slope :math:`e^{s-s_i}`."""
-        rise, left = -self.delta_T * np.expm1(-unreacted), self.delta_T * np.exp(-unreacted)
-        T, final, s_i = self.T_i + rise, self.T_i + self.delta_T, self._initial_exponent
-        slope = np.exp(-s_i * rise / T)
+        left, final, s_i = self.delta_T * np.exp(-unreacted), self.T_i + self.delta_T, self._initial_exponent
+        T = self.T_i - self.delta_T * np.expm1(-unreacted)
         at_start = scaled_Ei(np.array([s_i * self.delta_T / final])) - scaled_Ei(np.array([s_i]))
         now = scaled_Ei(s_i * self.T_i / T * left / final) - scaled_Ei(s_i * self.T_i / T)
-        return at_start - slope * now, slope
+        early = unreacted * max(1.0, self.delta_T / self.T_i * max(1.0, s_i)) < 0.25  # there the integrals cancel
+        slope = self._slope(unreacted)
+        return np.where(early, short_integral(self._slope, unreacted), at_start - slope * now), slope
+
+    def _slope(self, unreacted: Array) -> Array:
+        rise = -self.delta_T * np.expm1(-unreacted)
+        return np.asarray(np.exp(-self._initial_exponent * rise / (self.T_i + rise)))
 
 
 def scaled_Ei(x: Array) -> Array:

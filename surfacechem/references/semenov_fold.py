@@ -13,6 +13,8 @@ from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
 from surfacechem.terms import parameter
 
+SERIES_LIMIT = 0.1
+
 
 class SemenovFold(Reference):
     r"""Algebraic temperature of an interface whose dissipation is activated by temperature; lower branch.
@@ -63,8 +65,16 @@ class SemenovFold(Reference):
 
 def scaled_rise(severity: Array) -> Array:
     r"""The smaller x with :math:`xe^{1-x}=D_0/D_{crit}`, as 1 - v; not above one."""
-    distance = -np.log1p(severity - 1.0)
-    low = -distance + np.sqrt(distance * (distance + 2.0))
-    high = np.minimum(np.sqrt(2.0 * distance), np.nextafter(1.0, 0.0))
-    v = increasing_root(lambda v: (-v - np.log1p(-v), v / (1.0 - v)), distance, np.minimum(low, high), high)
+    almost_one = np.nextafter(1.0, 0.0)
+    with np.errstate(divide="ignore"):
+        distance = np.abs(np.log1p(severity - 1.0))
+        low = np.minimum(2.0 / (1.0 + np.sqrt(1.0 + 2.0 / distance)), almost_one)
+    high = np.minimum(np.sqrt(2.0 * distance), almost_one)
+    v = increasing_root(_distance_from_fold, distance, np.minimum(low, high), high)
     return np.where(v < 0.5, 1.0 - v, severity / math.e * np.exp(1.0 - v))
+
+
+def _distance_from_fold(v: Array) -> tuple[Array, Array]:
+    r""":math:`-v-\ln(1-v)`, by its series where the two would cancel, and its slope."""
+    series = sum(np.minimum(v, SERIES_LIMIT) ** n / n for n in range(2, 18))
+    return np.where(v < SERIES_LIMIT, series, -v - np.log1p(-v)), v / (1.0 - v)

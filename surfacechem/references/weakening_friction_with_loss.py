@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.references._heated_body import FrictionallyHeated
+from surfacechem.references._quadrature import short_integral
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array
 from surfacechem.terms import parameter
@@ -71,4 +72,10 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
         """The right-hand side of the implicit solution and its slope."""
         steady, other, rise = self.steady_temperature, self._other_root, self._rise(s)
         logarithms = steady**2 * s + other**2 * np.log1p(rise / (self.T_i - other))
-        return logarithms / (steady - other) - rise, (self.T_i + rise) ** 2 / (self.T_i + rise - other)
+        weak_loss = 4.0 * (self.T_i + rise) < -other  # far below both roots the logarithms cancel
+        slope = self._slope(s)
+        return np.where(weak_loss, short_integral(self._slope, s), logarithms / (steady - other) - rise), slope
+
+    def _slope(self, s: Array) -> Array:
+        T = self.T_i + self._rise(s)
+        return np.asarray(T**2 / (T - self._other_root))

@@ -1,0 +1,349 @@
+"""Where two exact solutions must agree, the equations they solve, and extreme parameters."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from surfacechem.errors import InputError
+from surfacechem.references import Reference, get
+
+TIMES = np.array([0.0, 1e-17, 1e-9, 1e-3, 0.1, 0.7, 3.0, 20.0, 1e3, 1e6])
+BODIES = {"C_1": 1.5, "C_2": 0.7, "C_c": 0.3, "T_0": 300.0}
+MEDIUM = {"C_1": 1200.0, "C_2": 500.0, "h_1": 2500.0, "h_2": 700.0, "T_1": 290.0, "T_2": 350.0}
+SOURCE = {"D_0": 150.0, "D_1": 4000.0, "gamma": 3.0}
+WIDE, WARM, T_0 = (-6.0, 6.0), (0.0, 4.0), (math.log10(300.0),) * 2
+EXPONENTS = {
+    "pair-exchange": {"C_1": WIDE, "C_2": WIDE, "h": (-9.0, 9.0), "T_0": T_0, "T_1": WARM, "T_2": WARM},
+    "reservoir-exchange": {"C": WIDE, "h": (-9.0, 9.0), "T_0": T_0, "T_i": (-2.0, 4.0), "T_a": (-2.0, 4.0)},
+    "weakening-friction-with-loss": {"C": WIDE, "T_0": T_0, "T_i": WARM, "D_0": WIDE, "H": WIDE, "T_a": WARM},
+    "thinning-film": {"C": (-3.0, 6.0), "T_0": T_0, "T_i": (2.3, 2.6), "D_0": WIDE, "beta": (-6.0, 0.5)},
+    "adiabatic-arrhenius": {"A": (0.0, 20.0), "E_a": (3.0, 5.5), "T_i": (2.0, 3.0), "delta_T": (-3.0, 3.3)},
+    "semenov-fold": {"T_0": T_0, "beta": (-4.0, 1.0), "H": (-3.0, 6.0), "D_0": (-16.0, -1e-16)},
+    "bonding": {"C_1": WIDE, "C_2": WIDE, "T_0": T_0, "T_i": T_0, "K_0": WIDE, "K_1": WIDE, "tau": WIDE, "D": WIDE},
+    "three-temperatures": {
+        **{"C_1": (-3.0, 6.0), "C_2": (-3.0, 6.0), "C_c": (-15.0, 6.0), "h_1": (-12.0, 20.0), "h_2": (-12.0, 20.0)},
+        **{"T_1": WARM, "T_2": WARM, "T_c": WARM, "D_0": WARM, "D_1": WARM, "gamma": WIDE},
+    },
+}
+FILM = {"C": 4000.0, "T_0": 300.0, "D_0": 3000.0}
+
+
+def assert_same(one: Reference, other: Reference, *, relative=1e-13, t=TIMES, absolute=0.0):
+    """Both give the same values of every quantity they share."""
+    first, second = one.solution(t), other.solution(t)
+    shared = first.keys() & second.keys()
+    assert shared
+    for name in shared:
+        np.testing.assert_allclose(first[name], second[name], rtol=relative, atol=absolute, err_msg=name)
+
+
+def derivative(reference: Reference, name: str, t: float) -> float:
+    """Five-point difference quotient; good to about 1e-10 of the value over t."""
+    h = 1e-3 * t
+    before, less, more, after = reference.solution([t - 2 * h, t - h, t + h, t + 2 * h])[name]
+    return float((before - 8 * less + 8 * more - after) / (12 * h))
+
+
+class TestLimits:
+    def test_general_bonding_is_exothermic_bonding(self):
+        given = {**BODIES, "K_0": 180.0, "tau": 2.0}
+        assert_same(get("bonding")(**given, T_i=300.0), get("exothermic-bonding")(**given))
+
+    @pytest.mark.parametrize("K_2", [1.0, 500.0, 749.999999])
+    def test_general_bonding_is_endothermic_bonding(self, K_2):
+        given = {**BODIES, "K_2": K_2, "tau": 2.0}
+        assert_same(get("bonding")(**given, T_i=300.0), get("endothermic-bonding")(**given))
+
+    @pytest.mark.parametrize("suffix", ["", "-constant-capacity"])
+    def test_bonding_without_bond_energy_is_sliding(self, suffix):
+        given = {**BODIES, "T_i": 310.0, "D": 40.0}
+        bonds = get("bonding" + suffix)(**given, tau=1.0)
+        assert_same(bonds, get("sliding" + suffix)(**given))
+
+    def test_bonding_and_sliding_add_their_energies(self):
+        given = {**BODIES, "T_i": 300.0, "tau": 0.5}
+        both = get("bonding")(**given, K_0=90.0, D=25.0).solution(TIMES)["T"]
+        bonds = get("bonding")(**given, K_0=90.0).solution(TIMES)["T"]
+        sliding = get("sliding")(**BODIES, T_i=300.0, D=25.0).solution(TIMES)["T"]
+        np.testing.assert_allclose(both**2 - 300.0**2, bonds**2 + sliding**2 - 2 * 300.0**2, rtol=1e-10, atol=1e-9)
+
+    @pytest.mark.parametrize("name", ["sliding", "bonding"])
+    def test_capacity_models_agree_for_small_heating(self, name):
+        given = {**BODIES, "T_i": 300.0, "D": 1e-9}
+        if name == "bonding":
+            given |= {"K_0": 1e-6, "K_1": 2e-6, "K_2": 1e-6, "tau": 1.0}
+        # Temperature rises by 1e-4 K at most, so both capacities agree to 1e-6 of the change and 1e-12 of T.
+        assert_same(get(name)(**given), get(name + "-constant-capacity")(**given), relative=1e-6, absolute=1e-9)
+
+    def test_small_kappa(self):
+        given = {**BODIES, "tau": 2.0}
+        none = get("exothermic-bonding")(**given, K_0=0.0)
+        for name, K in (("exothermic-bonding", "K_0"), ("endothermic-bonding", "K_2")):
+            assert_same(get(name)(**given, **{K: 1e-13}), none, absolute=1e-12)
+
+    @pytest.mark.parametrize("C_c", [1e-9, 1e-15])
+    def test_medium_without_capacity(self, C_c):
+        """The difference is the layer, gone after t = 1e-9, and C_c times the rates of change."""
+        dynamic = get("three-temperatures")(**MEDIUM, **SOURCE, C_c=C_c, T_c=300.0)
+        algebraic = get("three-temperatures-no-capacity")(**MEDIUM, **SOURCE)
+        assert_same(dynamic, algebraic, t=TIMES[3:], relative=max(1e-13, 20 * C_c), absolute=1e4 * C_c + 1e-11)
+
+    def test_large_conductance_is_perfect_contact(self):
+        given = {key: MEDIUM[key] for key in ("C_1", "C_2")}
+        dynamic = get("three-temperatures")(
+            **given, C_c=8.0, h_1=1e18, h_2=1e18, T_1=300.0, T_2=300.0, T_c=300.0, D_0=40.0
+        )
+        sliding = get("sliding-constant-capacity")(**given, C_c=8.0, T_0=300.0, T_i=300.0, D=40.0)
+        assert_same(dynamic, sliding, t=TIMES[3:])
+
+    @pytest.mark.parametrize("gamma", [0.0, 1e-12])
+    def test_slow_decay_of_the_source_is_a_steady_source(self, gamma):
+        decaying = get("three-temperatures")(**MEDIUM, C_c=8.0, T_c=300.0, D_1=400.0, gamma=gamma)
+        steady = get("three-temperatures")(**MEDIUM, C_c=8.0, T_c=300.0, D_0=400.0)
+        assert_same(decaying, steady, t=TIMES[:8], relative=max(1e-13, 100 * gamma), absolute=1e-9)
+
+    def test_source_that_decays_like_a_mode(self):
+        bodies = {**MEDIUM, "C_c": 8.0, "T_c": 300.0, "D_1": 4000.0}
+        for rate, _, _ in get("three-temperatures")(**bodies).modes():
+            at = get("three-temperatures")(**bodies, gamma=rate)
+            assert_same(
+                at, get("three-temperatures")(**bodies, gamma=rate * (1 + 1e-14)), absolute=1e-9, relative=1e-11
+            )
+
+    def test_exponential_law_is_linear_close_to_equilibrium(self):
+        given = {"n_c": 5e17, "K_c": 0.05, "phi_eq": 0.5, "phi_i": 0.5 + 1e-9}
+        exponential = get("exponential-affinity")(**given, C_r=2.5e38, T=310.0)
+        linear = get("linear-affinity")(**given, c_r=2.5e38 / 5e17)
+        moved = [reference.solution(TIMES)["phi"] - 0.5 for reference in (exponential, linear)]
+        np.testing.assert_allclose(moved[0], moved[1], rtol=1e-6, atol=1e-16)
+
+    def test_weakening_friction_is_quadratic_sliding(self):
+        """Capacity growing with T and friction falling with T are the same balance."""
+        friction = get("weakening-friction-constant-capacity")(**FILM, T_i=310.0).solution(TIMES)["T"]
+        sliding = get("sliding")(C_1=3000.0, C_2=1000.0, T_0=300.0, T_i=310.0, D=3000.0).solution(TIMES)["T"]
+        np.testing.assert_allclose(friction, sliding, rtol=1e-15)
+
+    @pytest.mark.parametrize("beta", [0.0, 1e-18])
+    def test_film_that_does_not_thin_is_sliding(self, beta):
+        film = get("thinning-film")(**FILM, T_i=310.0, beta=beta)
+        sliding = get("sliding")(C_1=3000.0, C_2=1000.0, T_0=300.0, T_i=310.0, D=3000.0)
+        assert_same(film, sliding)
+
+    def test_no_loss(self):
+        lossy = get("weakening-friction-with-loss")(**FILM, T_i=310.0, H=1e-15, T_a=300.0)
+        assert_same(lossy, get("weakening-friction")(**FILM, T_i=310.0))
+
+    def test_loss_without_friction_is_a_reservoir(self):
+        loss = get("weakening-friction-with-loss")(C=900.0, T_0=300.0, T_i=500.0, D_0=0.0, H=40.0, T_a=290.0)
+        assert_same(loss, get("reservoir-exchange")(C=900.0, T_0=300.0, T_i=500.0, h=40.0, T_a=290.0))
+
+    def test_large_partner_is_a_reservoir(self):
+        pair = get("pair-exchange")(C_1=900.0, C_2=9e20, h=40.0, T_0=300.0, T_1=20.0, T_2=290.0)
+        body = get("reservoir-exchange")(C=900.0, T_0=300.0, T_i=20.0, h=40.0, T_a=290.0)
+        np.testing.assert_allclose(pair.solution(TIMES)["T_1"], body.solution(TIMES)["T"], rtol=1e-9)
+
+    def test_exchange_is_symmetric(self):
+        one = get("pair-exchange")(C_1=900.0, C_2=200.0, h=40.0, T_0=300.0, T_1=250.0, T_2=400.0).solution(TIMES)
+        other = get("pair-exchange")(C_1=200.0, C_2=900.0, h=40.0, T_0=300.0, T_1=400.0, T_2=250.0).solution(TIMES)
+        np.testing.assert_allclose(one["T_1"], other["T_2"], rtol=1e-14)
+        np.testing.assert_allclose(one["q_1"], other["q_2"], rtol=1e-12, atol=1e-300)
+
+    def test_no_heat_of_reaction_is_first_order(self):
+        runaway = get("adiabatic-arrhenius")(A=1e13, E_a=8e4, T_i=320.0, delta_T=1e-7)
+        linear = get("adiabatic-linear-rate")(k_i=runaway.initial_rate, T_i=320.0, delta_T=0.0)
+        assert_same(runaway, linear, relative=1e-8, absolute=1e-12)
+
+
+class TestEquations:
+    """The solutions that no table holds, inserted into their differential equations."""
+
+    @pytest.mark.parametrize("t", [0.01, 0.5, 3.0, 30.0])
+    @pytest.mark.parametrize("pair", [(900.0, 200.0), (200.0, 900.0), (1.0, 5e4)])
+    def test_unequal_pair(self, t, pair):
+        C_1, C_2 = pair
+        reference = get("pair-exchange")(C_1=C_1, C_2=C_2, h=40.0, T_0=300.0, T_1=250.0, T_2=400.0)
+        now = reference.solution(t)
+        for k, C in ((1, C_1), (2, C_2)):
+            heating = C / 300.0 * now[f"T_{k}"] * derivative(reference, f"T_{k}", t)
+            rounding = 1e-12 * C * 400.0**2 / 300.0 / t
+            assert heating == pytest.approx(float(now[f"q_{k}"]), rel=1e-7, abs=rounding)
+        assert now["q_1"] == pytest.approx(float(40.0 * (now["T_2"] - now["T_1"])), rel=1e-9, abs=1e-9)
+        energies = [C_1 * T[0] ** 2 + C_2 * T[1] ** 2 for T in ((250.0, 400.0), (now["T_1"], now["T_2"]))]
+        assert energies[1] == pytest.approx(energies[0], rel=1e-14)
+
+    @pytest.mark.parametrize("t", [0.05, 0.7, 4.0])
+    @pytest.mark.parametrize("name", ["bonding", "bonding-constant-capacity"])
+    @pytest.mark.parametrize("potential", [(120.0, 60.0, 240.0), (-200.0, 700.0, 0.0), (300.0, 0.0, -400.0)])
+    def test_bonding(self, name, potential, t):
+        K = dict(zip(("K_0", "K_1", "K_2"), potential, strict=True))
+        reference = get(name)(**BODIES, **K, T_i=320.0, phi_i=0.1, tau=2.0, D=30.0)
+        now, T_rate = reference.solution(t), derivative(reference, "T", t)
+        factor = now["T"] / 300.0 if name == "bonding" else 1.0
+        assert now["q_1"] == pytest.approx(float(1.5 * factor * T_rate), rel=1e-8)
+        assert now["q_2"] == pytest.approx(float(0.7 * factor * T_rate), rel=1e-8)
+        # Energy: what the interface stores is the friction work less the heat given to the bodies.
+        assert derivative(reference, "U_c", t) == pytest.approx(float(30.0 - now["q_1"] - now["q_2"]), rel=1e-8)
+        # Entropy: produced by friction and by the reaction.
+        production = 30.0 / now["T"] + now["sigma_chem"]
+        assert derivative(reference, "S_total", t) == pytest.approx(float(production), rel=1e-8)
+
+    @pytest.mark.parametrize("T_i", [250.0, 300.0, 600.0])
+    @pytest.mark.parametrize("t", [1.0, 100.0, 3000.0])
+    def test_friction_heating(self, T_i, t):
+        for name, more, quadratic in (
+            ("weakening-friction", {}, True),
+            ("weakening-friction-constant-capacity", {}, False),
+            ("weakening-friction-with-loss", {"H": 12.0, "T_a": 280.0}, True),
+            ("thinning-film", {"beta": 0.02}, True),
+            ("thinning-film-constant-capacity", {"beta": 0.02}, False),
+        ):
+            reference = get(name)(**FILM, **more, T_i=T_i)
+            now = reference.solution(t)
+            T = float(now["T"])
+            friction = 3000.0 * (math.exp(-0.02 * (T - 300.0)) if "beta" in more else 300.0 / T)
+            assert now["D"] == pytest.approx(friction, rel=1e-13)
+            heating = friction - more.get("H", 0.0) * (T - more.get("T_a", 0.0))
+            capacity = 4000.0 * T / 300.0 if quadratic else 4000.0
+            assert capacity * derivative(reference, "T", t) == pytest.approx(heating, rel=1e-6, abs=1e-6)
+
+    def test_steady_film_balances(self):
+        film = get("thinning-film-steady-state")(T_0=300.0, D_0=3000.0, beta=0.04, H=12.0, T_a=290.0).solution(0.0)
+        assert film["D"] == pytest.approx(3000.0 * math.exp(-0.04 * (film["T"] - 300.0)), rel=1e-13)
+
+    @pytest.mark.parametrize("phi_i", [0.0, 0.3, 1.0])
+    @pytest.mark.parametrize("t", [1e-3, 0.1, 1.0])
+    def test_two_way_kinetics(self, phi_i, t):
+        exponential = get("exponential-affinity")(n_c=5e17, C_r=2.5e37, K_c=0.005, T=310.0, phi_eq=0.4, phi_i=phi_i)
+        assert derivative(exponential, "phi", t) == pytest.approx(float(exponential.solution(t)["phi_dot"]), rel=1e-7)
+        linear = get("linear-affinity")(n_c=1e18, c_r=4e18, K_c=0.3, phi_eq=0.4, phi_i=phi_i)
+        now = linear.solution(t)
+        assert 1e18 * derivative(linear, "phi", t) == pytest.approx(float(now["R_c"]), rel=1e-8)
+        assert now["R_forward"] - now["R_backward"] == pytest.approx(float(now["R_c"]), rel=1e-12)
+
+
+class TestExtremes:
+    @pytest.mark.parametrize("t", [0.0, 1e-17, 1e-12, 1e-3, 1.0, 40.0])
+    @pytest.mark.parametrize("power", [10, 40, 52])
+    def test_kappa_next_to_one(self, power, t):
+        """Digits that double precision holds of 1 - kappa are all kept."""
+        with mpmath.workdps(60):
+            left = mpmath.mpf(2) ** -power
+            exact = 256 * mpmath.sqrt(left / (left - (1 - left) * mpmath.expm1(-2 * mpmath.mpf(t))))
+        given = {"C_1": 1.0, "C_2": 1.0, "T_0": 256.0, "K_2": 512.0 * (1.0 - 2.0**-power), "tau": 1.0}
+        for reference in (get("endothermic-bonding")(**given), get("bonding")(**given, T_i=256.0)):
+            assert float(reference.solution(t)["T"] / exact - 1) == pytest.approx(0.0, abs=1e-15)
+
+    @pytest.mark.parametrize("t", [1e-9, 1e-3, 10.0, 1e4, 1e9])
+    @pytest.mark.parametrize("C_c", [1e3, 1.0, 1e-15])
+    @pytest.mark.parametrize("h", [(1e-12, 1e20), (1e20, 1e-12), (3.0, 3.0), (1e20, 1e20), (700.0, 2500.0)])
+    def test_three_temperatures_with_many_digits(self, h, C_c, t):
+        """Against the matrix exponential of the augmented system."""
+        given = {**MEDIUM, "h_1": h[0], "h_2": h[1], "C_c": C_c, "T_c": 300.0, **SOURCE}
+        actual = get("three-temperatures")(**given).solution(t)
+        for name, exact in zip(("T_1", "T_2", "T_c"), augmented_exponential(given, t), strict=True):
+            assert float(actual[name] / exact - 1) == pytest.approx(0.0, abs=4e-15)
+
+    @pytest.mark.parametrize("span", [1.0, 745.0, 800.0, 1e4, 1e6])
+    def test_exponential_law_is_finite(self, span):
+        for phi_i, phi_eq in ((0.0, 1.0), (1.0, 0.0)):
+            sites = get("exponential-affinity")(
+                n_c=5e17, C_r=2.5e38, K_c=span * 5e17 * 1.380649e-23 * 310.0, T=310.0, phi_i=phi_i, phi_eq=phi_eq
+            )
+            exact = sites.solution([1e-300, 1e-30, 1e-9, 1e-3, 1.0, 1e3, 1e9])
+            assert all(np.isfinite(value).all() for value in exact.values())
+            assert np.all((exact["phi"] >= -1e-15) & (exact["phi"] <= 1.0))
+
+    @pytest.mark.parametrize("beta", [1e-9, 1e-3, 1.0, 100.0])
+    def test_film_with_any_thinning(self, beta):
+        with mpmath.workdps(80):
+            b = mpmath.mpf(beta)
+            argument = mpmath.exp(300 * b - 1) * (300 * b - 1 + b**2 * 3000 * 300 * 50 / 4000)
+            exact = (1 + mpmath.lambertw(argument)) / b
+        assert get("thinning-film")(**FILM, T_i=300.0, beta=beta).solution(50.0)["T"] == pytest.approx(
+            float(exact), rel=1e-14
+        )
+
+    @pytest.mark.parametrize("H", [1e-9, 1e-3, 0.3, 12.0, 1e4])
+    @pytest.mark.parametrize("T_i", [1.0, 250.0, 900.0])
+    def test_loss_of_any_strength(self, H, T_i):
+        """Against the logarithms with many digits."""
+        body = get("weakening-friction-with-loss")(**FILM, T_i=T_i, H=H, T_a=300.0)
+        T = np.array([T_i + share * (body.steady_temperature - T_i) for share in (1e-6, 1e-3, 0.1, 0.5, 0.9)])
+        with mpmath.workdps(80):
+            product, start = mpmath.mpf(3000) * 300 / mpmath.mpf(H), mpmath.mpf(T_i)
+            upper = (300 + mpmath.sqrt(90000 + 4 * product)) / 2
+            lower = -product / upper
+            exact = [
+                start
+                - x
+                + (
+                    upper**2 * mpmath.log((upper - start) / (upper - x))
+                    + lower**2 * mpmath.log((x - lower) / (start - lower))
+                )
+                / (upper - lower)
+                for x in map(mpmath.mpf, map(float, T))
+            ]
+        t = np.array([float(value) for value in exact]) * 4000.0 / (H * 300.0)
+        np.testing.assert_allclose(body.solution(t)["T"], T, rtol=1e-13)
+
+    def test_runaway_with_a_huge_activation_energy(self):
+        reaction = get("adiabatic-arrhenius")(A=1e300, E_a=2.4e6, T_i=300.0, delta_T=100.0)
+        exact = reaction.solution(np.array([1e-3, 0.5, 1.0, 2.0, 1e6]) / reaction.initial_rate)
+        assert all(np.isfinite(value).all() for value in exact.values())
+        assert exact["T"][-1] == 400.0
+
+    @pytest.mark.parametrize("name", EXPONENTS)
+    def test_finite_everywhere(self, name):
+        """Parameters over many decades, times over 35."""
+        random = np.random.default_rng(7)
+        t = np.concatenate([[0.0], np.logspace(-20, 15, 36)])
+        for _ in range(40):
+            given = {key: float(10 ** random.uniform(*span)) for key, span in EXPONENTS[name].items()}
+            if name == "semenov-fold":
+                given["D_0"] *= given["H"] / (math.e * given["beta"])
+            assert all(np.isfinite(value).all() for value in get(name)(**given).solution(t).values())
+
+    def test_what_cannot_be_is_refused(self):
+        with pytest.raises(InputError, match="T_0 = -1"):
+            get("sliding")(**{**BODIES, "T_0": -1.0}, T_i=300.0, D=1.0)
+        with pytest.raises(InputError, match="K_2 must be below"):
+            get("endothermic-bonding")(**BODIES, K_2=750.0, tau=1.0)
+        with pytest.raises(InputError, match="T has no real value at t = "):
+            get("bonding")(**BODIES, K_0=-2000.0, T_i=300.0, tau=1.0).solution([0.0, 9.0])
+        with pytest.raises(InputError, match="T has no real value at t = "):
+            get("bonding-constant-capacity")(**BODIES, K_0=-2000.0, T_i=300.0, tau=1.0).solution([0.0, 9.0])
+        with pytest.raises(InputError, match="delta_T must be above"):
+            get("adiabatic-linear-rate")(k_i=1.0, T_i=300.0, delta_T=-300.0)
+
+
+def augmented_exponential(given: dict[str, float], t: float) -> list[mpmath.mpf]:
+    """T_1, T_2, T_c from exp(A t) with the steady and the decaying source as two more states."""
+    with mpmath.workdps(120):
+        p = {key: mpmath.mpf(value) for key, value in given.items()}
+        A = mpmath.zeros(5)
+        for k in (1, 2):
+            C, h = p[f"C_{k}"], p[f"h_{k}"]
+            A[k - 1, k - 1], A[k - 1, 2] = -h / C, h / C
+            A[2, k - 1] = h / p["C_c"]
+            A[2, 2] -= h / p["C_c"]
+        A[2, 3] = A[2, 4] = 1 / p["C_c"]
+        A[4, 4] = -p["gamma"]
+        start = mpmath.matrix([p["T_1"], p["T_2"], p["T_c"], p["D_0"], p["D_1"]])
+        values, left, right = mpmath.eig(A[:3, :3], left=True, right=True)
+        return list(modal(A, start, values, left, right, mpmath.mpf(t)))
+
+
+def modal(A, start, values, left, right, t):
+    """Sum over the modes of the three temperatures; the zero eigenvalue is the total energy."""
+    T = mpmath.zeros(3, 1)
+    for j in range(3):
+        weight = (left[j, :] * right[:, j])[0]
+        rate = mpmath.mpf(0) if abs(values[j]) < mpmath.mpf(10) ** -60 else mpmath.re(values[j])
+        initial = (left[j, :] * start[:3, 0])[0] / weight
+        drive = left[j, 2] * A[2, 3] / weight
+        steady = t if rate == 0 else mpmath.expm1(rate * t) / rate
+        decaying = (mpmath.exp(rate * t) - mpmath.exp(A[4, 4] * t)) / (rate - A[4, 4])
+        T += right[:, j] * (initial * mpmath.exp(rate * t) + drive * (start[3] * steady + start[4] * decaying))
+    return (mpmath.re(value) for value in T)
