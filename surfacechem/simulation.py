@@ -62,7 +62,7 @@ class Simulation:
             raise self.case.located(error) from None
         case = self.case
         accuracy = self._accuracy(trajectory)
-        return Solution(trajectory, case.title, case.source, case.text, case.mechanism_text, accuracy)
+        return Solution(trajectory, case.title, case.source, case.text, case.mechanism_text or "", accuracy)
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = {parameter.path: parameter.spec.unit for parameter in self.system.parameters}
@@ -80,8 +80,9 @@ class Simulation:
     def _against_exact(self, trajectory: Trajectory) -> Accuracy:
         from surfacechem.references.matching import exact_values
 
-        assert self.case.reference is not None
-        title, exact = exact_values(self.case.reference, trajectory)
+        named = self.case.reference
+        assert named is not None
+        title, exact = exact_values(named.name, named.options, named.place, self.case.scene.heat, trajectory)
         columns, states = computed(trajectory), _states(trajectory)
         errors = {
             name: relative_error(columns[name], values, FLOOR if name in states else 1.0)

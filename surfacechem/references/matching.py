@@ -1,0 +1,196 @@
+"""From a scene to its exact solution: parameters read off the scene, and a check that the solution solves its equations.
+
+An exact solution that is named for a scene it does not belong to is refused: it must satisfy the assembled equations.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import references
+from surfacechem.errors import InputError, Place
+from surfacechem.integrate import Trajectory
+from surfacechem.references.base import Reference
+from surfacechem.terms import HeatTransfer
+
+Array = NDArray[np.float64]
+
+MISMATCH = 1e-4
+"""Largest part of an equation by which a solution may miss it; differences in time are good to 1e-6 or better."""
+
+PROBES = 7
+"""Times at which the equations are tested."""
+
+
+def exact_values(
+    name: str, options: Mapping[str, float], place: Place | None, heat: Sequence[HeatTransfer], run: Trajectory
+) -> tuple[str, dict[str, Array]]:
+    """Title and exact values at the output times, by the names of the scene's variables."""
+    try:
+        reference = match(references.get(name), options, Start(run, heat))
+        exact = _renamed(reference.solution(run.result.times), run)
+        _check(reference, run)
+    except InputError as error:
+        raise (error.at(place) if place else error) from None
+    return f"exact solution {name}", exact
+
+
+def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> Reference:
+    """The reference with the parameters of the scene; ``options`` go first."""
+    values = dict(options)
+    for item in dataclasses.fields(kind):  # type: ignore[arg-type]
+        if item.name not in values:
+            found = start.find(item.name)
+            if found is not None:
+                values[item.name] = found
+            elif item.default is dataclasses.MISSING:
+                text = item.metadata["spec"].text
+                raise InputError(f"the exact solution {kind.name} needs {item.name} ({text}), which the scene has not.")
+    return kind(**values)
+
+
+class Start:
+    """What a scene says of itself at the start, by the names that exact solutions use."""
+
+    def __init__(self, run: Trajectory, heat: Sequence[HeatTransfer] = ()) -> None:
+        self.run, self.heat = run, heat
+        system = run.model.system
+        self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
+        self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
+        self.named = dict(zip((item.name for item in system.outputs), run.outputs[0], strict=True))
+        rates = run.result.output_rates[0]
+        self.rates = {state.name: float(rate) for state, rate in zip(system.states, rates, strict=True)}
+
+    def find(self, name: str) -> float | None:
+        """The value of a parameter of an exact solution, or None."""
+        try:
+            return float(RULES[name](self)) if name in RULES else self._plain(name)
+        except KeyError:
+            return None
+
+    def _plain(self, name: str) -> float:
+        for source in (self.parameters, self.initial, self.named):
+            if name in source:
+                return float(source[name])
+        return self.initial[name.removesuffix("_i")]
+
+    def temperature(self) -> float:
+        """The one temperature of the scene."""
+        names = [state for state in self.initial if state not in ("phi",) and not state.startswith("theta_")]
+        return self.initial[names[0]] if names else self.named["T_c"]
+
+    def capacity(self) -> float:
+        """Sum of all capacities at T_0."""
+        return sum(value for name, value in self.parameters.items() if name in ("C_1", "C_2", "C_c"))
+
+    def friction(self, temperature: float | None = None) -> float:
+        """Power of all friction, at the start or with every temperature set to one value."""
+        system = self.run.model.system
+        names = [account.quantity.name for account in system.ledger]
+        laws = [name[2:] for name in names if name.startswith("W_") and f"heat_{name[2:]}" in names]
+        values = self.named if temperature is None else self._at(temperature)
+        return float(sum(values[f"D_{law}"] for law in laws))
+
+    def _at(self, temperature: float) -> dict[str, float]:
+        model, result = self.run.model, self.run.result
+        y = np.array([[v if name == "phi" else temperature for name, v in self.initial.items()]])
+        values = model.evaluate(result, result.times[:1], y, np.zeros_like(y))[0]
+        return dict(zip((item.name for item in model.system.outputs), values, strict=True))
+
+    def supplied(self) -> float:
+        """External heat into all members."""
+        return float(sum(self.named.get(name, 0.0) for name in ("Q_1", "Q_2", "Q_c")))
+
+    def conductance(self, chosen: Callable[[tuple[str, str]], bool]) -> float:
+        """Sum of the conductances of the chosen heat paths."""
+        laws = [law for law in self.heat if chosen(tuple(law.between))]
+        if not laws:
+            raise KeyError("no such heat path")
+        return sum(self.run.values[f"{law.path}.h"] for law in laws)
+
+    def body(self, k: int) -> str:
+        """Name of body k among the ends of the heat paths."""
+        return next(law.between[1 - law.between.index("interface")] for law in self.heat if self._into(law, k))
+
+    def _into(self, law: HeatTransfer, k: int) -> bool:
+        names = [item.name for item in self.run.model.system.outputs if item.name in (f"q_c{k}", f"q_{k}c")]
+        text = next(i.quantity.long_name for i in self.run.model.system.outputs if i.name in names)
+        return "interface" in law.between and all(end in text for end in law.between)
+
+
+RULES: dict[str, Callable[[Start], float]] = {
+    "C": lambda s: s.capacity(),
+    "n_c": lambda s: s.parameters["N_c"],
+    "K_c": lambda s: s.parameters["K_0"],
+    "T": lambda s: s.temperature(),
+    "T_i": lambda s: s.temperature(),
+    "tau": lambda s: (s.parameters.get("phi_eq", 1.0) - s.initial["phi"]) / s.rates["phi"],
+    "k_i": lambda s: s.rates["phi"] / (1 - s.initial["phi"]),
+    "D": lambda s: s.friction(),
+    "D_0": lambda s: s.friction(s.parameters["T_0"]) + s.supplied(),
+    "Q": lambda s: -s.supplied(),
+    "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
+    "h": lambda s: s.conductance(lambda ends: True),
+    "H": lambda s: s.conductance(lambda ends: True),
+    "h_1": lambda s: s.conductance(lambda ends: s.body(1) in ends),
+    "h_2": lambda s: s.conductance(lambda ends: s.body(2) in ends),
+    "T_a": lambda s: s.named["T_a"] if "T_a" in s.named else s.named["T_2"] if "T_2" in s.named else s.named["T_1"],
+}
+"""Parameters of exact solutions that are not parameters of the scene under the same name."""
+
+
+def _renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
+    """Exact values under the names of the scene; those it does not have are left out."""
+    system = run.model.system
+    known = [state.name for state in system.states] + [item.name for item in system.outputs]
+    stands_for = {
+        "T": [state.name for state in system.states if state.quantity.unit == "K"],
+        "R_c": [name for name in known if name.startswith("R_")],
+        "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
+    }
+    result = {}
+    for name, values in exact.items():
+        candidates = [name] if name in known else stands_for.get(name, [])
+        if len(candidates) == 1:
+            result[candidates[0]] = values
+    return result
+
+
+def _check(reference: Reference, run: Trajectory) -> None:
+    """Refuse a solution that does not satisfy the scene's equations."""
+    system, program = run.model.system, run.model.program
+    reached = run.result.times[-1]
+    n = len(system.states)
+    for t in np.linspace(0.1, 0.9, PROBES) * reached:
+        y, ydot = _along(reference, run, float(t))
+        if y is None or ydot is None:
+            return
+        segment = np.searchsorted(run.result.problem.segments[1:-1], t, side="left")
+        inputs = np.concatenate([[t], y, ydot, run.result.problem.parameters[segment]])
+        misses = program.residual(inputs)
+        terms = np.abs(program.jacobian(inputs)[n * n :].reshape(n, n) * ydot).sum(axis=1)
+        forces = np.abs(misses - program.jacobian(inputs)[n * n :].reshape(n, n) @ ydot)
+        for row, miss, size in zip(system.rows, misses, terms + forces, strict=True):
+            if abs(miss) > MISMATCH * size:
+                part = abs(miss) / size
+                raise InputError(
+                    f"the exact solution {reference.name} does not belong to this scene: at t = {t:.3g} s it misses the "
+                    f"equation of {row} by {part:.1%}."
+                )
+
+
+def _along(reference: Reference, run: Trajectory, t: float) -> tuple[Array | None, Array | None]:
+    """Exact states and their rates at a time, by central differences; None where the solution leaves a state open."""
+    step = 1e-4 * min(t, run.result.times[-1])
+    times = np.array([t - step, t, t + step, t - 2 * step, t + 2 * step])
+    exact = _renamed(reference.solution(times), run)
+    names = [state.name for state in run.model.system.states]
+    if not all(name in exact for name in names):
+        return None, None
+    values = np.array([exact[name] for name in names])
+    slope = (8 * (values[:, 2] - values[:, 0]) - (values[:, 4] - values[:, 3])) / (12 * step)
+    return values[:, 1], slope
