@@ -19,8 +19,8 @@ from surfacechem.integrate import Trajectory
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-12
-"""Dissipation below zero by less than this part of the law's largest is rounding."""
+SLACK = 10.0
+"""Dissipation below zero by less than this many tolerances of the law's largest is error of the integration."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class Audit:
     """Largest energy that was exchanged [J/m^2]."""
     entropy_scale: float
     """Largest entropy that was exchanged or produced [J/(m^2 K)]."""
+    rtol: float
+    """Relative tolerance of the run."""
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
     largest: Mapping[str, float]
@@ -59,10 +61,8 @@ class Audit:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """Laws that destroyed entropy beyond rounding."""
-        return tuple(
-            law for law, low in self.least.items() if low < -ROUNDING * max(self.largest[law], abs(low) * ROUNDING)
-        )
+        """Laws that destroyed entropy beyond the tolerance of the run."""
+        return tuple(law for law, low in self.least.items() if low < -SLACK * self.rtol * abs(self.largest[law]))
 
 
 def _relative(residual: Array, scale: float) -> float:
@@ -110,6 +110,7 @@ class _Books:
             sites=self.sites(),
             energy_scale=_largest(exchanged),
             entropy_scale=_largest(turned),
+            rtol=self.trajectory.run.rtol,
             least=low,
             largest=high,
         )

@@ -110,11 +110,6 @@ def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Ex
     return symengine.Add(rate, *(-flow for flow in node.inflow))
 
 
-def energy_rows(
-    nodes: Sequence[Node], centre: Node | None, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]
-) -> dict[str, Expression]:
-    """One energy balance per free node; that of ``centre`` is the sum over all of them."""
-    rows = {node.name: node_row(node, rates, about) for node in nodes}
-    if centre is not None:
-        rows[centre.name] = symengine.Add(*rows.values())
-    return rows
+def energy_rows(rows: Mapping[str, Expression], centre: str) -> dict[str, Expression]:
+    """The energy balances of the free nodes, that of ``centre`` replaced by the sum over all of them."""
+    return {name: symengine.Add(*rows.values()) if name == centre else row for name, row in rows.items()}

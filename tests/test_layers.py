@@ -14,11 +14,11 @@ import surfacechem.data
 FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
     "contracts": ["terms", "scene"],
-    "core": ["balances", "variables", "system", "assembly", "compile"],
+    "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
     "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
-    "doors": ["case.*", "schema", "reactor", "rerun", "cli", "__init__", "__main__"],
+    "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*"]

@@ -1,0 +1,64 @@
+"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
+
+Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals.
+"""
+
+from __future__ import annotations
+
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.chemistry import reactions
+from surfacechem.assembly.equations import equations
+from surfacechem.assembly.exchange import friction, heat_paths
+from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
+from surfacechem.assembly.temperatures import temperatures
+from surfacechem.assembly.totals import regime, totals
+from surfacechem.errors import InputError, suggestion
+from surfacechem.scene import Scene
+from surfacechem.system import System
+
+__all__ = ["LOADABLE", "assemble"]
+
+STAGES = (
+    temperatures,
+    prescribed_variables,
+    bonding_variables,
+    free_energy,
+    reactions,
+    friction,
+    heat_paths,
+    equations,
+    totals,
+)
+
+
+def assemble(scene: Scene) -> System:
+    """The system of a scene; InputError where a variable that is read has no role, or two."""
+    build = Build(scene)
+    for stage in STAGES:
+        stage(build)
+    _refuse_idle_initial_values(build)
+    unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
+    return System(
+        t=build.t,
+        states=tuple(build.states),
+        parameters=tuple(build.parameters.items),
+        named=tuple(build.named),
+        rows={state.name: build.rows[state.name] for state in build.states},
+        ledger=tuple(build.ledger),
+        margins=tuple(build.margins),
+        roles=tuple(build.variables.roles),
+        regime=regime(build),
+        breakpoints=tuple(sorted(build.breakpoints)),
+        warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),
+    )
+
+
+def _refuse_idle_initial_values(build: Build) -> None:
+    """An initial value belongs to something that evolves."""
+    states = {state.name for state in build.states}
+    for name in build.scene.initial:
+        if name in states:
+            continue
+        if name in build.scene.loading or build.variables.has(name):
+            raise InputError(f"initial: {name} has two roles: an initial value, and prescribed or constant elsewhere.")
+        raise InputError(f"initial: nothing that evolves is called '{name}'.{suggestion(name, states)}")

@@ -1,0 +1,154 @@
+"""The system under construction, and the few ways in which stages add to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import symengine
+
+from surfacechem.balances import Node
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, derivative
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Scene
+from surfacechem.system import Account, Margin, Named, State
+from surfacechem.terms import Law, Load, Spec
+from surfacechem.variables import Parameters, Variables
+
+MANY = range(2, 1000)
+
+
+@dataclass(frozen=True)
+class Bond:
+    """A bonding variable that is a state: its symbol, its rate and the amount per reference area where it is one."""
+
+    symbol: Any
+    dot: Any
+    density: Expression
+
+
+class Build:
+    """What the stages of the assembly share; each stage leaves its results for the next."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.interface = scene.interface
+        custom = [body.temperature for body in scene.bodies if isinstance(body.temperature, str)]
+        self.parameters = Parameters([*custom, *(variable.name for variable in self.interface.variables)])
+        self.variables = Variables(self.parameters)
+        self.t = symengine.Symbol("t")
+        self.nodes: dict[str, Node] = {}
+        self.node_of: dict[str, Node] = {}
+        """Node of each body name, of 'interface' and of 'surroundings'."""
+        self.psi: Expression = symengine.Integer(0)
+        self.states: list[State] = []
+        self.named: list[Named] = []
+        self.rows: dict[str, Expression] = {}
+        self.ledger: list[Account] = []
+        self.margins: list[Margin] = []
+        self.bonding: dict[str, Bond] = {}
+        self.about: dict[Any, Expression] = {}
+        """Initial values of the bonding variables, about which capacities are written."""
+        self.frictions: set[str] = set()
+        """Labels of the friction laws, whose power comes from outside."""
+        self.dissipation: dict[str, Expression] = {}
+        """Power that each interface law turns into heat [W/m^2], by the law's label."""
+        self.into_body: dict[str, Expression] = {}
+        """Heat that reaches each body other than through the interface [W/m^2]."""
+        self.from_interface: dict[str, Expression] = {}
+        """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
+        self.breakpoints: set[float] = set()
+        self.used_names: set[str] = set()
+
+    def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
+        """Add a named quantity and return its symbol."""
+        self.named.append(Named(quantity, expression, output))
+        return symengine.Symbol(quantity.name)
+
+    def constant(self, name: str, path: str, unit: str, text: str, value: float) -> Expression:
+        """A scene-level number as a run-time parameter."""
+        return self.parameters.constant(name, path, Spec(unit, text), value)
+
+    def label(self, law: Law) -> str:
+        """A short unique name of a law for its quantities."""
+        return self.unique(law.label)
+
+    def unique(self, base: str) -> str:
+        """The name, with a number where it is taken."""
+        name = next(n for n in (base, *(f"{base}_{i}" for i in MANY)) if n not in self.used_names)
+        self.used_names.add(name)
+        return name
+
+    def history(self, name: str, load: Load) -> Expression:
+        """A prescribed history as an expression of time; its breakpoints will end a step."""
+        self.breakpoints.update(load.breakpoints())
+        return self.variables.bind(load, f"loading.{name}").value(self.t)
+
+    def prescribe(self, quantity: Quantity, load: Load) -> Expression:
+        """Make a prescribed variable a named quantity."""
+        return self.name(quantity, self.history(quantity.name, load))
+
+    def rate_of(self, symbol: Any) -> Expression:
+        """Time derivative of a prescribed variable."""
+        expression = next(item.expression for item in self.named if item.name == str(symbol))
+        return derivative(expression, self.t)
+
+    @property
+    def stretch(self) -> Expression:
+        """Area stretch J_c, or one."""
+        return self.variables.get("J_c", "the balance") if self.variables.has("J_c") else symengine.Integer(1)
+
+    def initial(self, name: str) -> float:
+        """Initial value of a state; InputError where the case gives none."""
+        if name not in self.scene.initial:
+            raise InputError(f"initial: {name} evolves but has no initial value. Add `{name}:` under `initial`.")
+        return self.scene.initial[name]
+
+    def areal(self, quantity: Quantity, nominal: Expression) -> Expression:
+        """A quantity per current area, and per reference area too where the two differ; returns the nominal one."""
+        if not self.variables.has("J_c"):
+            return self.name(quantity, nominal)
+        per_reference = Quantity(
+            f"{quantity.name}_nominal", quantity.unit, f"{quantity.long_name} per reference area", tag=quantity.tag
+        )
+        symbol = self.name(per_reference, nominal)
+        self.name(quantity, symbol / self.stretch)
+        return symbol
+
+    def supply(self, name: str, text: str, power: Expression, T: Expression | None) -> None:
+        """Book power that comes from outside; as heat at temperature T unless that is None."""
+        self.ledger.append(Account(Quantity(name, "J/m^2", text), power, "energy supply"))
+        if T is not None:
+            entropy = Quantity(f"{name}_entropy", "J/(m^2 K)", f"entropy supplied with {text}")
+            self.ledger.append(Account(entropy, power / T, "entropy supply"))
+
+    def production(self, name: str, text: str, rate: Expression) -> None:
+        """Book entropy that a law produces per time and reference area."""
+        sigma = Quantity(f"sigma_{name}", "W/(m^2 K)", f"entropy production of {text}")
+        symbol = self.name(sigma, rate)
+        integral = Quantity(f"entropy_{name}", "J/(m^2 K)", f"entropy produced by {text}")
+        self.ledger.append(Account(integral, symbol, "entropy production", name))
+
+    def law_margins(self, law: Law, own: Mapping[str, Expression]) -> None:
+        """What must stay positive for a law to hold."""
+        for name in law.positive:
+            value = own[name] if name in own else self.variables.get(name, law)
+            reason = f"{name} reached zero, where the law {law.name()} ends"
+            self.margins.append(Margin(f"{name} > 0", value, reason))
+
+    def shares(self) -> tuple[Expression, Expression]:
+        """Fractions of the interface's heat that go into body 1 and 2 where there is no medium."""
+        if not self.variables.has("partition"):
+            path, text, value = "interface.partition", "fraction of heat into body 1", self.interface.partition
+            self.variables.define("partition", lambda: self.constant("alpha", path, "1", text, value), "constant", path)
+        alpha = self.variables.get("partition", "the interface")
+        return alpha, 1 - alpha
+
+    def expanded(self, expression: Expression) -> Expression:
+        """The expression without names of quantities."""
+        result: dict[Any, Expression] = {}
+        for item in self.named:
+            result[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(result)
+        return symengine.sympify(expression).subs(result)

@@ -1,0 +1,68 @@
+"""Bonding: chemical potentials, rates, bond balances and what the reactions dissipate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import symengine
+
+from surfacechem import balances
+from surfacechem.assembly.build import Bond, Build
+from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.quantities import Quantity
+from surfacechem.system import Account
+from surfacechem.terms import RateLaw
+
+
+def reactions(build: Build) -> None:
+    """Chemical potentials, rates, bond balances and what the reactions dissipate."""
+    mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
+    change = {name: symengine.Integer(0) for name in build.bonding}
+    for law in build.interface.reactions:
+        label, nu = build.label(law), law.stoichiometry()
+        affinity = sum(n * mu[x] for x, n in nu.items())
+        rate = _rate(build, law, label, affinity)
+        build.dissipation[label] = -build.stretch * rate * affinity
+        for x, n in nu.items():
+            change[x] += n * rate
+    for name, bond in build.bonding.items():
+        build.rows[name] = balances.site_balance(change[name], bond.dot, bond.density, build.stretch)
+        formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
+        build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
+    _prescribed_bonding(build)
+
+
+def _potential_per_area(build: Build, name: str, symbol: Any) -> Expression:
+    quantity = Quantity(
+        "M" if name == "phi" else f"M_{name}", "J/m^2", f"chemical potential of {name} per area", tag="e:SMuc"
+    )
+    return build.name(quantity, derivative(build.psi, symbol))
+
+
+def _chemical_potential(build: Build, name: str, bond: Bond) -> Expression:
+    M = _potential_per_area(build, name, bond.symbol)
+    if name == "phi":
+        return build.name(Quantity("mu", "J", "chemical potential per bond", tag="e:muc"), M / bond.density)
+    quantity = Quantity(f"mu_{name}", "J", f"chemical potential of {name} per site", tag="e:muc")
+    return build.name(quantity, M / bond.density, output=False)
+
+
+def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:
+    bound = build.variables.bind(law, f"interface.bonding.{law.name()}")
+    own = {"mu": affinity, "t": build.t}
+    if "phi" in build.bonding:
+        bond = build.bonding["phi"]
+        own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
+    rate = build.variables.call(bound, bound.statement, own)
+    build.law_margins(law, own)
+    return build.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
+
+
+def _prescribed_bonding(build: Build) -> None:
+    phi = symengine.Symbol("phi")
+    if "phi" in build.bonding or not depends(build.psi, phi):
+        return
+    M = _potential_per_area(build, "phi", phi)
+    rate = build.rate_of(phi)
+    if rate != 0:
+        build.dissipation["prescribed_bonding"] = -M * rate

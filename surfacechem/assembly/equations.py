@@ -1,0 +1,139 @@
+"""Energy balances, temperature states and what must hold for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import symengine
+
+from surfacechem import balances
+from surfacechem.assembly.build import Build
+from surfacechem.balances import Node
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.system import Account, Margin, State
+from surfacechem.terms import Load
+
+COLD = 1e-9
+"""Temperature that counts as zero [K]."""
+
+
+def equations(build: Build) -> None:
+    """The work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
+    rates = _rates(build)
+    _dissipation(build)
+    free = [node for node in build.nodes.values() if not node.prescribed]
+    for node in free:
+        _temperature_state(build, node)
+    own_rows = {node.name: balances.node_row(node, rates, build.about) for node in free}
+    for node in free:
+        _temperature_margins(build, node, own_rows[node.name])
+    centre = build.node_of.get("interface")
+    build.rows |= balances.energy_rows(own_rows, centre.name if centre else "")
+    for node in build.nodes.values():
+        if node.prescribed:
+            _recovered_heat(build, node, rates)
+
+
+def _rates(build: Build) -> dict[Any, Expression]:
+    """Time derivatives of what the free energy depends on beside temperature."""
+    rates = {bond.symbol: bond.dot for bond in build.bonding.values()} | _gaps(build)
+    phi = symengine.Symbol("phi")
+    if phi not in rates and depends(build.psi, phi):
+        rates[phi] = build.rate_of(phi)
+    return rates
+
+
+def _gaps(build: Build) -> dict[Any, Expression]:
+    """Rates of the gaps that the potential depends on; books the work of the tractions."""
+    rates: dict[Any, Expression] = {}
+    for gap in ("g_n", "g_t"):
+        symbol = symengine.Symbol(gap)
+        if not depends(build.psi, symbol):
+            continue
+        rates[symbol] = build.rate_of(symbol)
+        power = derivative(build.psi, symbol) * rates[symbol]
+        if power != 0:
+            build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
+            _give_power(build, power)
+    return rates
+
+
+def _give_power(build: Build, power: Expression) -> None:
+    if "interface" in build.node_of:
+        build.node_of["interface"].inflow.append(power)
+
+
+def _dissipation(build: Build) -> None:
+    for label, power in build.dissipation.items():
+        text = label.replace("_", " ")
+        symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power)
+        turned = Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}")
+        build.ledger.append(Account(turned, symbol, "dissipation", label))
+        build.production(label, text, symbol / build.variables.get("T_c", "the dissipation"))
+        if label in build.frictions:
+            _give_power(build, symbol)
+
+
+def _temperature_state(build: Build, node: Node) -> None:
+    F = node.free_energy
+    algebraic = balances.second(F, node.T) == 0
+    members = [body for body in build.scene.bodies if build.node_of[body.name] is node]
+    if algebraic and members:
+        raise InputError(
+            f"nothing evolves or prescribes {node.name}: give {members[0].name} a heat capacity C, or its "
+            "temperature a value."
+        )
+    initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else build.initial(node.name)
+    if not initial > 0:
+        raise InputError(f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.")
+    quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
+    build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic))
+
+
+def _members(build: Build, node: Node) -> str:
+    return " and ".join(name for name, other in build.node_of.items() if other is node)
+
+
+def _guess(build: Build) -> float:
+    """Start value for an algebraic interface temperature: the mean of the bodies."""
+    values = [build.scene.initial.get(build.node_of[body.name].name) for body in build.scene.bodies]
+    known = [value for value in values if value is not None]
+    loads = [body.temperature for body in build.scene.bodies if isinstance(body.temperature, Load)]
+    known += [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]
+    return sum(known) / len(known) if known else float(build.scene.T_0 or 300.0)
+
+
+def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
+    build.margins.append(Margin(f"{node.name} > 0", node.T - COLD, f"the temperature {node.name} reached zero"))
+    if _is_algebraic(build, node):
+        _fold_margin(build, node, row)
+    elif "interface" in node.energies and balances.second(build.psi, node.T) != 0:
+        capacity = balances.conditioned(node.capacity(), build.about)
+        quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
+        symbol = build.name(quantity, capacity)
+        reason = f"the heat capacity at {node.name} was lost"
+        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason))
+
+
+def _is_algebraic(build: Build, node: Node) -> bool:
+    return any(state.algebraic for state in build.states if state.name == node.name)
+
+
+def _fold_margin(build: Build, node: Node, row: Expression) -> None:
+    """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
+    explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
+    slope = derivative(build.expanded(row.subs(explicit)), node.T)
+    if slope.free_symbols & {state.symbol for state in build.states}:
+        reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
+        build.margins.append(Margin(f"stable {node.name}", slope, reason))
+
+
+def _recovered_heat(build: Build, node: Node, rates: Mapping[Any, Expression]) -> None:
+    """The heat that must be supplied from outside to keep a prescribed temperature."""
+    supply = balances.node_row(node, rates, build.about)
+    if supply != 0:
+        symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", f"heat supplied to keep {node.name}"), supply)
+        build.supply(f"H_{node.name}", f"heat supplied to keep {node.name}", symbol, node.T)

@@ -1,0 +1,126 @@
+"""The state of the interface: prescribed variables, bonding states with their bounds, and the free energy."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import symengine
+
+from surfacechem.assembly.build import Bond, Build
+from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.system import Margin, State
+
+LOADABLE = ("phi", "g_n", "g_t", "v", "p", "J_c", "Q_1", "Q_2", "Q_c")
+"""Variables that a case may prescribe, beside the temperatures."""
+
+TRACTIONS = (
+    ("g_n", "t_n", "normal traction on body 1"),
+    ("g_t", "t_e", "elastic tangential traction on body 1"),
+)
+"""Gap, traction that is its derivative of the free energy, and its long name."""
+
+
+def prescribed_variables(build: Build) -> None:
+    """Histories under ``loading``; each comes to life when something reads it."""
+    for name, load in build.scene.loading.items():
+        if name in build.nodes:
+            continue
+        if name not in LOADABLE:
+            known = [*LOADABLE, *build.nodes]
+            raise InputError(f"loading: nothing is called '{name}'.{suggestion(name, known)}")
+        build.variables.define(name, partial(build.prescribe, VARIABLES[name], load), "prescribed", "loading")
+
+
+def bonding_variables(build: Build) -> None:
+    """Bonding states, site densities and their bounds."""
+    sites = build.interface.sites
+    if sites is not None:
+        text, density = "nominal density of reference bonding sites", sites.density
+        nominal = partial(build.constant, "N_c", "interface.sites", "1/m^2", text, density)
+        build.variables.define("N_c", nominal, "constant", "interface.sites")
+        build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
+    if any("phi" in law.stoichiometry() for law in build.interface.reactions):
+        limit = sites.phi_max if sites else 1.0
+        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding reaction"), limit)
+    for variable in build.interface.variables:
+        amount = build.constant(
+            f"N_{variable.name}", f"interface.{variable.name}.density", "1/m^2", "site density", variable.density
+        )
+        _bonding_state(build, Quantity(variable.name, "1", variable.long_name), amount, 1.0)
+        _amounts(build, variable.name, amount)
+    if build.interface.bonds:
+        build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
+
+
+def _current_density(build: Build) -> Expression:
+    nominal = build.variables.get("N_c", "the interface")
+    if not build.variables.has("J_c"):
+        return nominal
+    return build.name(VARIABLES["n_c"], nominal / build.stretch)
+
+
+def _amounts(build: Build, name: str, density: Expression) -> None:
+    """What a bonding variable amounts to where it is one: N_x per reference area, n_x per current area."""
+    build.variables.define(f"N_{name}", lambda: density, "constant", f"interface.{name}")
+    build.variables.define(f"n_{name}", lambda: density / build.stretch, "derived", f"interface.{name}")
+
+
+def _derived_phi(build: Build) -> Expression:
+    N_c = build.variables.get("N_c", "the bonding state")
+    bonds = sum(build.bonding[name].symbol * build.bonding[name].density for name in build.interface.bonds)
+    return bonds / N_c
+
+
+def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> None:
+    name = quantity.name
+    symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
+    initial = build.initial(name)
+    if not 0 <= initial <= limit:
+        raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.")
+    build.variables.define(name, lambda: symbol, "evolved", "bonding")
+    build.bonding[name] = Bond(symbol, dot, density)
+    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", "1", f"initial {name}", initial)
+    build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
+    _bounds(build, name, symbol, limit)
+
+
+def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
+    if not build.variables.has("slack"):
+        text = "how far rounding may carry a bonding variable beyond its bounds"
+        build.variables.define(
+            "slack", partial(build.constant, "slack", "run.slack", "1", text, 1e-9), "constant", "run"
+        )
+    slack = build.variables.get("slack", "the bounds")
+    top = build.constant(f"{name}_max", f"{name}_max", "1", f"upper bound of {name}", limit)
+    build.margins.append(Margin(f"{name} >= 0", symbol + slack, f"{name} fell below its bound 0"))
+    build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, f"{name} rose above its bound {limit:g}"))
+
+
+def free_energy(build: Build) -> None:
+    """The sum of the interface's potentials, and the tractions that follow."""
+    for law in build.interface.potentials:
+        bound = build.variables.bind(law, f"interface.potential.{law.name()}")
+        build.psi += build.variables.call(bound, bound.statement)
+    if build.interface.temperature is not None:
+        node = build.node_of["interface"]
+        node.energies["interface"] = build.psi
+    elif any(depends(build.psi, symengine.Symbol(name)) for name in build.nodes):
+        raise InputError(
+            "the interface's potential depends on temperature, but the interface has none. "
+            "Give `interface.temperature` a name."
+        )
+    _tractions(build)
+
+
+def _tractions(build: Build) -> None:
+    """Tractions of the elastic gaps; the normal one gives the contact pressure where the potential states it."""
+    for gap, traction, text in TRACTIONS:
+        symbol = symengine.Symbol(gap)
+        if depends(build.psi, symbol):
+            build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(build.psi, symbol))
+    if depends(build.psi, symengine.Symbol("g_n")):
+        pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
+        build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

@@ -1,0 +1,73 @@
+"""Temperature nodes: who carries which temperature, which are prescribed, and the energies of the bodies."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.balances import Node
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.scene import Body
+from surfacechem.terms import Load
+
+
+def temperatures(build: Build) -> None:
+    """Nodes: who carries which temperature, and which are prescribed."""
+    if build.scene.T_0 is not None:
+        value = build.scene.T_0
+        build.variables.define(
+            "T_0", lambda: build.constant("T_0", "T_0", "K", "reference temperature", value), "constant", "T_0"
+        )
+    for k, body in enumerate(build.scene.bodies, start=1):
+        _join(build, f"T_{k}", body.temperature, body.name)
+    if build.interface.temperature is not None:
+        _join(build, "T_c", build.interface.temperature, "interface")
+    else:
+        build.variables.define(
+            "T_c", partial(_mean_temperature, build), "derived", "harmonic mean of the bodies, no medium"
+        )
+    if build.scene.surroundings is not None:
+        _join(build, "T_a", build.scene.surroundings, "surroundings")
+    for k, body in enumerate(build.scene.bodies, start=1):
+        _body_energy(build, body, f"_{k}")
+
+
+def _join(build: Build, variable: str, temperature: str | Load, member: str) -> None:
+    load = temperature if isinstance(temperature, Load) else build.scene.loading.get(temperature)
+    name = variable if isinstance(temperature, Load) else temperature
+    node = build.nodes.get(name) or _new_node(build, name, load)
+    build.node_of[member] = node
+    role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
+    build.variables.define(variable, lambda: node.T, role, f"{member}: {name}")
+
+
+def _new_node(build: Build, name: str, load: Load | None) -> Node:
+    clash = name in VARIABLES and name not in ("T_1", "T_2", "T_c", "T_a")
+    if clash or not name.isidentifier():
+        raise InputError(f"'{name}' cannot name a temperature: use letters, digits and _, and no symbol of the theory.")
+    symbol = symengine.Symbol(name)
+    quantity = VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name))
+    if load is None:
+        node = Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
+    else:
+        build.prescribe(quantity, load)
+        node = Node(name, symbol, build.rate_of(symbol), prescribed=True)
+    build.nodes[name] = node
+    return node
+
+
+def _mean_temperature(build: Build) -> Expression:
+    T_1, T_2 = (build.variables.get(f"T_{k}", "the interface") for k in (1, 2))
+    share_1, share_2 = build.shares()
+    return build.name(VARIABLES["T_c"], 1 / (share_1 / T_1 + share_2 / T_2))
+
+
+def _body_energy(build: Build, body: Body, suffix: str) -> None:
+    node = build.node_of[body.name]
+    if body.energy is not None:
+        law = build.variables.bind(body.energy, f"bodies.{body.name}", suffix)
+        node.energies[body.name] = law.energy(T=node.T, T_0=build.variables.get("T_0", f"the body {body.name}"))

@@ -1,0 +1,87 @@
+"""Totals that the ledger must explain, the fluxes into the bodies, and the regime in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import symengine
+
+from surfacechem import balances
+from surfacechem.assembly.build import Build
+from surfacechem.balances import Node
+from surfacechem.expressions import Expression, derivative
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.scene import Body
+from surfacechem.system import Account
+
+
+def totals(build: Build) -> None:
+    """Energies, entropies and the fluxes into the bodies."""
+    energies, entropies = [], []
+    for node, member, F in _energies(build):
+        suffix = _suffix(build, member)
+        U = balances.internal_energy(F, node.T) if node else F
+        energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
+        if node and derivative(F, node.T) != 0:
+            quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
+            entropies.append(build.name(quantity, balances.entropy(F, node.T)))
+    build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
+    build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
+    _fluxes(build)
+    if build.interface.bonds:
+        build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
+
+
+def _energies(build: Build) -> Iterator[tuple[Node | None, str, Expression]]:
+    """Node, member and free energy of everything that stores energy; no node where there is no medium."""
+    for node in build.nodes.values():
+        yield from ((node, member, F) for member, F in node.energies.items() if F != 0)
+    if build.interface.temperature is None and build.psi != 0:
+        yield None, "interface", build.psi
+
+
+def _suffix(build: Build, member: str) -> str:
+    names = [body.name for body in build.scene.bodies]
+    return str(names.index(member) + 1) if member in names else "c"
+
+
+def _fluxes(build: Build) -> None:
+    fluxes = [_flux(build, k, body) for k, body in enumerate(build.scene.bodies, start=1)]
+    known = [flux for flux in fluxes if flux is not None]
+    if len(known) == 2:
+        build.name(Quantity("q_m", "W/m^2", "mean heat flux into the bodies", tag="e:qm_def"), sum(known) / 2)
+        build.name(
+            Quantity("q_t", "W/m^2", "transfer heat flux from body 2 to body 1", tag="e:qt_def"),
+            (known[0] - known[1]) / 2,
+        )
+
+
+def _flux(build: Build, k: int, body: Body) -> Expression | None:
+    """Heat into a body from the interface: stated by its laws, or recovered where they share a temperature."""
+    node = build.node_of[body.name]
+    recovered = None
+    if body.name in node.energies:
+        rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
+        recovered = rate - build.into_body[body.name]
+        account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
+        build.ledger.append(Account(account, recovered, "heat"))
+    shared = any(other is node for name, other in build.node_of.items() if name != body.name)
+    flux = recovered if shared else build.from_interface[body.name]
+    if flux is None or flux == 0:
+        return None
+    quantity = Quantity(f"q_{k}", "W/m^2", f"heat flux from the interface into {body.name}", tag="e:qc_k1")
+    build.areal(quantity, flux)
+    return symengine.Symbol(quantity.name)
+
+
+def regime(build: Build) -> str:
+    """The thermal regime in words."""
+    nodes = [build.node_of[body.name] for body in build.scene.bodies]
+    centre = build.node_of.get("interface")
+    if centre is None:
+        return "no medium" if nodes[0] is not nodes[1] else "perfect contact without a medium"
+    if nodes[0] is nodes[1] is centre:
+        return "perfect contact"
+    if centre in nodes:
+        return "one-sided perfect contact"
+    return "separate interface temperature"
