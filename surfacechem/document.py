@@ -79,6 +79,14 @@ def read(path: Path, name: str = "") -> str:
         raise InputError("no text in UTF-8.", place) from None
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a file; no path is too odd to ask."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def parse(text: str, file: str = "") -> Tree:
     """The tree of a YAML document.
 

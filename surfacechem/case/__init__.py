@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -97,13 +98,14 @@ def names() -> list[str]:
 def _find(name: str) -> tuple[Path, str]:
     """The file of a case, and how messages call it."""
     path = Path(name)
-    if path.is_file():
+    if document.is_file(path):
         return path, name
     if name in names():
         return data.cases() / f"{name}.yaml", f"cases/{name}.yaml"
-    if "\0" not in name and path.exists():
-        return path, name
-    raise InputError(f"no file and no case '{name}'.{suggestion(path.stem, names())}")
+    with suppress(OSError, ValueError):  # no name is too odd to be looked for
+        if path.exists():
+            return path, name
+    raise InputError(f"no file and no case '{name[:200]}'.{suggestion(path.stem, names())}")
 
 
 def _overridden(tree: Tree, values: Overrides) -> Tree:

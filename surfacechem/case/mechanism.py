@@ -55,7 +55,7 @@ def _with_suffix(name: str) -> str:
 
 def _find(name: str, base: Path, tree: Tree) -> Path:
     for folder in (base, data.mechanisms()):
-        if (folder / name).is_file():
+        if document.is_file(folder / name):
             return folder / name
     known = [path.stem for folder in (data.mechanisms(),) for path in folder.glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")

@@ -90,7 +90,7 @@ class SceneReader:
         """Temperature of body 1, of body 2 and of the interface."""
         trees = [mapping(tree).get("temperature") for tree in self.bodies.values()]
         for name, body in self.bodies.items():
-            if "temperature" not in mapping(body):
+            if "temperature" not in self._body_fields(body):
                 raise body.error(f"{name} needs `temperature`: a name such as T, or a value.")
         trees.append(self.interface.get("temperature"))
         found = [self._temperature(tree) if tree is not None else None for tree in trees]
@@ -120,21 +120,24 @@ class SceneReader:
             raise tree.error(f"{start:g} K is not an absolute temperature above zero.")
         return load
 
-    def _body(self, k: int, name: str) -> Body:
-        tree = self.bodies[name]
+    def _body_kind(self, tree: Tree) -> type[BodyEnergy]:
         kinds = laws.laws(BodyEnergy)
-        fields = mapping(tree)
-        capacity = fields.get("capacity")
-        kind = kinds[choice(capacity, "capacity", kinds) if capacity is not None else "quadratic"]
-        parameters = [field for field, _ in kind.specs()]
-        mapping(tree, ["temperature", "capacity", *parameters])
-        given = {field: fields[field] for field in parameters if field in fields}
-        energy = None
-        if given or capacity is not None:
-            energy = cast(BodyEnergy, build(kind, tree, self.units, fields=given))
-        temperature = self.temperatures[k]
+        capacity = mapping(tree).get("capacity")
+        name = choice(capacity, "capacity", kinds) if capacity is not None else "quadratic"
+        return cast(type[BodyEnergy], kinds[name])
+
+    def _body_fields(self, tree: Tree) -> dict[str, Tree]:
+        parameters = [name for name, _ in self._body_kind(tree).specs()]
+        return mapping(tree, ["temperature", "capacity", *parameters])
+
+    def _body(self, k: int, name: str) -> Body:
+        tree, temperature = self.bodies[name], self.temperatures[k]
         assert temperature is not None
-        return Body(name, temperature, energy)
+        fields = self._body_fields(tree)
+        given = {key: child for key, child in fields.items() if key not in ("temperature", "capacity")}
+        if not given and "capacity" not in fields:
+            return Body(name, temperature)
+        return Body(name, temperature, build(self._body_kind(tree), tree, self.units, fields=given))
 
     # -- interface ------------------------------------------------------------------------------------------------
 

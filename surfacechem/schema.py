@@ -1,0 +1,225 @@
+"""JSON Schema of the case format, made from the classes of the laws: for editors that complete and check YAML."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import typing
+from collections.abc import Iterable
+from typing import Any
+
+from surfacechem import laws, references, solvers
+from surfacechem.assembly import LOADABLE
+from surfacechem.case import TOP_KEYS
+from surfacechem.case.run import RUN_KEYS, SPACINGS
+from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
+from surfacechem.quantities import VARIABLES
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Load, Potential, RateLaw, Spec
+
+Schema = dict[str, Any]
+
+QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
+"""A number, with or without a unit."""
+
+CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Load, Factor)
+
+_TEXTS = {
+    "until": "end of the run [s]",
+    "outputs": "number of output times, with both ends",
+    "spacing": "of the output times",
+    "first": "first output time after 0 for logarithmic spacing [s]",
+    "times": "output times [s], instead of `until` and `outputs`",
+    "accuracy": "relative accuracy wanted, instead of `rtol`",
+    "rtol": "relative tolerance of each step",
+    "atol": "absolute tolerance relative to the scale of each state",
+    "solver": "integrator",
+    "max-steps": "most steps",
+    "max-seconds": "longest run time [s]",
+}
+
+
+def schema() -> Schema:
+    """The JSON Schema (draft 2020-12) of a case file."""
+    definitions = {"quantity": _quantity("a number in SI, or a number and a unit")}
+    for contract in CONTRACTS:
+        definitions |= {_key(contract, law): _law(law) for law in laws.laws(contract).values()}
+        definitions[contract.contract] = _any_law(contract)
+    definitions["history"] = {"anyOf": [_ref("quantity"), _ref(Load.contract)]}
+    definitions["temperature"] = {
+        "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a history",
+        "anyOf": [{"type": "string", "pattern": f"^{NODE.pattern}$"}, _ref("history")],
+    }
+    properties = _top()
+    assert set(properties) == set(TOP_KEYS)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "surfacechem case",
+        **_object(properties, required=("bodies", "run")),
+        "$defs": definitions,
+    }
+
+
+def text() -> str:
+    """The schema as JSON."""
+    return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _top() -> dict[str, Schema]:
+    variables = {name: {**_ref("history"), "description": _variable(name)} for name in LOADABLE}
+    return {
+        "title": _string("one line"),
+        "source": _string("where the case comes from"),
+        "description": _string("what the case shows"),
+        "T_0": _quantity("reference temperature [K]"),
+        "bodies": _bodies(),
+        "interface": _interface(),
+        "heat": _list(HeatTransfer, "heat paths"),
+        "surroundings": _object({"temperature": _ref("history")}, required=("temperature",)),
+        "loading": _object(variables, patterns={NODE.pattern: _ref("history")}),
+        "initial": _initial(),
+        "run": _run(),
+        "reference": _reference(),
+    }
+
+
+def _bodies() -> Schema:
+    kinds = laws.laws(BodyEnergy)
+    parameters = {name: _parameter(spec) for kind in kinds.values() for name, spec in kind.specs()}
+    capacity = {"description": "energy as a function of temperature", "enum": sorted(kinds), "default": "quadratic"}
+    body = _object({"temperature": _ref("temperature"), "capacity": capacity, **parameters}, required=("temperature",))
+    bodies = _object({}, patterns={BODY_NAME.pattern: body})
+    return {**bodies, "minProperties": 2, "maxProperties": 2, "description": "the two bodies; the first is body 1"}
+
+
+def _interface() -> Schema:
+    density = _quantity("density of bonding sites [1/m^2]")
+    bonds = {"type": "array", "items": {"type": "string"}, "description": "species that count as bonds"}
+    mechanism = _object({"file": _string("file"), "phase": _string("phase"), "bonds": bonds}, required=("file",))
+    reference = {"reference": _string("the body whose sites define phi")}
+    sides = {**_object(reference), "additionalProperties": density}
+    properties = {
+        "temperature": _ref("temperature"),
+        "sites": {"anyOf": [density, sides]},
+        "partition": _quantity("fraction of heat into body 1 where there is no medium"),
+        "potential": _list(Potential, "terms of the free energy"),
+        "friction": _list(Friction, "friction laws, whose tractions add up"),
+        "bonding": _list(RateLaw, "reactions, whose rates add up"),
+        "mechanism": {"description": "Cantera surface mechanism", "anyOf": [{"type": "string"}, mechanism]},
+    }
+    assert set(properties) == set(INTERFACE_KEYS)
+    return _object(properties)
+
+
+def _initial() -> Schema:
+    coverages = {"type": "object", "additionalProperties": _ref("quantity"), "description": "by species"}
+    properties = {"phi": _quantity("bonding state"), "coverages": coverages}
+    return _object(properties, patterns={NODE.pattern: _quantity("temperature [K]")})
+
+
+def _run() -> Schema:
+    times = {"type": "array", "items": _ref("quantity"), "minItems": 1}
+    whole = {"anyOf": [{"type": "integer", "minimum": 1}, {"type": "string", "pattern": "^[0-9]+$"}]}
+    special: dict[str, Schema] = {
+        "outputs": whole,
+        "max-steps": whole,
+        "spacing": {"enum": list(SPACINGS)},
+        "times": times,
+        "solver": {"enum": sorted(solvers.names)},
+    }
+    properties = {key: {**special.get(key, _ref("quantity")), "description": _TEXTS[key]} for key in RUN_KEYS}
+    return {**_object(properties), "anyOf": [{"required": ["until"]}, {"required": ["times"]}]}
+
+
+def _reference() -> Schema:
+    name = {"enum": references.names()}
+    options = {"type": "object", "properties": {"name": name}, "required": ["name"]}
+    return {"description": "exact solution to compare with", "anyOf": [name, options]}
+
+
+def _key(contract: type[Law], law: type[Law]) -> str:
+    return f"{contract.contract}.{law.name()}"
+
+
+def _any_law(contract: type[Law]) -> Schema:
+    """One law: ``name: {...}``, or the bare name where nothing is required."""
+    found = laws.laws(contract)
+    properties = {name: _ref(_key(contract, law)) for name, law in found.items()}
+    one = {**_object(properties), "minProperties": 1, "maxProperties": 1}
+    bare = [name for name, law in found.items() if not _required(law)]
+    return {"anyOf": [one, {"enum": bare}]} if bare else one
+
+
+def _law(law: type[Law]) -> Schema:
+    properties = {name: _option(law, name, meaning) for name, meaning in law.options()}
+    properties |= {name: _with_default(law, name, _parameter(spec)) for name, spec in law.specs()}
+    description = (law.__doc__ or "").strip().splitlines()[0]
+    found = {**_object(properties, required=_required(law)), "description": description}
+    return found if _required(law) else {**found, "type": ["object", "null"]}
+
+
+def _required(law: type[Law]) -> list[str]:
+    return [name for name in (*dict(law.options()), *dict(law.specs())) if _default(law, name) is dataclasses.MISSING]
+
+
+def _default(law: type[Law], name: str) -> Any:
+    return next(item.default for item in dataclasses.fields(law) if item.name == name)
+
+
+def _with_default(law: type[Law], name: str, entry: Schema) -> Schema:
+    default = _default(law, name)
+    return entry if default is dataclasses.MISSING else {**entry, "default": default}
+
+
+def _parameter(spec: Spec) -> Schema:
+    limits = {"exclusiveMinimum": spec.above, "minimum": spec.at_least, "maximum": spec.at_most}
+    number: Schema = {"type": "number", **{key: value for key, value in limits.items() if math.isfinite(value)}}
+    kinds: list[Schema] = [number, {"type": "string", "pattern": QUANTITY}]
+    if spec.varies:
+        factors = {"type": "array", "items": _ref(Factor.contract)}
+        kinds.append(_object({"value": _ref("quantity"), "times": factors}, required=("value",)))
+    return {"description": f"{spec.text} [{spec.unit}]", "anyOf": kinds}
+
+
+def _option(law: type[Law], name: str, meaning: str) -> Schema:
+    declared = typing.get_type_hints(law)[name]
+    origin, arguments = typing.get_origin(declared), typing.get_args(declared)
+    entry: Schema = {}
+    if declared is str:
+        entry = {"type": "string"}
+    elif origin is typing.Literal:
+        entry = {"enum": list(arguments)}
+    elif origin is tuple and Ellipsis not in arguments:
+        entry = {"type": "array", "items": {"type": "string"}, "minItems": len(arguments), "maxItems": len(arguments)}
+    elif origin is not None and float in arguments:
+        entry = {"type": "array", "items": _ref("quantity")}
+    return _with_default(law, name, {**entry, "description": meaning})
+
+
+def _variable(name: str) -> str:
+    return f"{VARIABLES[name].long_name} [{VARIABLES[name].unit}]"
+
+
+def _list(contract: type[Law], description: str) -> Schema:
+    return {"type": ["array", "null"], "items": _ref(contract.contract), "description": description}
+
+
+def _quantity(description: str) -> Schema:
+    return {"description": description, "anyOf": [{"type": "number"}, {"type": "string", "pattern": QUANTITY}]}
+
+
+def _string(description: str) -> Schema:
+    return {"type": "string", "description": description}
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _object(
+    properties: dict[str, Schema], required: Iterable[str] = (), patterns: dict[str, Schema] | None = None
+) -> Schema:
+    found: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    if patterns:
+        found["patternProperties"] = {f"^{pattern}$": entry for pattern, entry in patterns.items()}
+    return {**found, "required": list(required)} if list(required) else found

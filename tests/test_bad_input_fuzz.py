@@ -1,0 +1,131 @@
+"""Whatever stands in a case file, it loads and assembles or is an input error; nothing else escapes."""
+
+from contextlib import suppress
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from surfacechem import document
+from surfacechem.case import load, load_text, names
+from surfacechem.errors import InputError, Place
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 400),
+    st.floats(),
+    st.sampled_from([10**400, -1e308, 5e-324, 1e18, "1e18"]),
+    st.sampled_from(
+        ["", "T", "T_1", "T_2", "T_c", "T_a", "phi", "300 K", "25 C", "1 kJ/m^2/K", "3 m", "0 s", "-1", "."]
+    ),
+    st.sampled_from(["coulomb", "lower", "interface", "logarithmic", "constant", "power", "[", "{", "a: b", "*", "&"]),
+    st.text(max_size=6),
+    st.sampled_from([[], {}, [[]], {"value": 3}, {"value": 1, "times": []}, {"ramp": {"rate": 1}}, ["coulomb"]]),
+    st.just({"hold": {"level": 300}}),
+    st.just({"harmonic": {"amplitude": 3, "frequency": "1 Hz"}}),
+)
+KEYS = [
+    *("T_0", "bodies", "interface", "temperature", "sites", "partition", "potential", "friction", "bonding", "heat"),
+    *("loading", "initial", "run", "until", "T", "T_1", "phi", "v", "p", "g_n", "J_c", "Q_1", "coulomb", "value", "C"),
+    *("times", "of", "between", "h", "mechanism", "coverages", "reference", "capacity", "surroundings", "", "a.b"),
+]
+SAMPLES = [name for name in names() if "kappa" not in name]
+
+
+def places_of(value, path=()):
+    """The path of every value of a document."""
+    yield path
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, child in entries:
+        yield from places_of(child, (*path, key))
+
+
+def changed(value, path, change):
+    """The document with the value at a path replaced; None removes it."""
+    if not path:
+        return change(value)
+    if isinstance(value, dict):
+        return {**value, path[0]: changed(value[path[0]], path[1:], change)}
+    return [changed(child, path[1:], change) if i == path[0] else child for i, child in enumerate(value)]
+
+
+def without(value, data):
+    """A mapping or list without one of its entries."""
+    if isinstance(value, dict) and value:
+        gone = data.draw(st.sampled_from(sorted(value)))
+        return {key: child for key, child in value.items() if key != gone}
+    return value[:-1] if isinstance(value, list) else value
+
+
+def renamed(value, data):
+    """A mapping with an entry under another key."""
+    if not isinstance(value, dict) or not value:
+        return value
+    old, new = data.draw(st.sampled_from(sorted(value))), data.draw(st.sampled_from(KEYS))
+    return {new if key == old else key: child for key, child in value.items()}
+
+
+def mutated(plain, data):
+    path = data.draw(st.sampled_from(list(places_of(plain))))
+    kind = data.draw(st.sampled_from(["replace", "remove", "rename", "add", "repeat"]))
+    if kind == "replace":
+        new = data.draw(VALUES)
+        return changed(plain, path, lambda _: new)
+    if kind == "remove":
+        return changed(plain, path, lambda value: without(value, data))
+    if kind == "rename":
+        return changed(plain, path, lambda value: renamed(value, data))
+    if kind == "add":
+        key, new = data.draw(st.sampled_from(KEYS)), data.draw(VALUES)
+        return changed(plain, path, lambda value: {**value, key: new} if isinstance(value, dict) else value)
+    return changed(plain, path, lambda value: value * 2 if isinstance(value, list) else value)
+
+
+def refusal(text):
+    """The error of a text that is no case, else None."""
+    try:
+        load_text(text, "fuzz").system()
+    except InputError as error:
+        return error
+    return None
+
+
+def loads_or_is_refused(text):
+    error = refusal(text)
+    if error is not None:
+        assert error.place.file.endswith(".yaml"), error  # the mechanism's, where the mistake is in there
+        assert "\n" not in str(error)
+
+
+@given(name=st.sampled_from(SAMPLES), data=st.data())
+@settings(max_examples=300, suppress_health_check=list(HealthCheck))
+def test_mutated_documents(name, data):
+    plain = document.parse(load(name).text).plain()
+    for _ in range(data.draw(st.integers(1, 3))):
+        plain = mutated(plain, data)
+    loads_or_is_refused(document.dump(document.from_plain(plain, Place())))
+
+
+@given(name=st.sampled_from(SAMPLES), data=st.data())
+@settings(max_examples=200, suppress_health_check=list(HealthCheck))
+def test_mutated_texts(name, data):
+    text = load(name).text
+    for _ in range(data.draw(st.integers(1, 4))):
+        start = data.draw(st.integers(0, len(text)))
+        end = min(len(text), start + data.draw(st.integers(0, 12)))
+        text = text[:start] + data.draw(st.text("aT0 .:-[]{}#&*!|>'\"%@\n\t\0e", max_size=6)) + text[end:]
+    loads_or_is_refused(text)
+
+
+@given(st.text())
+def test_any_text(text):
+    with suppress(InputError):
+        document.parse(text)
+
+
+@given(name=st.sampled_from(SAMPLES), path=st.lists(st.sampled_from(KEYS), max_size=4), value=VALUES)
+def test_any_override(name, path, value):
+    with suppress(InputError):
+        load(name, {".".join(path): value}).system()
+    with suppress(InputError):
+        load(name, [f"{'.'.join(path)}={value}"]).system()
