@@ -25,7 +25,7 @@ compiled: Any = _njit(error_model="numpy", _nrt=False)
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
 """Rows of the table of addresses (code, user data)."""
 
-ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION = range(12)
+ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = range(13)
 """Rows of the vectors of length n."""
 Q, Q_TRIAL, Q_CORRECTION = range(3)
 """Rows of the vectors of length n_ledger."""
@@ -173,7 +173,7 @@ def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_marg
         np.zeros(1 + 2 * n + n_parameters),
         np.zeros(10),
         np.zeros(11, np.int64),
-        np.zeros((12, n)),
+        np.zeros((13, n)),
         np.zeros((7, n)),
         np.zeros((7, n)),
         np.zeros((7, n)),

@@ -37,6 +37,7 @@ from surfacechem.solvers.native import (
     finite,
     set_inputs,
 )
+from surfacechem.solvers.noise import correction_is_noise
 from surfacechem.solvers.radau_tables import (
     GAMMA,
     INVERSE,
@@ -153,7 +154,7 @@ def _stage_residuals(w: Any, h: float) -> bool:
 
 @compiled
 def _correct(w: Any) -> float:
-    """One Newton correction of all stages; returns its weighted maximum norm."""
+    """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
     k = w.count[MEMBER]
     s = stage_count(k)
     n = w.algebraic.shape[0]
@@ -179,6 +180,7 @@ def _correct(w: Any) -> float:
                 column, value = PAIR_COLUMNS[k, i, pair], w.pairs[pair, m]
                 change += column.real * value.real - column.imag * value.imag
             w.z[i, m] += change
+            w.g[i, m] = change
             size = abs(change) / w.vector[WEIGHT, m]
             # Not max(): a NaN must reach the caller.
             if not size <= norm:
@@ -208,12 +210,10 @@ def solve_stages(w: Any, h: float) -> int:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
+            if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > TIGHT:
+                return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
             w.clock[THETA] = rate
-            if rate >= 0.99:
-                return CONVERGED if norm <= min(1e3 * rounding, 1.0) else DIVERGED
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
-            if contraction * norm * rate ** (limit - 1 - iteration) > max(TIGHT, 100.0 * rounding):
-                return DIVERGED
         if contraction * norm <= TIGHT or norm <= 8.0 * rounding:
             w.clock[CONTRACTION] = contraction
             return CONVERGED

@@ -19,6 +19,7 @@ from surfacechem.solvers.native import (
     ERROR,
     LOOSE,
     MEMBER,
+    NOISE,
     RESIDUAL,
     RESIDUALS,
     ROUNDING,
@@ -37,6 +38,7 @@ from surfacechem.solvers.native import (
     finite,
     set_inputs,
 )
+from surfacechem.solvers.noise import find_noise
 from surfacechem.solvers.radau_stages import stage_count
 from surfacechem.solvers.radau_tables import START_SLOPE
 
@@ -44,6 +46,10 @@ SAFETY = 0.9
 GROWTH = 8.0
 SHRINK = 0.1
 TINIEST = 1e-290
+MAGNIFIED = 10.0
+"""Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
+NOISY = 0.05
+"""Error assumed where the estimate is noise, so that the step grows slowly."""
 
 
 @compiled
@@ -86,13 +92,14 @@ def _filter(w: Any) -> bool:
 
 
 @compiled
-def _error_norm(w: Any) -> float:
+def _error_norm(w: Any, floor: float) -> float:
+    """Norm of the part of the error above so many times the noise."""
     norm = 0.0
     last = stage_count(w.count[MEMBER]) - 1
     for j in range(w.algebraic.shape[0]):
         size = max(abs(w.vector[Y, j]), abs(w.vector[Y, j] + w.z[last, j]))
         weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINIEST)
-        norm = max(norm, abs(w.vector[ERROR, j]) / weight)
+        norm = max(norm, (abs(w.vector[ERROR, j]) - floor * w.vector[NOISE, j]) / weight)
     return norm / w.clock[LOOSE]
 
 
@@ -110,12 +117,16 @@ def estimate_error(w: Any, h: float, again: bool) -> float:
     set_inputs(w, w.vector[Y], w.vector[DELTA])
     if not _filter(w):
         return np.inf
-    norm = _error_norm(w)
+    norm = _error_norm(w, 0.0)
+    if norm < NOISY:
+        return norm
+    find_noise(w)
+    norm = max(_error_norm(w, MAGNIFIED), NOISY)
     if norm >= 1.0 and again:
         for m in range(n):
             w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
         if _filter(w):
-            return min(norm, _error_norm(w))
+            return min(norm, max(_error_norm(w, MAGNIFIED), NOISY))
     return norm
 
 

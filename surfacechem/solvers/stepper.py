@@ -14,6 +14,7 @@ _SOURCES = (
     "contract",
     "native",
     "lu",
+    "noise",
     "radau_tables",
     "radau_stages",
     "radau_step",

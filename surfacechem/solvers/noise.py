@@ -1,0 +1,56 @@
+"""What rounding errors of the residual do to the solution of one step.
+
+Where large terms of an equation cancel, the residual is known only to the rounding of those terms, and no correction
+or error estimate can be smaller than its image under the inverse Newton matrix. The floor is found when a step is
+about to fail, so smooth runs do not pay for it.
+"""
+
+from typing import Any
+
+from surfacechem.solvers.lu import solve
+from surfacechem.solvers.native import DELTA, MEMBER, NOISE, SCALE, YDOT, Y, compiled
+from surfacechem.solvers.radau_tables import GAMMA
+
+ULPS = 4.4e-16
+"""Rounding of a term: its own, and that of the sum it enters."""
+
+LARGEST = 1e-6
+"""Noise above this part of a variable would mean a singular matrix, not rounding."""
+
+
+@compiled
+def _row_noise(w: Any, i: int) -> float:
+    """Rounding error of equation i, whose terms are as large as its derivatives times their variables."""
+    total = 0.0
+    for j in range(w.algebraic.shape[0]):
+        total += abs(w.jacobian[0, i, j] * w.vector[Y, j]) + abs(w.jacobian[1, i, j] * w.vector[YDOT, j])
+    return ULPS * total
+
+
+@compiled
+def find_noise(w: Any) -> None:
+    """Largest change of each variable that rounding errors of the residuals can cause, into NOISE."""
+    n = w.algebraic.shape[0]
+    column = w.vector[DELTA]
+    for j in range(n):
+        w.vector[NOISE, j] = ULPS * abs(w.vector[Y, j])
+    for i in range(n):
+        for j in range(n):
+            column[j] = 0.0
+        column[i] = _row_noise(w, i)
+        solve(w.real, w.order[0], column)
+        for j in range(n):
+            w.vector[NOISE, j] += abs(column[j])
+    for j in range(n):
+        w.vector[NOISE, j] = min(w.vector[NOISE, j], LARGEST * w.vector[SCALE, j])
+
+
+@compiled
+def correction_is_noise(w: Any, stages: int) -> bool:
+    """Whether Newton's last correction, kept in g, is no larger than the noise, magnified by the method."""
+    find_noise(w)
+    for i in range(stages):
+        for j in range(w.algebraic.shape[0]):
+            if not abs(w.g[i, j]) <= 2.0 * GAMMA[w.count[MEMBER]] * w.vector[NOISE, j]:
+                return False
+    return True
