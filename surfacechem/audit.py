@@ -97,8 +97,10 @@ class _Books:
         return self.outputs[:, columns] - self.outputs[:1, columns]
 
     def residual(self, total: str, kinds: tuple[str, ...]) -> Array:
-        values = self.column(total)
-        return values - values[:1] - sum(self.booked(kind).sum(axis=1) for kind in kinds)
+        residual = self.column(total) - self.column(total)[:1]
+        for kind in kinds:
+            residual = residual - self.booked(kind).sum(axis=1)
+        return residual
 
     def audit(self) -> Audit:
         exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation")]
@@ -119,8 +121,11 @@ class _Books:
         accounts = [(j, a.law) for j, a in enumerate(self.system.ledger) if a.kind == "bonds"]
         states = [state.name for state in self.system.states]
         y = self.trajectory.result.outputs
-        residuals = [y[:, states.index(n)] - y[:1, states.index(n)] - self.ledger[:, j] for j, n in accounts]
-        return np.max(np.abs(residuals), axis=0) if residuals else np.zeros(len(y))
+        residuals = np.zeros((len(y), 1 + len(accounts)))
+        for k, (j, name) in enumerate(accounts):
+            bonds = y[:, states.index(name)]
+            residuals[:, k] = np.abs(bonds - bonds[:1] - self.ledger[:, j])
+        return np.asarray(residuals.max(axis=1))
 
     def production(self) -> tuple[dict[str, float], dict[str, float]]:
         """Least and largest entropy production of each law over outputs and steps."""

@@ -152,7 +152,8 @@ class Model:
             return "stopped", f"{shrunk} near {where}"
         if result.status is Status.NO_CONSISTENT_STATE and any(state.algebraic for state in self.system.states):
             names = ", ".join(state.name for state in self.system.states if state.algebraic)
-            return "stopped", f"ignition: no temperature {names} balances the heat that the interface produces, at {where}"
+            reason = f"ignition: no temperature {names} balances the heat that the interface produces"
+            return "stopped", f"{reason} at {where}"
         return "failed", f"{result.message}"
 
     def _closest_margin(self, result: Result) -> str | None:
@@ -167,7 +168,8 @@ class Model:
 
     def _margins(self, result: Result, step: int) -> Array:
         steps = result.steps
-        assert steps is not None and self.program.margins is not None
+        assert steps is not None
+        assert self.program.margins is not None
         parameters = result.problem.parameters[0 if step == 0 else -1]
         inputs = np.concatenate([[steps.t[step]], steps.y[step], steps.ydot[step], parameters])
         return self.program.margins(inputs)

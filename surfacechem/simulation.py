@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import case as cases
-from surfacechem.case import Case
+from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError, suggestion
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solution import Accuracy, Solution
@@ -75,21 +76,25 @@ class Simulation:
     def _accuracy(self, trajectory: Trajectory) -> Accuracy | None:
         if len(trajectory.result.times) == 0:
             return None
-        return self._against_exact(trajectory) if self.case.reference else self._against_tighter(trajectory)
+        if self.case.reference is None:
+            return self._against_tighter(trajectory)
+        try:
+            return self._against_exact(trajectory, self.case.reference)
+        except InputError as error:
+            estimate = self._against_tighter(trajectory)
+            unused = f"the exact solution {self.case.reference.name} is not of this scene: {error.message}"
+            return replace(estimate, source=f"{estimate.source}; {unused}")
 
-    def _against_exact(self, trajectory: Trajectory) -> Accuracy:
+    def _against_exact(self, trajectory: Trajectory, named: Reference) -> Accuracy:
         from surfacechem.references.matching import exact_values
 
-        named = self.case.reference
-        assert named is not None
-        title, exact = exact_values(named.name, named.options, named.place, self.case.scene.heat, trajectory)
+        exact = exact_values(named.name, named.options, self.case.scene.heat, trajectory)
         columns, states = computed(trajectory), _states(trajectory)
         errors = {
             name: relative_error(columns[name], values, FLOOR if name in states else 1.0)
             for name, values in exact.items()
-            if name in columns
         }
-        return Accuracy(max(errors.values()), title, errors, {name: exact[name] for name in errors})
+        return Accuracy(max(errors.values()), f"exact solution {named.name}", errors, exact)
 
     def _against_tighter(self, trajectory: Trajectory) -> Accuracy:
         tolerance = max(trajectory.run.rtol * TIGHTER, TIGHTEST)

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -207,6 +207,7 @@ class Solution:
         return target
 
 
+@cache
 def _versions() -> str:
     names = ("surfacechem", "numpy", "numba", "symengine")
     return ", ".join(f"{name} {version(name)}" for name in names)

@@ -134,14 +134,14 @@ class Law(ABC):
     @classmethod
     def specs(cls) -> Iterator[tuple[str, Spec]]:
         """Names and specifications of the numeric parameters."""
-        for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+        for item in dataclasses.fields(cls):
             if "spec" in item.metadata:
                 yield item.name, item.metadata["spec"]
 
     @classmethod
     def options(cls) -> Iterator[tuple[str, str]]:
         """Names and meanings of the structural fields."""
-        for item in dataclasses.fields(cls):  # type: ignore[arg-type]
+        for item in dataclasses.fields(cls):
             if "option" in item.metadata:
                 yield item.name, item.metadata["option"]
 
@@ -151,7 +151,7 @@ class Law(ABC):
 
     def is_default(self, name: str) -> bool:
         """Whether a parameter was left at its default, so that it is a constant of the formula."""
-        default = next(item.default for item in dataclasses.fields(self) if item.name == name)  # type: ignore[arg-type]
+        default = next(item.default for item in dataclasses.fields(self) if item.name == name)
         return bool(getattr(self, name) == default)
 
     def bind(self, values: Mapping[str, Expression]) -> Self:

@@ -41,7 +41,7 @@ def test_maxwell_relations():
     point = laws.consistent_point(system, 0) | {g: mpmath.mpf(1e-6), symengine.Symbol("g_t"): mpmath.mpf(1e-7)}
     for left, right in [(t_n.diff(phi), M.diff(g)), (S.diff(g), -t_n.diff(T)), (S.diff(phi), -M.diff(T))]:
         assert laws.number(left, point) != 0
-        assert laws.closes(left, [right], point)
+        assert laws.closes([left], [right], point)
 
 
 def item(system, name):

@@ -80,35 +80,32 @@ def consistent_point(system: System, seed: int) -> dict:
     raise AssertionError("no consistent point")
 
 
-def rate(system: System, name: str):
-    """Time derivative of a named quantity that depends on t and the states."""
+def rate(system: System, name: str) -> list:
+    """Terms of the time derivative of a named quantity that depends on t and the states."""
     total = system.expand(symengine.Symbol(name))
-    result = symengine.diff(total, system.t)
-    for state in system.states:
-        result += symengine.diff(total, state.symbol) * state.dot
-    return result
+    slopes = [symengine.diff(total, state.symbol) * state.dot for state in system.states]
+    return [symengine.diff(total, system.t), *slopes]
 
 
 def booked(system: System, *kinds: str) -> list:
     return [system.expand(account.rate) for account in system.ledger if account.kind in kinds]
 
 
-def closes(total, parts, point) -> bool:
-    """Whether the total is the sum of its parts, relative to the largest of them."""
-    values = [number(part, point) for part in parts]
-    whole = number(total, point)
-    scale = max([abs(whole), *(abs(value) for value in values)], default=mpmath.mpf(0))
-    return bool(abs(whole - sum(values)) <= scale * mpmath.mpf(10) ** -DIGITS)
+def closes(totals, parts, point, digits: int = DIGITS) -> bool:
+    """Whether the totals add up to the parts, relative to the largest of them."""
+    left, right = ([number(term, point) for term in terms] for terms in (totals, parts))
+    scale = max(abs(value) for value in [*left, *right])
+    return bool(abs(sum(left) - sum(right)) <= scale * mpmath.mpf(10) ** -digits)
 
 
-def first_law_holds(system: System, point) -> bool:
+def first_law_holds(system: System, point, digits: int = DIGITS) -> bool:
     """dE/dt is what is supplied."""
-    return closes(rate(system, "E_total"), booked(system, "energy supply"), point)
+    return closes(rate(system, "E_total"), booked(system, "energy supply"), point, digits)
 
 
-def second_law_holds(system: System, point) -> bool:
+def second_law_holds(system: System, point, digits: int = DIGITS) -> bool:
     """dS/dt is what is supplied and produced."""
-    return closes(rate(system, "S_total"), booked(system, "entropy supply", "entropy production"), point)
+    return closes(rate(system, "S_total"), booked(system, "entropy supply", "entropy production"), point, digits)
 
 
 def productions(system: System, point) -> dict[str, mpmath.mpf]:

@@ -1,0 +1,98 @@
+"""Every shipped case runs to a true status, meets its exact solution, and its equations obey both laws."""
+
+import numpy as np
+import pytest
+import thermodynamics as laws
+
+import surfacechem
+from surfacechem.case import names
+from surfacechem.simulation import Simulation
+
+STOPPED = {"cooling-to-zero": "the temperature T reached zero"}
+"""Cases that end early, and why."""
+
+every_case = pytest.mark.parametrize("name", names())
+
+
+@pytest.fixture(scope="module")
+def simulations() -> dict[str, Simulation]:
+    return {}
+
+
+def load(simulations, name) -> Simulation:
+    return simulations.setdefault(name, surfacechem.load(name))
+
+
+@every_case
+def test_runs_to_a_true_status_with_closed_balances(simulations, name):
+    solution = load(simulations, name).run()
+    assert solution.status == ("stopped" if name in STOPPED else "finished")
+    assert STOPPED.get(name, "reached the end") in solution.reason
+    assert solution.audit.energy_error < 1e-9
+    assert solution.audit.violations == ()
+    assert all(np.isfinite(column.values).all() for column in solution.columns if column.values.dtype == float)
+
+
+@every_case
+def test_meets_its_exact_solution(simulations, name):
+    simulation = load(simulations, name)
+    accuracy = simulation.run().accuracy
+    if simulation.case.reference:
+        assert accuracy.source == f"exact solution {simulation.case.reference.name}"
+        assert accuracy.error < 1e-8
+    else:
+        assert accuracy.source.startswith("estimate")
+        assert accuracy.error < 1e-7
+
+
+@every_case
+def test_both_laws_hold_on_the_equations(simulations, name):
+    system = load(simulations, name).system
+    point = laws.consistent_point(system, 0)
+    digits = 12 if load(simulations, name).case.mechanism_text else laws.DIGITS  # a mechanism's constants are doubles
+    assert laws.first_law_holds(system, point, digits)
+    assert laws.second_law_holds(system, point, digits)
+
+
+def test_a_repeated_run_has_the_same_bytes(simulations):
+    first, second = (load(simulations, "exothermic").run() for _ in range(2))
+    for a, b in zip(first.columns, second.columns, strict=True):
+        assert np.array_equal(a.values, b.values)
+
+
+def test_a_run_with_changed_parameters_compiles_nothing(simulations, monkeypatch):
+    simulation = load(simulations, "exothermic")
+    simulation.run()
+    monkeypatch.setattr("surfacechem.compile.symengine.Lambdify", None)
+    hotter = simulation.run({"interface.potential.bond-energy.K_0": "600 J/m^2", "initial.phi": 0.1})
+    assert hotter.status == "finished"
+    assert hotter.dataset["T"][-1] > 400
+
+
+def test_changed_parameters_give_what_the_changed_case_gives(simulations):
+    path = "bodies.lower.C"
+    changed = load(simulations, "exothermic").run({path: "2 J/m^2/K"})
+    overridden = surfacechem.run("exothermic", {path: "2 J/m^2/K"})
+    assert changed.accuracy.error < 1e-8
+    for a, b in zip(changed.columns, overridden.columns, strict=True):
+        assert np.array_equal(a.values, b.values)
+
+
+def test_an_exact_solution_of_another_scene_is_not_used(simulations):
+    accuracy = load(simulations, "exothermic").run({"initial.T": 350.0}).accuracy
+    assert accuracy.source.startswith("estimate: a second run")
+    assert "it starts from T = 300, the scene from 350" in accuracy.source
+    other = surfacechem.run("exothermic", ["bodies.upper.capacity=constant"]).accuracy
+    assert "it misses the equation of T by" in other.source
+
+
+def test_the_error_estimate_is_true(simulations):
+    """Without its exact solution a case estimates its error; the estimate is within a factor of ten of the error."""
+    simulation = load(simulations, "exothermic")
+    trajectory = simulation.model.solve(simulation.case.run)
+    exact, estimate = (
+        simulation._against_exact(trajectory, simulation.case.reference),
+        simulation._against_tighter(trajectory),
+    )
+    for name in estimate.variables:
+        assert 0.1 < estimate.variables[name] / exact.variables[name] < 10
