@@ -209,5 +209,10 @@ def test_errors_of_the_assembly_have_a_place():
     with pytest.raises(InputError, match=r"^cases/sliding-dry.yaml:12: interface.friction.coulomb: the law coulomb re"):
         broken.system()
     broken = load("endothermic", {"initial": {"phi": 0}})
-    with pytest.raises(InputError, match=r"^override: initial: initial: T evolves but has no initial value"):
+    with pytest.raises(InputError, match=r"^override: initial: T evolves but has no initial value\. Add `T:` under"):
+        broken.system()
+    broken = load("sliding-dry", {"bodies.lower": {"temperature": "T_1"}, "initial": {"T": 300}})
+    with pytest.raises(
+        InputError, match=r"^override: bodies.lower: nothing evolves or prescribes T_1: give lower a he"
+    ):
         broken.system()

@@ -30,6 +30,14 @@ TOP_KEYS = (
     *("loading", "initial", "run", "reference"),
 )
 
+SECTIONS = (
+    (r"(initial|loading|heat|interface): ", r"\1"),
+    (r"initial (\w+) =", r"initial.\1"),
+    (r"nothing evolves or prescribes \w+: give ([\w-]+) a heat capacity", r"bodies.\1"),
+    (r".*interface's potential", "interface"),
+)
+"""What messages of the assembly speak of, as a path in the case."""
+
 Overrides = Sequence[str] | Mapping[str, object]
 
 
@@ -60,9 +68,12 @@ class Case:
         """The error at the place that it speaks of, at least with the file."""
         if error.place is not None:
             return error
-        section = re.match(r"(initial) (\w+) =|(initial|loading|heat|interface)\b", error.message)
-        path = ".".join(part for part in section.groups() if part) if section else ""
-        return error.at(self.places.get(path, Place(self.file)))
+        for pattern, path in SECTIONS:
+            found = re.match(pattern, error.message)
+            place = self.places.get(found.expand(path)) if found else None
+            if found and place is not None:
+                return InputError(error.message.removeprefix(f"{place.path}: "), place)
+        return error.at(Place(self.file))
 
 
 def load(name: str | Path, overrides: Overrides = ()) -> Case:
