@@ -177,18 +177,13 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
         yield Group("t_growth", 1 / rising.max(), "s", "a disturbance grows by e in this time at the start")
 
 
-def warnings(system: System, scene: Scene) -> list[str]:
+def warnings(system: System) -> list[str]:
     """What is given but has no effect, beside what the assembly found."""
     read = {
         symbol for row in [*system.residual(), *map(system.expand, _audited(system))] for symbol in row.free_symbols
     }
-    states = {state.name for state in system.states}
     idle = [p for p in system.parameters if p.symbol not in read and not p.path.startswith(("run.", "initial."))]
-    return [
-        *system.warnings,
-        *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle),
-        *(f"initial: {name} is given but is no state." for name in scene.initial if name not in states),
-    ]
+    return [*system.warnings, *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle)]
 
 
 def _audited(system: System) -> list[object]:

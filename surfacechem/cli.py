@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
+from surfacechem.guard import interruptible, refuse_unwritable
 
 if TYPE_CHECKING:
     from surfacechem.integrate import Run
     from surfacechem.simulation import Simulation
     from surfacechem.solution import Solution
-
-R = TypeVar("R")
 
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 """Exit code of each way in which a run ends."""
@@ -104,14 +101,13 @@ def run(
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.simulation import load
-    from surfacechem.solution import replacing
 
     simulation = load(case, changes or ())
     settings = _settings(simulation, solver, rtol)
     target = output or Path(f"{simulation.case.name}.nc")
-    with replacing(target) as temporary:  # refuses a place that cannot be written before anything is computed
-        solution = _solved(simulation, settings, quiet)
-        solution.write(temporary)
+    refuse_unwritable(target)
+    solution = _solved(simulation, settings, quiet)
+    solution.write(target)
     _conclude(solution, target, quiet)
 
 
@@ -139,26 +135,6 @@ def _solved(simulation: Simulation, settings: Run, quiet: bool) -> Solution:
         return simulation.run(run=settings)
 
     return interruptible(work)
-
-
-def interruptible(work: Callable[[], R]) -> R:
-    """Do the work in another thread, so that an interrupt is answered while compiled code runs."""
-    done: list[R] = []
-    failed: list[BaseException] = []
-
-    def task() -> None:
-        try:
-            done.append(work())
-        except BaseException as error:
-            failed.append(error)
-
-    thread = threading.Thread(target=task, daemon=True)
-    thread.start()
-    while thread.is_alive():
-        thread.join(0.5)
-    if failed:
-        raise failed[0]
-    return done[0]
 
 
 def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
@@ -189,7 +165,7 @@ def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rt
     except InputError as error:
         raise simulation.case.located(error) from None
     numbers = groups(model, scene, values, settings.times[-1])
-    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, warnings(system, scene)))
+    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, warnings(system)))
 
 
 @app.command()
@@ -256,10 +232,12 @@ def plot(
     from surfacechem import plots
     from surfacechem.solution import replacing
 
+    refuse_unwritable(target)
+    solution = None if is_file else _solved_case(source, changes)
+    chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
+    figure = plots.figure(solution.dataset if solution else Path(source), chosen)
     with replacing(target) as temporary:
-        solution = None if is_file else _solved_case(source, changes)
-        chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
-        plots.save(plots.figure(solution.dataset if solution else Path(source), chosen), temporary, kind)
+        plots.save(figure, temporary, kind)
     typer.echo(str(target))
     if solution and STATUS[solution.status]:
         typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
@@ -280,17 +258,15 @@ def rerun(
     quiet: Quiet = False,
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""
-    from contextlib import nullcontext
-
     from surfacechem import rerun as again
-    from surfacechem.solution import replacing
 
     record = again.read(file)
     simulation, settings = again.simulation(record)
-    with replacing(output) if output else nullcontext() as temporary:
-        solution = _solved(simulation, settings, quiet)
-        if temporary:
-            solution.write(temporary)
+    if output:
+        refuse_unwritable(output)
+    solution = _solved(simulation, settings, quiet)
+    if output:
+        solution.write(output)
     different = again.differences(record, solution)
     if different:
         typer.echo(f"surfacechem: {file}: {len(different)} variables differ: {', '.join(different)}", err=True)

@@ -153,7 +153,9 @@ def _usual(dataset: xarray.Dataset) -> list[Panel]:
 def _varies(values: Array) -> bool:
     """Whether a curve is more than a constant with rounding."""
     finite = values[np.isfinite(values)]
-    return len(finite) == 1 or bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))
+    if len(finite) < 2:
+        return len(finite) == 1
+    return bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))
 
 
 def _chosen(dataset: xarray.Dataset, variables: Sequence[str]) -> list[Panel]:

@@ -18,7 +18,7 @@ FLOORS = {
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
     "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
-    "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "cli", "__init__", "__main__"],
+    "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*"]

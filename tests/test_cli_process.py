@@ -1,0 +1,96 @@
+"""The command as a process: what it imports, how it ends, how it is interrupted."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+HEAVY = ("xarray", "matplotlib", "CoolProp", "cantera", "sympy", "pandas", "dask", "sksundae")
+LONG = """\
+title: Rubbing for a very long time
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 1 MJ/m^2/K}
+  upper: {temperature: T, C: 1 MJ/m^2/K}
+interface:
+  friction:
+    - coulomb: {mu: 0.3}
+loading:
+  p: 1 kPa
+  v: {harmonic: {amplitude: 1 mm/s, frequency: 100 1/s}}
+initial: {T: 280 K}
+run: {until: 100000 s, outputs: 2, max-steps: 1000000000}
+"""
+
+
+def surfacechem(*arguments, folder):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+
+
+def imported(code, folder):
+    """Modules after some code, as a process of its own sees them."""
+    guarded = f"try:\n    {code}\nexcept SystemExit as end:\n    assert not end.code, end.code"
+    script = f"import sys\n{guarded}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_run_imports_only_what_it_needs(tmp_path):
+    found = imported("from surfacechem.cli import app; app(['run', 'exothermic', '-q'])", tmp_path)
+    assert (tmp_path / "exothermic.nc").exists()
+    assert {"numba", "netCDF4", "symengine"} <= found
+    assert not found & set(HEAVY)
+
+
+def test_the_command_line_itself_imports_little(tmp_path):
+    found = imported("import surfacechem.cli", tmp_path)
+    assert not found & {"numpy", "symengine", "numba", "netCDF4", "pint", "pydantic", "rich", "ruamel.yaml", *HEAVY}
+
+
+def test_run_as_a_process(tmp_path):
+    done = surfacechem("run", "exothermic", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "exact solution exothermic-bonding" in done.stdout
+    assert done.stderr == "" or done.stderr.startswith("compiling the stepper")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["run", "nothing"], 2),
+        (["run", "exothermic", "--set", "initial.T=0 K"], 2),
+        (["run"], 2),
+        (["nonsense"], 2),
+        (["run", "cooling-to-zero", "-q"], 3),
+        (["run", "exothermic", "-q", "--set", "run.max-steps=1"], 4),
+    ],
+)
+def test_exit_codes_come_without_traceback(tmp_path, arguments, code):
+    done = surfacechem(*arguments, folder=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to one process")
+def test_interrupt_ends_a_long_run_at_once_and_writes_nothing(tmp_path):
+    (tmp_path / "long.yaml").write_text(LONG)
+    surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
+    command = [sys.executable, "-m", "surfacechem", "run", "long.yaml"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        time.sleep(5.0)
+        assert process.poll() is None, process.communicate()
+        start = time.perf_counter()
+        process.send_signal(signal.SIGINT)
+        out, error = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert time.perf_counter() - start < 5.0
+    assert (process.returncode, out) == (130, "")
+    assert error == "surfacechem: interrupted; nothing was written.\n"
+    assert {path.name for path in tmp_path.iterdir()} == {"long.yaml", "exothermic.nc"}
