@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 CONVENTIONS = "CF-1.11"
 
+DATASET_NAMES = {"Q_1": "Q_ext_1", "Q_2": "Q_ext_2", "Q_c": "Q_ext_c"}
+"""Names that differ in the dataset, where no two may be the same but for their case."""
+
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -112,7 +115,14 @@ class Solution:
         values = self.trajectory.outputs
         items = self.trajectory.model.system.outputs
         return [
-            Column(i.name, ("time",), values[:, j], i.quantity.unit, i.quantity.long_name, i.quantity.tag)
+            Column(
+                DATASET_NAMES.get(i.name, i.name),
+                ("time",),
+                values[:, j],
+                i.quantity.unit,
+                i.quantity.long_name,
+                i.quantity.tag,
+            )
             for j, i in enumerate(items)
         ]
 
@@ -171,6 +181,7 @@ class Solution:
             "Conventions": CONVENTIONS,
             "title": self.title,
             "source": self.source or "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
             "case": self.case,
             **({"mechanism": self.mechanism} if self.mechanism else {}),
             "status": self.status,

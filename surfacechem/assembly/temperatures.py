@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 
 import symengine
@@ -37,8 +38,11 @@ def temperatures(build: Build) -> None:
 
 
 def _join(build: Build, variable: str, temperature: str | Load, member: str) -> None:
+    own_history = isinstance(temperature, Load)
     load = temperature if isinstance(temperature, Load) else build.scene.loading.get(temperature)
     name = variable if isinstance(temperature, Load) else temperature
+    if own_history and name in build.nodes:
+        raise InputError(f"{name} has two roles: the temperature of {member}, and a node of another member.")
     node = build.nodes.get(name) or _new_node(build, name, load)
     build.node_of[member] = node
     role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
@@ -46,9 +50,8 @@ def _join(build: Build, variable: str, temperature: str | Load, member: str) -> 
 
 
 def _new_node(build: Build, name: str, load: Load | None) -> Node:
-    clash = name in VARIABLES and name not in ("T_1", "T_2", "T_c", "T_a")
-    if clash or not name.isidentifier():
-        raise InputError(f"'{name}' cannot name a temperature: use letters, digits and _, and no symbol of the theory.")
+    if name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
+        raise InputError(f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0.")
     symbol = symengine.Symbol(name)
     quantity = VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name))
     if load is None:

@@ -1,0 +1,107 @@
+"""The dataset: conventions, units, attributes, and files that appear whole or not at all."""
+
+import numpy as np
+import pytest
+import xarray
+
+import surfacechem
+from surfacechem.case import names
+from surfacechem.errors import InputError
+from surfacechem.solution import cf_unit
+
+SKIPPED = ["check_spatiotemporal_dims_have_coordinate_vars"]
+"""Wants a calendar date of every coordinate called time; a run has elapsed seconds."""
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return surfacechem.run("exothermic")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Every shipped case as a file."""
+    folder = tmp_path_factory.mktemp("datasets")
+    return {name: surfacechem.run(name).write(folder / f"{name}.nc") for name in names()}
+
+
+@pytest.mark.parametrize("name", names())
+def test_follows_the_cf_conventions(written, name):
+    runner = pytest.importorskip("compliance_checker.runner")
+    suite = runner.CheckSuite()
+    suite.load_all_available_checkers()
+    data = suite.load_dataset(str(written[name]))
+    results, problems = suite.run_all(data, ["cf:1.11"], skip_checks=SKIPPED)["cf:1.11"]
+    assert problems == {}
+    assert [message for result in results for message in result.msgs] == []
+
+
+@pytest.mark.parametrize("name", names())
+def test_opens_plainly_and_is_the_dataset_in_memory(written, name):
+    with xarray.open_dataset(written[name]) as opened:
+        memory = surfacechem.run(name).dataset
+        xarray.testing.assert_identical(opened.drop_attrs(), memory.drop_attrs())
+        same = {key for key in memory.attrs if not key.endswith("_seconds")}
+        assert {key: opened.attrs[key] for key in same} == {key: memory.attrs[key] for key in same}
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_variable_has_a_unit_and_a_meaning(written, name):
+    with xarray.open_dataset(written[name]) as data:
+        for variable in data.variables.values():
+            assert variable.attrs["units"]
+            assert variable.attrs["long_name"]
+        assert all(isinstance(value, str | float | int | np.number) for value in data.attrs.values())
+
+
+def test_says_what_was_run_and_how_it_went(solution):
+    attributes = solution.dataset.attrs
+    assert attributes["status"] == "finished"
+    assert attributes["reason"] == "reached the end at t = 2.5 s"
+    assert attributes["error"] < 1e-9
+    assert attributes["error_source"] == "exact solution exothermic-bonding"
+    assert attributes["energy_error"] < 1e-9
+    assert attributes["run_seconds"] > 0
+    assert attributes["count_steps"] > 0
+    assert "bond-energy" in attributes["case"]
+
+
+def test_carries_the_exact_solution_and_the_residuals(solution):
+    data = solution.dataset
+    assert float(abs(data["T"] - data["T_exact"]).max()) < 1e-6
+    for name in ("energy_residual", "entropy_residual", "site_residual", "least_sigma_linear_affinity"):
+        assert name in data
+
+
+def test_what_the_scene_does_not_have_is_not_there():
+    data = surfacechem.run("sliding-dry").dataset
+    assert not [name for name in data.variables if name.startswith(("phi", "g_n", "J_c", "mu", "site", "event"))]
+
+
+def test_a_file_is_replaced_whole(solution, tmp_path):
+    path = tmp_path / "out.nc"
+    path.write_text("old")
+    solution.write(path)
+    assert [file.name for file in tmp_path.iterdir()] == ["out.nc"]
+    assert xarray.open_dataset(path)["T"].size == 201
+
+
+def test_a_failing_write_leaves_nothing_behind(solution, tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("surfacechem.solution._write_netcdf", fail)
+    with pytest.raises(OSError, match="disk full"):
+        solution.write(tmp_path / "out.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("target", ["", "missing/out.nc"])
+def test_an_unwritable_target_is_refused(solution, tmp_path, target):
+    with pytest.raises(InputError, match=r"is a directory|cannot be written"):
+        solution.write(tmp_path / target)
+
+
+def test_units_in_the_notation_of_the_conventions():
+    assert cf_unit("1/(J s m^2)") == "J-1 s-1 m-2"
+    assert cf_unit("Pa s") == "Pa s"
