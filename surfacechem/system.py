@@ -83,6 +83,8 @@ class Margin:
     expression: Expression
     reason: str
     terminal: bool = True
+    remedy: str = ""
+    """What to change where it is closed from the start."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ def _check(margin: Margin, value: Expression) -> None:
     if value.free_symbols:  # needs an algebraic variable or a derivative, which only the run can find
         return
     if not float(value) > 0:
-        raise InputError(f"at the start {margin.reason} ({margin.name} does not hold: {float(value):.6g}).")
+        remedy = f" {margin.remedy}" if margin.remedy else ""
+        raise InputError(f"at the start {margin.reason} ({margin.name} does not hold: {float(value):.6g}).{remedy}")
 
 
 def _exact(value: float) -> Any:

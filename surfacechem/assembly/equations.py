@@ -19,6 +19,11 @@ from surfacechem.terms import Load
 COLD = 1e-9
 """Temperature that counts as zero [K]."""
 
+CAPACITY_REMEDY = (
+    "The interface's potential takes more capacity than there is. Of a bond energy: kappa_2 (1 - phi_i)^2 must stay "
+    "below 1, with kappa_2 = K_2 / (T_0 C) and C the capacities that share this temperature."
+)
+
 
 def equations(build: Build) -> None:
     """The work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
@@ -115,7 +120,7 @@ def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
         quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
         symbol = build.name(quantity, capacity)
         reason = f"the heat capacity at {node.name} was lost"
-        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason))
+        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY))
 
 
 def _is_algebraic(build: Build, node: Node) -> bool:
