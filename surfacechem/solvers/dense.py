@@ -17,6 +17,7 @@ from surfacechem.solvers.native import (
     TRIAL_DOT,
     Q,
     Y,
+    clear,
     compiled,
     evaluate,
 )
@@ -65,7 +66,7 @@ def interpolate_rate(w: Any, h: float, x: float) -> None:
     shape = 1.0
     for i in range(s):
         shape *= 1.0 - x / NODES[k, i]
-    w.basis[:s] = 0.0
+    clear(w.basis)
     for i in range(s):
         weight = LAGRANGE[k, i] * NODES[k, i]
         for j in range(s):

@@ -22,6 +22,7 @@ from surfacechem.solvers.native import (
     YDOT,
     Y,
     compiled,
+    compiled_once,
     evaluate,
     set_inputs,
 )
@@ -76,7 +77,7 @@ def _update_sides(w: Any) -> None:
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
 
 
-@compiled
+@compiled_once
 def _scan(w: Any, h: float, kinds: Any, fired: Any) -> float:
     """End of the first interval in which margins cross, marking them; 0 if there is none."""
     any_crossing = False
@@ -92,7 +93,7 @@ def _scan(w: Any, h: float, kinds: Any, fired: Any) -> float:
     return 0.0
 
 
-@compiled
+@compiled_once
 def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
     """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method)."""
     side = w.margin[M_SIDE, m]
@@ -123,7 +124,7 @@ def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
     return high
 
 
-@compiled
+@compiled_once
 def _slope(w: Any, h: float, m: int, x: float) -> float:
     """Change of a margin per step, from the polynomial around x."""
     width = 1e-4 * x
@@ -133,7 +134,7 @@ def _slope(w: Any, h: float, m: int, x: float) -> float:
     return float((ahead - w.margin[M_NOW, m]) / (2.0 * width))
 
 
-@compiled
+@compiled_once
 def step_onto(w: Any, size: float) -> bool:
     """Repeat the step with another size, with the full order of the method."""
     w.clock[H_FACTORED] = 0.0
@@ -143,7 +144,7 @@ def step_onto(w: Any, size: float) -> bool:
     if solve_stages(w, size) != CONVERGED:
         return False
     store_polynomial(w, size, 0.0)
-    estimate_error(w, size, False)
+    estimate_error(w, size)
     finish_step(w, size)
     return True
 
@@ -154,7 +155,7 @@ def _margins_at_end(w: Any, size: float) -> None:
     evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
 
 
-@compiled
+@compiled_once
 def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
     step fails.
@@ -178,7 +179,7 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
     return size
 
 
-@compiled
+@compiled_once
 def _mark_coincident(w: Any, h: float, size: float, kinds: Any, fired: Any, slopes: Any) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
     _margins_at_end(w, size)

@@ -19,8 +19,11 @@ _intrinsic: Any = intrinsic
 _borrowed: Any = impl_ret_borrowed
 _Constant: Any = ir.Constant
 
-compiled: Any = _njit(error_model="numpy", _nrt=False)
+compiled: Any = _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """Nothing is allocated inside a step; without reference counts the code compiles and runs about twice as fast."""
+
+compiled_once: Any = _njit(error_model="numpy", _nrt=False, inline="always")
+"""For the stem of the call tree, functions of one caller. Numba would optimise all they contain once a level."""
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
 """Rows of the table of addresses (code, user data)."""
@@ -155,10 +158,26 @@ def copy(source: Any, target: Any) -> None:
 
 
 @compiled
+def clear(target: Any) -> None:
+    """Set entry by entry; a slice assignment would bring broadcasting and its errors."""
+    for j in range(target.shape[0]):
+        target[j] = 0
+
+
+@compiled
+def any_true(flags: Any) -> bool:
+    """Whether a flag is set."""
+    found = False
+    for flag in flags:
+        found = found or flag
+    return found
+
+
+@compiled
 def finite(values: Any) -> bool:
     """Whether no entry is infinite or NaN."""
     total = 0.0
-    for value in values.flat:
+    for value in values:
         total += 0.0 * value
     return total == 0.0
 

@@ -27,6 +27,7 @@ from surfacechem.solvers.native import (
     Q,
     Y,
     compiled,
+    compiled_once,
     evaluate,
     set_inputs,
 )
@@ -43,6 +44,7 @@ from surfacechem.solvers.radau_stages import (
 from surfacechem.solvers.radau_step import (
     TINIEST,
     choose_member,
+    estimate_again,
     estimate_error,
     next_size,
     preferred_member,
@@ -51,6 +53,9 @@ from surfacechem.solvers.radau_step import (
 
 INVALID, OLD, CURRENT = range(3)
 """Whether the Jacobian in the workspace was taken nowhere, at an earlier state, or at the current one."""
+
+SLOW, SLOW_REJECTED = 0.8, 0.3
+"""Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
 
 GOOD = -1
 STEP_UNDERFLOW = int(Status.STEP_UNDERFLOW)
@@ -88,7 +93,7 @@ def restart(w: Any) -> int:
     return GOOD
 
 
-@compiled
+@compiled_once
 def _prepare(w: Any, h: float) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.clock[H_FACTORED] == h:
@@ -110,7 +115,7 @@ def too_small(w: Any, h: float) -> bool:
     return not (h > TINIEST and h > 4e-16 * w.clock[TAU])
 
 
-@compiled
+@compiled_once
 def advance(
     w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
 ) -> tuple[int, float, float, float]:
@@ -136,7 +141,9 @@ def advance(
         predict(w, h)
         outcome = solve_stages(w, h)
         if outcome == CONVERGED:
-            norm = estimate_error(w, h, repeated)
+            norm = estimate_error(w, h)
+            if norm >= 1.0 and repeated:
+                norm = min(norm, estimate_again(w))
             if norm < 1.0:
                 return GOOD, h, norm, next_size(w, h, norm, size_last, norm_last)
             smaller = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
@@ -147,13 +154,13 @@ def advance(
             w.count[FRESH] = INVALID
             w.clock[H_FACTORED] = 0.0
             continue
-        choose_member(w, True)
+        choose_member(w, SLOW_REJECTED)
         w.clock[H_FACTORED] = 0.0
         repeated = True
         h = smaller
 
 
-@compiled
+@compiled_once
 def finish_step(w: Any, h: float) -> None:
     """What interpolation inside the step needs beyond the stages."""
     keep_correction(w)
@@ -194,7 +201,7 @@ def accept(w: Any, h: float) -> None:
 @compiled
 def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
-    if choose_member(w, False):
+    if choose_member(w, SLOW):
         w.clock[H_FACTORED] = 0.0
     elif w.clock[THETA] < 1e-3 and h <= proposed <= 1.2 * h:
         return h

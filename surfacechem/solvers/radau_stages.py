@@ -32,7 +32,9 @@ from surfacechem.solvers.native import (
     WEIGHT,
     YDOT,
     Y,
+    clear,
     compiled,
+    compiled_once,
     evaluate,
     finite,
     set_inputs,
@@ -73,7 +75,11 @@ def differentiate_system(w: Any) -> bool:
     set_inputs(w, w.vector[Y], w.vector[YDOT])
     evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
     w.count[JACOBIANS] += 1
-    return bool(finite(w.jacobian))
+    for part in range(2):
+        for i in range(w.algebraic.shape[0]):
+            if not finite(w.jacobian[part, i]):
+                return False
+    return True
 
 
 @compiled
@@ -116,7 +122,8 @@ def predict(w: Any, h: float) -> None:
     s, last = stage_count(w.count[MEMBER]), w.count[LAST_MEMBER]
     n = w.algebraic.shape[0]
     if w.clock[H_LAST] == 0.0:
-        w.z[:s] = 0.0
+        for i in range(s):
+            clear(w.z[i])
         return
     for i in range(s):
         lagrange(w, last, w.clock[OFFSET] + NODES[w.count[MEMBER], i] * h / w.clock[H_LAST])
@@ -141,18 +148,19 @@ def set_stage(w: Any, i: int, h: float) -> None:
         w.inputs[1 + n + m] = slope / h
 
 
-@compiled
+@compiled_once
 def _stage_residuals(w: Any, h: float) -> bool:
     s = stage_count(w.count[MEMBER])
-    n = w.algebraic.shape[0]
+    w.count[RESIDUALS] += s
     for i in range(s):
         set_stage(w, i, h)
-        evaluate(w, RESIDUAL, w.g.ctypes.data + 8 * n * i)
-    w.count[RESIDUALS] += s
-    return bool(finite(w.g[:s]))
+        evaluate(w, RESIDUAL, w.g[i].ctypes.data)
+        if not finite(w.g[i]):
+            return False
+    return True
 
 
-@compiled
+@compiled_once
 def _correct(w: Any) -> float:
     """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
     k = w.count[MEMBER]

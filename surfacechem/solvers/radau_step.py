@@ -104,8 +104,8 @@ def _error_norm(w: Any, floor: float) -> float:
 
 
 @compiled
-def estimate_error(w: Any, h: float, again: bool) -> float:
-    """Norm of the local error; filtered a second time where a stiff transient makes the first estimate too large."""
+def estimate_error(w: Any, h: float) -> float:
+    """Norm of the local error."""
     k = w.count[MEMBER]
     n = w.algebraic.shape[0]
     for m in range(n):
@@ -121,13 +121,17 @@ def estimate_error(w: Any, h: float, again: bool) -> float:
     if norm < NOISY:
         return norm
     find_noise(w)
-    norm = max(_error_norm(w, MAGNIFIED), NOISY)
-    if norm >= 1.0 and again:
-        for m in range(n):
-            w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
-        if _filter(w):
-            return min(norm, max(_error_norm(w, MAGNIFIED), NOISY))
-    return norm
+    return float(max(_error_norm(w, MAGNIFIED), NOISY))
+
+
+@compiled
+def estimate_again(w: Any) -> float:
+    """The estimate filtered a second time, where a stiff transient made the first one too large."""
+    for m in range(w.algebraic.shape[0]):
+        w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
+    if not _filter(w):
+        return np.inf
+    return float(max(_error_norm(w, MAGNIFIED), NOISY))
 
 
 @compiled
@@ -144,10 +148,12 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
 
 
 @compiled
-def choose_member(w: Any, rejected: bool) -> bool:
-    """Lower order where Newton struggles, back up after a few easy steps; True if the member changed."""
+def choose_member(w: Any, slowest: float) -> bool:
+    """Lower order where Newton contracts slower than this, back up after a few easy steps; True if the member
+    changed.
+    """
     k = w.count[MEMBER]
-    if w.clock[THETA] > 0.8 or (rejected and w.clock[THETA] > 0.3):
+    if w.clock[THETA] > slowest:
         w.count[CALM] = 0
         w.count[MEMBER] = max(0, k - 1)
     elif w.clock[THETA] < 0.05:

@@ -34,7 +34,7 @@ def _folder(part: str) -> Path:
 
 def is_compiled() -> bool:
     """Whether the stepper can be loaded instead of compiled (which takes some ten seconds, once)."""
-    return is_filled(_folder("run"))
+    return all(is_filled(_folder(part)) for part in ("run", "consistent"))
 
 
 @cache

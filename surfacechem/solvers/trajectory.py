@@ -12,6 +12,7 @@ from surfacechem.solvers.native import (
     FRESH,
     H_FACTORED,
     LOOSE,
+    M_LARGEST,
     M_NOW,
     M_SLOPE,
     Q_TRIAL,
@@ -23,7 +24,10 @@ from surfacechem.solvers.native import (
     Q,
     Y,
     allocate,
+    any_true,
+    clear,
     compiled,
+    compiled_once,
     copy,
     keep_alive,
     reference,
@@ -60,7 +64,7 @@ def _write_state(w: Any, row: Any, t: float) -> None:
         row[1 + 2 * n + m] = w.ledger[Q, m]
 
 
-@compiled
+@compiled_once
 def _write_output(w: Any, row: Any, t: float, x: float) -> None:
     """[y | ledger] at the fraction x of the step; algebraic variables are made consistent with the rest."""
     interpolate(w, x)
@@ -70,7 +74,7 @@ def _write_output(w: Any, row: Any, t: float, x: float) -> None:
         w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
     for m in range(w.ledger.shape[1]):
         row[n + m] = w.ledger[Q_TRIAL, m]
-    if w.algebraic.any():
+    if any_true(w.algebraic):
         w.inputs[0] = t
         w.clock[H_FACTORED] = 0.0
         w.count[FRESH] = INVALID
@@ -79,7 +83,7 @@ def _write_output(w: Any, row: Any, t: float, x: float) -> None:
                 row[j] = w.vector[TRIAL, j]
 
 
-@compiled
+@compiled_once
 def _write_outputs(w: Any, times: Any, outputs: Any, written: int, h: float, end: float) -> int:
     """Outputs up to the end of the step; returns how many the run has now."""
     while written < times.shape[0] and times[written] <= end:
@@ -89,7 +93,7 @@ def _write_outputs(w: Any, times: Any, outputs: Any, written: int, h: float, end
     return written
 
 
-@compiled
+@compiled_once
 def _write_events(w: Any, events: Any, kinds: Any, fired: Any, counts: Any) -> bool:
     """A row for each margin that fired; True if one of them is terminal."""
     terminal = False
@@ -140,7 +144,7 @@ def _run_segment(
         return outcome
     if kinds.shape[0] > 0:
         start_margins(w, fired)
-        fired[:] = False
+        clear(fired)
     if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.clock[BASE]:
         copy(w.vector[Y], outputs[0])
         copy(w.ledger[Q], outputs[0, w.algebraic.shape[0] :])
@@ -172,7 +176,7 @@ def _run_segment(
         if size == remaining:
             w.clock[TAU] = end - w.clock[BASE]
         _record(w, steps, counts)
-        if kinds.shape[0] > 0 and fired.any():
+        if kinds.shape[0] > 0 and any_true(fired):
             if _write_events(w, events, kinds, fired, counts):
                 return EVENT
             if not end - (w.clock[BASE] + w.clock[TAU]) > 0.0:
@@ -181,7 +185,7 @@ def _run_segment(
             if outcome != GOOD:
                 return outcome
             start_margins(w, fired)
-            fired[:] = False
+            clear(fired)
             h = first_size(w, end - w.clock[BASE])
             size_last, norm_last = 0.0, 1.0
             continue
@@ -189,7 +193,7 @@ def _run_segment(
         h = keep_matrices(w, h, proposed)
 
 
-@compiled
+@compiled_once
 def _run(
     w: Any,
     y0: Any,
@@ -209,10 +213,10 @@ def _run(
     n = w.algebraic.shape[0]
     n_margins = kinds.shape[0]
     fired = w.fired
-    fired[:] = False
-    w.count[:] = 0
-    w.ledger[:] = 0.0
-    w.margin[:] = 0.0
+    clear(fired)
+    clear(w.count)
+    clear(w.ledger[Q])
+    clear(w.margin[M_LARGEST])
     w.clock[TAU] = 0.0
     for j in range(n):
         w.vector[Y, j] = y0[j]
@@ -275,7 +279,7 @@ def run_batch(
     w = reference(work)
     w.clock[RTOL] = tolerances[0]
     w.clock[LOOSE] = loosening(tolerances[0])
-    w.vector[ATOL] = tolerances[1:]
+    copy(tolerances[1:], w.vector[ATOL])
     for i in range(first, last):
         _run(
             w,
@@ -303,7 +307,7 @@ def make_consistent(code: Any, algebraic: Any, t: Any, y: Any, ydot: Any, parame
     w = reference(work)
     for i in range(t.shape[0]):
         w.inputs[0] = t[i]
-        w.inputs[1 + 2 * n :] = parameters[i if parameters.shape[0] > 1 else 0]
+        copy(parameters[i if parameters.shape[0] > 1 else 0], w.inputs[1 + 2 * n :])
         for j in range(n):
             w.vector[TRIAL, j] = y[i, j]
             w.vector[TRIAL_DOT, j] = ydot[i, j]
