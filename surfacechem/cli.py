@@ -15,6 +15,8 @@ from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
 from surfacechem.guard import interruptible, refuse_unwritable
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from surfacechem.integrate import Run
     from surfacechem.simulation import Simulation
     from surfacechem.solution import Solution
@@ -106,7 +108,7 @@ def run(
     settings = _settings(simulation, solver, rtol)
     target = output or Path(f"{simulation.case.name}.nc")
     refuse_unwritable(target)
-    solution = _solved(simulation, settings, quiet)
+    solution = _solved(lambda: simulation.run(run=settings), quiet)
     solution.write(target)
     _conclude(solution, target, quiet)
 
@@ -123,7 +125,7 @@ def _settings(simulation: Simulation, solver: str | None, rtol: float | None) ->
     return replace(simulation.case.run, **given)  # type: ignore[arg-type]
 
 
-def _solved(simulation: Simulation, settings: Run, quiet: bool) -> Solution:
+def _solved(run: Callable[[], Solution], quiet: bool) -> Solution:
     """The solution, its dataset's columns and audit included, so that what follows only writes."""
     from surfacechem.solvers import stepper
 
@@ -132,7 +134,7 @@ def _solved(simulation: Simulation, settings: Run, quiet: bool) -> Solution:
 
     def work() -> Solution:
         stepper.compile_stepper()  # apart from the run, so that the run's time is its own
-        return simulation.run(run=settings)
+        return run()
 
     return interruptible(work)
 
@@ -248,7 +250,7 @@ def _solved_case(name: str, changes: list[str] | None) -> Solution:
     from surfacechem.simulation import load
 
     simulation = load(name, changes or ())
-    return _solved(simulation, simulation.case.run, quiet=False)
+    return _solved(simulation.run, quiet=False)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -261,10 +263,9 @@ def rerun(
     from surfacechem import rerun as again
 
     record = again.read(file)
-    simulation, settings = again.simulation(record)
     if output:
         refuse_unwritable(output)
-    solution = _solved(simulation, settings, quiet)
+    solution = _solved(lambda: again.run_again(record), quiet)
     if output:
         solution.write(output)
     different = again.differences(record, solution)

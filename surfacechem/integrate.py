@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from surfacechem.compile import Function, Program, compile_function, compile_program
 from surfacechem.errors import InputError, suggestion
 from surfacechem.solvers import solver
-from surfacechem.solvers.contract import Margin, Problem, Result, Status
+from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Status
 from surfacechem.system import System
+from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
 Array = NDArray[np.float64]
@@ -24,6 +26,9 @@ DEFAULT_RTOL = 1e-11
 
 ABSOLUTE = 1e-6
 """Default absolute tolerance of a state, relative to rtol times its scale."""
+
+STATE = Spec("", "initial value")
+"""Initial values need only be finite here; margins say where they may be."""
 
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
@@ -39,6 +44,11 @@ class Run:
     solver: str = "radau"
     max_steps: int = 100_000
     max_seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        """Output times start at zero, where the initial values hold, and increase."""
+        if len(self.times) < 2 or self.times[0] != 0 or any(b <= a for a, b in pairwise(self.times)):
+            raise InputError("output times must start at 0 and increase from each to the next, at least two.")
 
 
 @dataclass(frozen=True)
@@ -83,9 +93,11 @@ class Model:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
         values |= {f"initial.{state.name}": state.initial for state in self.system.states}
+        specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
         for path, value in (changes or {}).items():
             if path not in values:
                 raise InputError(f"no parameter '{path}'.{suggestion(path, values)}")
+            specs.get(path, STATE).check(path, float(value))
             values[path] = float(value)
         return values
 
@@ -154,7 +166,7 @@ class Model:
             names = ", ".join(state.name for state in self.system.states if state.algebraic)
             reason = f"ignition: no temperature {names} balances the heat that the interface produces"
             return "stopped", f"{reason} at {where}"
-        return "failed", f"{result.message}"
+        return "failed", f"{REASONS[result.status]} at {where}"
 
     def _closest_margin(self, result: Result) -> str | None:
         """Reason of the margin that has all but closed where a run could not go on."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 
 from surfacechem import case as cases
 from surfacechem.errors import InputError, Place
-from surfacechem.integrate import Run
 from surfacechem.simulation import Simulation
 from surfacechem.solution import Solution
 
@@ -50,12 +50,19 @@ def read(path: str | Path) -> Record:
     return Record(Path(path), attributes, variables)
 
 
-def simulation(record: Record) -> tuple[Simulation, Run]:
-    """The case of a record, and how it was run."""
+def run_again(record: Record) -> Solution:
+    """The case of a record, run as it was run."""
     mechanism = record.attributes.get("mechanism")
     case = cases.load_text(str(record.attribute("case")), record.path.stem, record.path.parent, mechanism)
-    run = replace(case.run, solver=str(record.attribute("solver")), rtol=float(record.attribute("rtol")))
-    return Simulation(case), run
+    departures = json.loads(record.attributes.get("departures", "{}"))
+    run = replace(
+        case.run,
+        solver=str(record.attribute("solver")),
+        rtol=float(record.attribute("rtol")),
+        times=tuple(departures.get("times", case.run.times)),
+        atol=departures.get("atol", case.run.atol),
+    )
+    return Simulation(case).run(departures.get("changes"), run)
 
 
 def differences(record: Record, solution: Solution) -> list[str]:

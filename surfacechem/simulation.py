@@ -57,13 +57,22 @@ class Simulation:
     def run(self, changes: Mapping[str, float | str] | None = None, run: Run | None = None) -> Solution:
         """Run with some parameters or initial values changed, by path; nothing is compiled again."""
         settings = run or self.case.run
+        values = self._values(changes or {})
         try:
-            trajectory = self.model.solve(settings, self._values(changes or {}))
+            trajectory = self.model.solve(settings, values)
         except InputError as error:
             raise self.case.located(error) from None
         case = self.case
-        accuracy = self._accuracy(trajectory)
-        return Solution(trajectory, case.title, case.source, case.text, case.mechanism_text or "", accuracy)
+        return Solution(
+            trajectory,
+            title=case.title,
+            source=case.source,
+            case=case.text,
+            mechanism=case.mechanism_text or "",
+            accuracy=self._accuracy(trajectory),
+            changes=values,
+            case_times=case.run.times,
+        )
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = {parameter.path: parameter.spec.unit for parameter in self.system.parameters}
@@ -71,7 +80,7 @@ class Simulation:
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}'.{suggestion(unknown, units)}")
-        return {path: parse(value, units[path]) for path, value in changes.items()}
+        return {path: parse(value, units[path], name=path) for path, value in changes.items()}
 
     def _accuracy(self, trajectory: Trajectory) -> Accuracy | None:
         if len(trajectory.result.times) == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import tempfile
@@ -82,6 +83,10 @@ class Solution:
     case: str = ""
     mechanism: str = ""
     accuracy: Accuracy | None = None
+    changes: Mapping[str, float] = field(default_factory=dict)
+    """Parameters and initial values that differ from the case, by path."""
+    case_times: Sequence[float] = ()
+    """Output times of the case, where the run had others than these."""
 
     @property
     def status(self) -> str:
@@ -184,6 +189,7 @@ class Solution:
             "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
             "case": self.case,
             **({"mechanism": self.mechanism} if self.mechanism else {}),
+            **self._departures(),
             "status": self.status,
             "reason": self.reason,
             "regime": self.trajectory.model.system.regime,
@@ -200,6 +206,16 @@ class Solution:
             "entropy_violations": ", ".join(books.violations) or "none",
             "versions": _versions(),
         }
+
+    def _departures(self) -> dict[str, str]:
+        """In which way the run was not that of its case, for running it again."""
+        run = self.trajectory.run
+        departures: dict[str, object] = {"changes": dict(self.changes)} if self.changes else {}
+        if tuple(run.times) != tuple(self.case_times):
+            departures["times"] = [float(t) for t in run.times]
+        if run.atol is not None:
+            departures["atol"] = run.atol
+        return {"departures": json.dumps(departures)} if departures else {}
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
