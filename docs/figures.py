@@ -1,0 +1,103 @@
+"""Figures that are computed when the documentation is built."""
+
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, Rectangle
+from mkdocs.structure.files import File, Files
+
+import surfacechem
+from surfacechem import plots
+
+BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the figures to the pages' files."""
+    for name, make in FIGURES.items():
+        buffer = BytesIO()
+        with matplotlib.rc_context(plots.STYLE):
+            plots.save(make(), buffer, name.rpartition(".")[2])
+        files.append(File.generated(config, f"images/{name}", content=buffer.getvalue()))
+    return files
+
+
+def new(width: float, height: float) -> Figure:
+    """An empty figure."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def accuracy() -> Figure:
+    """Error achieved and energy residual against the tolerance asked for."""
+    cases = {"exothermic": BLUE, "endothermic-kappa-0p99": RED, "sliding-dry": GREEN, "three-temperatures": PINK}
+    tolerances = np.logspace(-3, -12, 10)
+    figure = new(7.2, 3.0)
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    for name, colour in cases.items():
+        simulation = surfacechem.load(name, ["run.accuracy=1e-3"])
+        runs = [simulation.run(run=_at(simulation.case.run, rtol)) for rtol in tolerances]
+        left.loglog(tolerances, [r.accuracy.error for r in runs], "o-", color=colour, markersize=3.5, label=name)
+        right.loglog(tolerances, [max(r.audit.energy_error, 1e-17) for r in runs], "o-", color=colour, markersize=3.5)
+    for ax, text in (
+        (left, "largest error against the exact solution"),
+        (right, "energy residual, of what is exchanged"),
+    ):
+        ax.loglog(tolerances, tolerances, color="0.6", linewidth=0.8, linestyle="--")
+        ax.set_xlabel("rtol")
+        ax.set_title(text, fontsize=9)
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def _at(run: Any, rtol: float) -> Any:
+    from dataclasses import replace
+
+    return replace(run, rtol=float(rtol))
+
+
+def signs() -> Figure:
+    """Bodies, interface, and which way everything counts."""
+    figure = new(6.4, 2.3)
+    ax = figure.subplots()
+    ax.set(xlim=(0, 10), ylim=(0, 3.4), xticks=[], yticks=[], aspect="equal")
+    for side in ax.spines.values():
+        side.set_visible(False)
+    for x, colour, text in (
+        (0.2, "#dbe9f4", "body 1\n$T_1,\\;U_1,\\;S_1$"),
+        (6.8, "#f9e2d2", "body 2\n$T_2,\\;U_2,\\;S_2$"),
+    ):
+        ax.add_patch(Rectangle((x, 0.3), 3.0, 2.8, facecolor=colour, edgecolor="0.4"))
+        ax.text(x + 1.5, 2.45, text, ha="center", va="center")
+    ax.add_patch(Rectangle((3.2, 0.3), 3.6, 2.8, facecolor="#f4f4f4", edgecolor="0.4", linestyle="--"))
+    ax.text(5.0, 2.45, "interface\n$T_c,\\;\\phi,\\;g_n,\\;\\Psi$", ha="center", va="center")
+    arrows = (
+        ((4.3, 1.6), (2.4, 1.6), RED, "$q_1$", (2.15, 1.6)),
+        ((5.7, 1.6), (7.6, 1.6), RED, "$q_2$", (7.85, 1.6)),
+        ((2.4, 0.75), (4.3, 0.75), BLUE, "$t_n>0$: tension", None),
+        ((6.8, 3.28), (8.6, 3.28), GREEN, "$v$", (8.8, 3.28)),
+    )
+    for start, end, colour, text, where in arrows:
+        ax.add_patch(FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=colour))
+        ax.text(*(where or (4.4, 0.75)), text, color=colour, va="center", ha="left" if where is None else "center")
+    return figure
+
+
+def adhesive() -> Figure:
+    """The DNA case on a logarithmic time axis."""
+    changes = ["run.spacing=logarithmic", "run.first=1 us"]
+    dataset = surfacechem.run("dna-adhesive", changes).dataset
+    return plots.figure(dataset, ["T_1", "T_2", "T_c", "phi", "q_1", "q_2"])
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "accuracy.svg": accuracy,
+    "signs.svg": signs,
+    "dna-adhesive.svg": adhesive,
+}

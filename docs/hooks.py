@@ -1,0 +1,294 @@
+"""Pages and tables that are made from the code when the documentation is built, so that they cannot fall behind it.
+
+A page asks for a table with a comment: ``<!-- made: variables area-stretch -->``.
+"""
+
+import dataclasses
+import importlib
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+import surfacechem
+from surfacechem import case as cases
+from surfacechem import data, references
+from surfacechem.laws import FAMILIES, laws
+from surfacechem.quantities import VARIABLES
+from surfacechem.terms import Law, Spec, reads
+
+PLACES = {
+    "capacity": "bodies.NAME.capacity, with its parameters beside it",
+    "potential": "interface.potential",
+    "bonding": "interface.bonding",
+    "friction": "interface.friction",
+    "heat": "heat",
+    "loading": "loading.NAME",
+    "factor": "the list `times` of a parameter that varies",
+}
+"""Where the laws of a contract stand in a case file."""
+
+LAWS = """\
+A law is one class in one file: its name in a case file, its parameters with units and ranges, its formula and its
+source. These pages are made from the classes when the documentation is built. `surfacechem laws` prints the same,
+`surfacechem laws coulomb` one of them.
+
+What a potential gives (traction, entropy, chemical potential, heat of reaction, capacity) is differentiated from its
+formula; see the [theory](../theory.md). How to [add a law](../adding-a-law.md)."""
+
+
+# -- hooks ------------------------------------------------------------------------------------------------------------
+
+
+def on_config(config: Any) -> Any:
+    """Put the generated pages of the laws into the navigation."""
+    for entry in config.nav:
+        if "Laws" in entry:
+            entry["Laws"] = ["laws/index.md", *(f"laws/{family}.md" for family in families())]
+    return config
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the generated pages."""
+    pages = {"laws/index.md": laws_index()}
+    pages |= {f"laws/{family}.md": family_page(family) for family in families()}
+    for path, content in pages.items():
+        files.append(File.generated(config, path, content=content))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Fill in the tables that the page asks for."""
+    return re.sub(r"<!-- made: (\w+) ?(.*?) *-->", lambda m: MAKERS[m[1]](*m[2].split()), markdown)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Docstrings that mkdocstrings has rendered as Markdown: roles and formulas of reStructuredText."""
+    html = re.sub(r":(?:class|func|meth|attr|mod):<code>~?([\w.]+)</code>", _role, html)
+    html = re.sub(r":math:<code>(.*?)</code>", r'<span class="arithmatex">\\(\1\\)</span>', html, flags=re.DOTALL)
+    return re.sub(r"<p>\.\. math:: ?(.*?)</p>", r'<div class="arithmatex">\\[\1\\]</div>', html, flags=re.DOTALL)
+
+
+def _role(match: re.Match[str]) -> str:
+    return f"<code>{match[1].rpartition('.')[2]}</code>"
+
+
+# -- docstrings -------------------------------------------------------------------------------------------------------
+
+
+def markdown(docstring: str) -> str:
+    """A docstring of this package as Markdown: formulas, roles and worked numbers."""
+    text = re.sub(
+        r"^\.\. math::((?:.*\n)(?:[ \t]+.*\n|[ \t]*\n(?=[ \t]))*)", _formula, docstring + "\n", flags=re.MULTILINE
+    )
+    text = re.sub(r":math:`([^`]*)`", r"$\1$", text)
+    text = re.sub(r":class:`~?(?:\w+\.)*(\w+)`", r"`\1`", text)
+    text = re.sub(r"(^>>> (?:.+\n)+)", r"```python\n\1```\n", text, flags=re.MULTILINE)
+    return re.sub(r"(^|\s)Source: ", r"\1*Source:* ", text).strip()
+
+
+def _formula(match: re.Match[str]) -> str:
+    lines = "\n".join(line.strip() for line in match[1].strip().splitlines())
+    body = f"\\begin{{gathered}}\n{lines}\n\\end{{gathered}}" if "\\\\" in lines else lines
+    return f"\n$$\n{body}\n$$\n\n"
+
+
+def first_line(thing: Any) -> str:
+    """The first sentence of a docstring."""
+    return " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
+
+
+def inline(thing: Any) -> str:
+    """The first sentence as Markdown."""
+    return markdown(first_line(thing))
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+
+
+def families() -> list[str]:
+    """Modules of laws, in the order of the contracts."""
+    return list(dict.fromkeys(family for modules in FAMILIES.values() for family in modules))
+
+
+def _module(family: str) -> Any:
+    return importlib.import_module(f"surfacechem.laws.{family}")
+
+
+def _title(family: str) -> str:
+    return (_module(family).__doc__ or family).split("\n")[0].partition(":")[0].rstrip(".")
+
+
+def _members(family: str) -> Iterator[tuple[type[Law], type[Law]]]:
+    module = f"surfacechem.laws.{family}"
+    for contract in FAMILIES:
+        yield from ((contract, law) for law in laws(contract).values() if law.__module__ == module)
+
+
+def laws_index() -> str:
+    """All laws on one page."""
+    lines = ["# Laws", LAWS]
+    for family in families():
+        rows = [(f"[`{law.name()}`]({family}.md#{law.name()})", inline(law)) for _, law in _members(family)]
+        lines += [f"## {_title(family)}", table(("law", "what it is"), rows)]
+    return "\n\n".join(lines)
+
+
+def family_page(family: str) -> str:
+    """All about the laws of one module."""
+    parts = [f"# {_title(family)}"]
+    members = list(_members(family))
+    for contract in dict.fromkeys(contract for contract, _ in members):
+        where = PLACES.get(contract.contract, contract.contract)
+        parts += [f"{inline(contract)} In a case file: {where if '`' in where else f'`{where}`'}."]
+    parts += [law_section(law) for _, law in members]
+    return "\n\n".join(parts)
+
+
+def law_section(law: type[Law]) -> str:
+    """One law: formula, parameters, what it reads, worked number."""
+    parts = [f"## `{law.name()}` {{ #{law.name()} }}", markdown(inspect.getdoc(law) or "")]
+    rows = [_parameter_row(law, name, spec) for name, spec in law.specs()]
+    rows += [(f"`{name}`", "", text, "", _default(law, name)) for name, text in law.options()]
+    parts += [table(("parameter", "unit", "meaning", "range", "if not given"), rows)] if rows else []
+    meanings = {name: quantity.long_name for name, quantity in VARIABLES.items()} | {"N_c": "nominal site density"}
+    found = [f"{meanings[name]} `{name}`" for name in reads(getattr(law, law.formula)) if name in meanings]
+    parts += [f"Reads: {', '.join(found)}."] if found else []
+    return "\n\n".join(parts)
+
+
+def _parameter_row(law: type[Law], name: str, spec: Spec) -> tuple[str, ...]:
+    allowed = spec.range.replace(">=", "≥").replace("<=", "≤")
+    return f"`{name}`", _unit(spec.unit), spec.text, "" if allowed == "any" else allowed, _default(law, name)
+
+
+def _default(kind: Any, name: str) -> str:
+    default = next(item.default for item in dataclasses.fields(kind) if item.name == name)
+    if default is dataclasses.MISSING:
+        return "required"
+    return f"{default:g}" if isinstance(default, float) else f"`{default}`"
+
+
+def _unit(unit: str) -> str:
+    """A unit with raised powers; [x] is the unit of the quantity that varies or is prescribed."""
+    return re.sub(r"\^(-?\d+)", lambda m: f"<sup>{m[1].replace('-', '−')}</sup>", unit.replace("[x]", "x"))
+
+
+def table(heading: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """A Markdown table; columns that are empty throughout are left out."""
+    used = [i for i in range(len(heading)) if any(row[i] for row in rows)]
+    lines = [
+        [heading[i] for i in used],
+        ["---"] * len(used),
+        *([row[i].replace("|", "\\|") for i in used] for row in rows),
+    ]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+# -- tables that pages ask for ----------------------------------------------------------------------------------------
+
+
+def made_references() -> str:
+    """Every exact solution."""
+    kinds = references.all()
+    rows = [(f"[`{name}`](#{name})", inline(kind)) for name, kind in kinds.items()]
+    return "\n\n".join([table(("name", "what it is"), rows), *(_reference(name, kind) for name, kind in kinds.items())])
+
+
+def _reference(name: str, kind: type[references.Reference]) -> str:
+    specs = [(item.name, item.metadata["spec"]) for item in dataclasses.fields(kind)]  # type: ignore[arg-type]
+    rows = [_parameter_row(kind, field, spec) for field, spec in specs]  # type: ignore[arg-type]
+    return "\n\n".join(
+        [
+            f"## `{name}` {{ #{name} }}",
+            markdown(inspect.getdoc(kind) or ""),
+            table(("parameter", "unit", "meaning", "range", "if not given"), rows),
+        ]
+    )
+
+
+def made_cases() -> str:
+    """Every shipped case: title, regime, exact solution, and its text."""
+    found = [cases.load(name) for name in cases.names()]
+    rows = [
+        (
+            f"[`{case.name}`](#{case.name})",
+            case.title,
+            case.system().regime,
+            f"[`{case.reference.name}`](exact-solutions.md#{case.reference.name})" if case.reference else "",
+        )
+        for case in found
+    ]
+    parts = [table(("case", "title", "thermal regime", "exact solution"), rows)]
+    for case in found:
+        parts += [f"## `{case.name}` {{ #{case.name} }}", f"```yaml\n{case.text.rstrip()}\n```"]
+    return "\n\n".join(parts)
+
+
+def made_mechanisms() -> str:
+    """Every shipped mechanism with the first paragraph of its description."""
+    from ruamel.yaml import YAML
+
+    rows = []
+    for path in sorted(data.mechanisms().glob("*.yaml")):
+        text = " ".join(str(YAML(typ="safe").load(path).get("description", "")).split("\n\n")[0].split())
+        rows.append((f"`{path.name}`", text))
+    return table(("file", "what it is"), rows)
+
+
+def made_variables(name: str) -> str:
+    """The variables of a case's dataset."""
+    dataset = surfacechem.run(name).dataset
+    rows = []
+    for key, variable in dataset.variables.items():
+        attributes = variable.attrs
+        unit = re.sub(r"(?<=[A-Za-z])(-?\d+)", r"<sup>\1</sup>", attributes.get("units", ""))
+        words = attributes.get("long_name", ""), attributes.get("equation", "")
+        rows.append((f"`{key}`", unit.replace("-", "−"), *words))
+    return table(("variable", "unit", "long name", "equation"), rows)
+
+
+def made_variable_table() -> str:
+    """What laws may read and cases may prescribe."""
+    from surfacechem.assembly import LOADABLE
+
+    can = {*LOADABLE, "T_1", "T_2", "T_c"}
+    rows = [(f"`{name}`", _unit(q.unit), q.long_name, "yes" if name in can else "") for name, q in VARIABLES.items()]
+    return table(("name", "unit", "meaning", "may be prescribed"), rows)
+
+
+def made_cli() -> str:
+    """The help of every command."""
+    from typer.main import get_command
+    from typer.testing import CliRunner
+
+    from surfacechem.cli import app
+
+    names = [None, *get_command(app).commands]  # type: ignore[attr-defined]
+    parts = []
+    for name in names:
+        arguments = ["--help"] if name is None else [name, "--help"]
+        text = CliRunner().invoke(app, arguments, prog_name="surfacechem", terminal_width=100).output
+        title = "## `surfacechem`" if name is None else f"## `surfacechem {name}` {{ #{name} }}"
+        parts += [title, f"```text\n{text.strip()}\n```"]
+    return "\n\n".join(parts)
+
+
+def made_solvers() -> str:
+    """Names of the solvers."""
+    from surfacechem import solvers
+
+    return ", ".join(f"`{name}`" for name in solvers.names)
+
+
+MAKERS: dict[str, Callable[..., str]] = {
+    "references": made_references,
+    "cases": made_cases,
+    "mechanisms": made_mechanisms,
+    "variables": made_variables,
+    "variable_table": made_variable_table,
+    "cli": made_cli,
+    "solvers": made_solvers,
+}

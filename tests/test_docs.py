@@ -1,0 +1,141 @@
+"""What the documentation shows is true: its Python runs, its commands print what it says, its cases load."""
+
+import doctest
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import surfacechem
+from surfacechem.document import parse
+from surfacechem.solvers import stepper
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+FENCE = re.compile(
+    r"(?:^<!-- part of: (?P<base>\S+) -->\n)?"
+    r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<body>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+NUMBER = re.compile(r"-?\b\d+(\.\d+)?(e[-+]?\d+)?\b( (us|ms|s)\b)?")
+
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page."""
+
+    language: str
+    body: str
+    title: str | None = None
+    base: str | None = None
+    """Name of the shipped case of which the block shows a part."""
+
+
+def blocks(page: Path) -> list[Block]:
+    return [Block(**match.groupdict()) for match in FENCE.finditer(page.read_text(encoding="utf-8"))]
+
+
+def masked(text: str) -> str:
+    """Numbers and times vary from machine to machine; words do not."""
+    return NUMBER.sub("#", text)
+
+
+def check(shown: str, got: str, command: str) -> None:
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    assert doctest.OutputChecker().check_output(masked(shown), masked(got), flags), f"{command}\n{got}"
+
+
+def surfacechem_command(arguments: str, folder: Path, path: str | None = None) -> tuple[int, str]:
+    import shlex
+
+    command = [sys.executable, "-m", "surfacechem", *shlex.split(arguments)]
+    environment = os.environ | ({"PYTHONPATH": path} if path else {})
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    done = subprocess.run(command, cwd=folder, env=environment, check=False, **streams)
+    return done.returncode, done.stdout
+
+
+def made(folder: Path) -> str:
+    """What the recipe of `make run` prints through this package."""
+    recipe = (ROOT / "Makefile").read_text().partition("\nrun:")[2].partition("\n\n")[0]
+    (folder / "results").mkdir()
+    commands = re.findall(r"^\t\$\(BIN\)/surfacechem (.*)$", recipe, re.MULTILINE)
+    return "".join(surfacechem_command(command, folder)[1] for command in commands)
+
+
+def run_session(body: str, folder: Path) -> None:
+    """Run the `surfacechem` commands of a console block and compare what they print with what is shown."""
+    code = 0
+    for entry in re.split(r"^\$ ", body, flags=re.MULTILINE)[1:]:
+        command, _, shown = entry.partition("\n")
+        if command.startswith("surfacechem "):
+            code, got = surfacechem_command(command.removeprefix("surfacechem "), folder)
+            assert "Traceback" not in got, got
+            assert code == 0 or shown.strip(), f"{command}\n{got}"
+            if shown.strip() or got.strip():
+                check(shown, got, command)
+        elif command == "echo $?":
+            assert int(shown) == code
+        elif command == "make run" and shown.strip():
+            lines = masked(made(folder)).splitlines()
+            assert all(line in lines for line in masked(shown).splitlines()), lines
+
+
+def run_python(block: Block, namespace: dict, page: Path) -> None:
+    exec(compile(block.body, f"{page.name}: {block.title or 'python'}", "exec", dont_inherit=True), namespace)
+    for name, value in list(namespace.items()):
+        if isinstance(value, type) and value.__module__ == namespace["__name__"] and value.__doc__:
+            example = doctest.DocTestParser().get_doctest(value.__doc__, dict(namespace), name, page.name, 0)
+            assert doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example).failed == 0
+
+
+@each_page
+def test_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    stepper.compile_stepper()
+    namespace: dict = {"__name__": page.stem}
+    for block in blocks(page):
+        if block.language == "yaml" and block.title:
+            (tmp_path / block.title).write_text(block.body, encoding="utf-8")
+        elif block.language == "console":
+            run_session(block.body, tmp_path)
+        elif block.language == "python":
+            run_python(block, namespace, page)
+
+
+@each_page
+def test_parts_of_cases_are_valid(page):
+    for block in blocks(page):
+        if block.base:
+            surfacechem.load(block.base, parse(block.body).plain()).system  # noqa: B018
+
+
+def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
+    """Nothing but the class of the page "Adding a law" is put into the package."""
+    shown = {block.title: block.body for block in blocks(ROOT / "docs" / "adding-a-law.md") if block.title}
+    for folder in ("surfacechem", "cases", "mechanisms"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    with (tmp_path / "surfacechem/laws/friction.py").open("a") as file:
+        file.write("\n\n" + shown["surfacechem/laws/friction.py"])
+    (tmp_path / "eyring.yaml").write_text(shown["eyring.yaml"])
+    for command, expected in (
+        ("laws eyring", "stress scale"),
+        ("schema", "friction.eyring"),
+        ("equations eyring.yaml", "t_eyring = "),
+    ):
+        code, got = surfacechem_command(command, tmp_path, path=str(tmp_path))
+        assert code == 0, got
+        assert expected in got
+
+
+def test_links_of_the_readme_exist():
+    links = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert links
+    assert all((ROOT / link).exists() for link in links), links
