@@ -106,6 +106,7 @@ print(float(endothermic["T"][-1]), T_0 * np.sqrt(1 - kappa))
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
+axes[0].set_ylabel("error / largest value")
 for ax, (name, run) in zip(axes, runs.items(), strict=True):
     for variable, style in (("T", "-"), ("phi", "--"), ("q_m", ":")):
         error = np.abs(run[variable].values - exact[name][variable]) / np.abs(exact[name][variable]).max()
@@ -115,7 +116,6 @@ for ax, (name, run) in zip(axes, runs.items(), strict=True):
     ax.set(title=name, xlabel="time [s]")
     ax.grid(alpha=0.25)
     ax.legend(frameon=False)
-axes[0].set_ylabel("error / largest value")
 # %% [markdown]
 # Both cases run at the default tolerance. The files say what was found against the package's own exact solutions, and
 # how well the balances close:
