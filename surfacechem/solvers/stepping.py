@@ -18,6 +18,10 @@ LEDGER_ATOL = 1e100
 """Takes the ledger out of the library's error norm."""
 
 
+LONGEST_FIRST = 1e3
+"""First change of a state that its rate may predict, in units of the state."""
+
+
 class StepError(Exception):
     """The library could not take a step."""
 
@@ -178,10 +182,13 @@ class SteppingSolver(Solver):
 
     def _stretch(self, view: View, progress: Progress, method: Method, end: float) -> set[int]:
         """Step until an event, the end of the segment or of the budget; returns the margins that fired."""
+        start = progress.t
         while progress.t < end and progress.over_budget() is None:
             reached = min(method.advance(), end)
             if not reached > progress.t:
                 raise StepError("the step size fell to zero")
+            if progress.t == start:
+                self._check_first(view, progress, method, reached)
             fired: set[int] = set()
             if view.problem.margins:
                 reached, fired = self._find_event(view, progress, method, reached)
@@ -198,6 +205,14 @@ class SteppingSolver(Solver):
             if fired:
                 return fired
         return set()
+
+    def _check_first(self, view: View, progress: Progress, method: Method, reached: float) -> None:
+        """A first step far longer than the layer it starts in may end in another solution, unseen by its own test."""
+        y, _, _ = self._split(view, reached, method.at(reached))
+        moved = np.abs(progress.ydot) * (reached - progress.t)
+        seen = np.abs(progress.y) + np.abs(y) + view.problem.atol
+        if np.any((moved > LONGEST_FIRST * seen)[~view.problem.program.algebraic_mask]):
+            raise StepError("the first step is longer than the layer it starts in")
 
     def _margins(self, view: View, method: Method, t: float) -> Array:
         y, ydot, _ = self._split(view, t, method.at(t))
