@@ -8,6 +8,8 @@ write it today.
 """
 
 import csv
+import os
+import platform
 import statistics
 import sys
 import time
@@ -25,13 +27,13 @@ matplotlib.use("Agg")
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from matplotlib import pyplot as plt
-from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_dae
+from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_sums
 
 from surfacechem.solvers import names, solver
 from surfacechem.solvers.contract import Problem, Result
 from surfacechem.solvers.radau import solve_many
 
-REPEATS = 5
+REPEATS = 3
 ROBERTSON_END = np.array([2.083340149701255e-08, 8.333360770334713e-14])
 Run = Callable[[], np.ndarray]
 
@@ -128,7 +130,7 @@ def p1_curves(rtol: float) -> list[Curve]:
 
 def p4_curves(rtol: float) -> list[Curve]:
     """Every solver on P4."""
-    case = problem(robertson_dae(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10)
+    case = problem(robertson_sums(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10)
     curves = [Curve("P4", name, rtol, end_of(name, case), p4_error, []) for name in names]
     for name, direct in (("scipy-LSODA", direct_lsoda), ("scikit-sundae-CVODE", direct_cvode)):
         run = lambda d=direct: d(p4_rates, [1.0, 0.0, 0.0], 1e11, None, rtol, rtol * 1e-10)  # noqa: E731
@@ -196,16 +198,51 @@ def plot(curves: list[Curve], folder: Path) -> None:
     axes[0].legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(folder / "steppers.png", dpi=150)
+    figure.savefig(folder / "steppers.svg")
+
+
+def seconds_at(curves: list[Curve], case: str, name: str, error: float) -> float:
+    """Time to reach an error, interpolated in logarithms along the best runs; NaN if it is not reached."""
+    mine = [c for c in curves if (c.case, c.name) == (case, name) and c.achieved > 0]
+    points = sorted((c.achieved, statistics.median(c.seconds)) for c in mine)
+    if not points or points[0][0] > error:
+        return np.nan
+    errors, seconds = np.log(np.array(points)).T
+    fastest = np.minimum.accumulate(seconds)  # what reaches a smaller error in less time reaches this one too
+    return float(np.exp(np.interp(np.log(error), errors, fastest)))
+
+
+def compare(curves: list[Curve]) -> None:
+    """Times at equal error and how many times longer than ours."""
+    for case in ("P1", "P4"):
+        for error in (1e-6, 1e-8, 1e-10):
+            ours = seconds_at(curves, case, "radau", error)
+            for name in dict.fromkeys(curve.name for curve in curves):
+                time_taken = seconds_at(curves, case, name, error)
+                ratio = (
+                    "not reached" if np.isnan(time_taken) else f"{1e6 * time_taken:10.1f} us {time_taken / ours:8.1f}x"
+                )
+                print(f"{case} to {error:.0e}  {name:20s} {ratio}")
+
+
+def machine() -> str:
+    """What this ran on."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "")
+    return f"{cpu or platform.processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
 
 def main() -> None:
     """Run everything."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    curves = [curve for rtol in (1e-4, 1e-6, 1e-8, 1e-10) for curve in p1_curves(rtol)]
-    curves += [curve for rtol in (1e-4, 1e-6, 1e-8) for curve in p4_curves(rtol)]
+    print(machine())
+    curves = [curve for rtol in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-12) for curve in p1_curves(rtol)]
+    curves += [curve for rtol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
     measure(curves)
     report(curves, folder)
     plot(curves, folder)
+    compare(curves)
     for rtol in (1e-3, 1e-4, 1e-5, 1e-6):
         rate, error = sweep(rtol)
         print(f"sweep of P1, 2 threads, rtol {rtol:7.0e}: {rate:9.0f} trajectories/s, largest error {error:.1e}")
