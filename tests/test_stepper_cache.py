@@ -36,9 +36,9 @@ print("hits", sum(compiled.stats.cache_hits.values()), "filled", is_filled(folde
 def start(tmp_path: Path):
     (tmp_path / "tiny_kernel.py").write_text(KERNEL)
 
-    def run(cache: Path) -> subprocess.Popen[str]:
+    def run(cache: Path, first: str = "") -> subprocess.Popen[str]:
         environment = {**os.environ, "SURFACECHEM_CACHE": str(cache)}
-        code = USE.format(here=str(tmp_path))
+        code = first + USE.format(here=str(tmp_path))
         return subprocess.Popen(
             [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -68,6 +68,14 @@ def test_folder_that_cannot_be_written(start, tmp_path: Path) -> None:
     out, err = finish(start(tmp_path / "file" / "cache"))
     assert out == "hits 0 filled False"
     assert err.count("cannot be kept") == 1
+
+
+def test_disk_that_is_full(start, tmp_path: Path) -> None:
+    """No file may grow beyond nothing: every write fails as on a full disk."""
+    out, err = finish(start(tmp_path / "cache", "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"))
+    assert out.startswith("hits 0")
+    assert err.count("cannot be kept") == 1
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
