@@ -76,7 +76,8 @@ def read(path: Path, name: str = "") -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError("no text in UTF-8.", place) from None
+        message = "no text in UTF-8; a case is a YAML file, a dataset is read by `plot` and `rerun`."
+        raise InputError(message, place) from None
 
 
 def is_file(path: Path) -> bool:

@@ -104,6 +104,18 @@ class Solution:
         return audit(self.trajectory)
 
     @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Laws that the run has extrapolated, in words."""
+        columns = {column.name: column.values for column in (*self._states(), *self._named())}
+        left = []
+        for limit in self.trajectory.model.system.ranges:
+            low, high = float(np.min(columns[limit.variable])), float(np.max(columns[limit.variable]))
+            if low < limit.low or high > limit.high:
+                span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
+                left.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
+        return tuple(left)
+
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
         return (*self._states(), *self._named(), *self._ledger(), *self._balances(), *self._exact(), *self._events())
@@ -192,6 +204,7 @@ class Solution:
             **self._departures(),
             "status": self.status,
             "reason": self.reason,
+            "warnings": "; ".join(self.warnings) or "none",
             "regime": self.trajectory.model.system.regime,
             "solver": run.solver,
             "rtol": float(run.rtol),

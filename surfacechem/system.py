@@ -88,6 +88,16 @@ class Margin:
 
 
 @dataclass(frozen=True)
+class Range:
+    """Where a law is not an extrapolation: a variable between two values."""
+
+    variable: str
+    low: float
+    high: float
+    law: str
+
+
+@dataclass(frozen=True)
 class Role:
     """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
 
@@ -112,6 +122,7 @@ class System:
     ledger: tuple[Account, ...]
     margins: tuple[Margin, ...]
     roles: tuple[Role, ...]
+    ranges: tuple[Range, ...]
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()

@@ -44,6 +44,10 @@ class Spec:
     at_most: float = math.inf
     varies: bool = True
 
+    def resolved(self, x: str) -> Spec:
+        """The specification with the unit that "[x]" stands for."""
+        return dataclasses.replace(self, unit=resolved_unit(self.unit, x))
+
     def check(self, name: str, value: float) -> None:
         """Raise InputError unless the value is finite and in range."""
         if not math.isfinite(value):
@@ -56,6 +60,15 @@ class Spec:
         """The allowed range in words."""
         bounds = (("> ", self.above), (">= ", self.at_least), ("<= ", self.at_most))
         return " and ".join(f"{sign}{bound:g}" for sign, bound in bounds if math.isfinite(bound)) or "any"
+
+
+def resolved_unit(unit: str, x: str) -> str:
+    """A unit with "[x]" replaced.
+
+    >>> resolved_unit("[x]/s", "m/s")
+    '(m/s)/s'
+    """
+    return x if unit == "[x]" else unit.replace("[x]", f"({x})")
 
 
 def parameter(
@@ -109,6 +122,11 @@ class Law(ABC):
     def name(cls) -> str:
         """The name of the law in a case file."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
+
+    @property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Ranges of variables outside which the law is an extrapolation; a run that leaves them says so."""
+        return {}
 
     @property
     def statement(self) -> Callable[..., Expression]:

@@ -12,7 +12,7 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Parameter, Role
-from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads
+from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads, resolved_unit
 
 L = TypeVar("L", bound=Law)
 
@@ -28,6 +28,13 @@ REMEDIES = {
     "n_c": "Give `interface.sites`.",
     "mu": "Give `interface.sites` and a potential that reads the bonding state.",
 }
+
+
+def unit_of(name: str) -> str:
+    """Unit of a variable; what the table does not name is a temperature node or a coverage."""
+    if name in VARIABLES:
+        return VARIABLES[name].unit
+    return "K" if name.startswith("T") else "1"
 
 
 class Parameters:
@@ -113,18 +120,18 @@ class Variables:
         own = extra or {}
         return formula(**{name: own[name] if name in own else self.get(name, law) for name in reads(formula)})
 
-    def bind(self, law: L, path: str, suffix: str = "") -> L:
+    def bind(self, law: L, path: str, suffix: str = "", unit: str = "") -> L:
         """The law with every numeric parameter replaced by its symbol, times its factors where it varies.
 
-        ``path`` is where a law that was built in Python would stand in a case file.
+        ``path`` is where a law that was built in Python would stand in a case file, ``unit`` what "[x]" stands for.
         """
         law = law if law.place else replace(law, place=Place(path=path))
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
             values[name] = self._parameter(law, name, law.refine(name, spec), suffix)
         if isinstance(law, Load):
-            for name, unit in law.local.items():
-                spec = Spec(unit, f"{name} of the present piece")
+            for name, local_unit in law.local.items():
+                spec = Spec(resolved_unit(local_unit, unit), f"{name} of the present piece")
                 values[name] = self.parameters.add(name, f"{law.path}.{name}", spec, 0.0, law, name)
         return law.bind(values)
 
@@ -134,7 +141,7 @@ class Variables:
         if isinstance(value, Varying):
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
             for factor in value.factors:
-                symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}"))
+                symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}", unit=unit_of(factor.of)))
             return symbol
         if law.is_default(name):
             return int(value) if float(value).is_integer() else value

@@ -84,6 +84,12 @@ def test_an_exact_solution_of_another_scene_is_not_used(simulations):
     assert "it starts from T = 300, the scene from 350" in accuracy.source
     other = surfacechem.run("exothermic", ["bodies.upper.capacity=constant"]).accuracy
     assert "it misses the equation of T by" in other.source
+    third = surfacechem.run("exothermic", ["reference=sliding"]).accuracy
+    assert "it says nothing of phi" in third.source
+
+
+def test_an_exact_solution_is_used_far_beyond_its_time_scale():
+    assert surfacechem.run("exothermic", ["run.until=50 s"]).accuracy.source == "exact solution exothermic-bonding"
 
 
 def test_the_error_estimate_is_true(simulations):

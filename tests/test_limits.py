@@ -86,6 +86,22 @@ def test_infinite_conductance_is_one_temperature(h):
     assert audit(stiff).energy_error < 1e-9
 
 
+@pytest.mark.parametrize("h", [1e10, 1e15, 1e20, 1e25])
+def test_infinite_direct_conductance_is_one_temperature(h):
+    scene = Scene(
+        bodies(energy=Constant), Interface(), [path("lower", "upper", h)], {}, None, 300.0, {"T_1": 290.0, "T_2": 355.0}
+    )
+    trajectory = solve(scene, 2.0)
+    for name in ("T_1", "T_2"):
+        assert final(trajectory, name) == pytest.approx((40 * 290 + 25 * 355) / 65, rel=1e-12)
+    assert audit(trajectory).energy_error < 1e-9
+
+
+def test_an_interface_temperature_that_nothing_determines_is_refused():
+    with pytest.raises(InputError, match="nothing determines the interface temperature T_c"):
+        assemble(Scene(bodies(), Interface("T_c"), (), {}, None, 300.0, {"T_1": 300.0, "T_2": 300.0}))
+
+
 def test_one_sided_contact_is_the_limit_of_one_large_conductance():
     scene = exchange(50.0)
     scene = dataclasses.replace(scene, heat=[path("interface", "lower", 1e15), path("interface", "upper", 50.0)])

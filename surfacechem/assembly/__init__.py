@@ -47,6 +47,7 @@ def assemble(scene: Scene) -> System:
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
         roles=tuple(build.variables.roles),
+        ranges=tuple(build.ranges),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
         warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),

@@ -13,9 +13,9 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Margin, Named, State
+from surfacechem.system import Account, Margin, Named, Range, State
 from surfacechem.terms import Law, Load, Spec
-from surfacechem.variables import Parameters, Variables
+from surfacechem.variables import Parameters, Variables, unit_of
 
 MANY = range(2, 1000)
 
@@ -60,6 +60,7 @@ class Build:
         self.from_interface: dict[str, Expression] = {}
         """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
         self.breakpoints: set[float] = set()
+        self.ranges: list[Range] = []
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
@@ -84,7 +85,7 @@ class Build:
     def history(self, name: str, load: Load) -> Expression:
         """A prescribed history as an expression of time; its breakpoints will end a step."""
         self.breakpoints.update(load.breakpoints())
-        return self.variables.bind(load, f"loading.{name}").value(self.t)
+        return self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t)
 
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
         """Make a prescribed variable a named quantity."""
@@ -130,6 +131,11 @@ class Build:
         symbol = self.name(sigma, rate)
         integral = Quantity(f"entropy_{name}", "J/(m^2 K)", f"entropy produced by {text}")
         self.ledger.append(Account(integral, symbol, "entropy production", name))
+
+    def law_ranges(self, law: Law) -> None:
+        """Where a law's ranges of variables are to be watched; constants need no watching."""
+        for name, (low, high) in law.ranges.items():
+            self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
     def law_margins(self, law: Law, own: Mapping[str, Expression]) -> None:
         """What must stay positive for a law to hold."""

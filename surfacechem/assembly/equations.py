@@ -35,11 +35,16 @@ def equations(build: Build) -> None:
     own_rows = {node.name: balances.node_row(node, rates, build.about) for node in free}
     for node in free:
         _temperature_margins(build, node, own_rows[node.name])
-    centre = build.node_of.get("interface")
-    build.rows |= balances.energy_rows(own_rows, centre.name if centre else "")
+    build.rows |= balances.energy_rows(own_rows, _centre(build, own_rows))
     for node in build.nodes.values():
         if node.prescribed:
             _recovered_heat(build, node, rates)
+
+
+def _centre(build: Build, free: Mapping[str, Expression]) -> str:
+    """The node whose balance is the sum of all: the interface's, or where it has none the first."""
+    interface = build.node_of.get("interface")
+    return interface.name if interface and interface.name in free else next(iter(free), "")
 
 
 def _rates(build: Build) -> dict[Any, Expression]:
@@ -131,6 +136,11 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
     slope = derivative(build.expanded(row.subs(explicit)), node.T)
+    if slope == 0:
+        raise InputError(
+            f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
+            "interface a capacity or a heat path, or let it share the temperature of a body."
+        )
     if slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
         build.margins.append(Margin(f"stable {node.name}", slope, reason))

@@ -104,6 +104,7 @@ def free_energy(build: Build) -> None:
     for law in build.interface.potentials:
         bound = build.variables.bind(law, f"interface.potential.{law.name()}")
         build.psi += build.variables.call(bound, bound.statement)
+        build.law_ranges(law)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]
         node.energies["interface"] = build.psi

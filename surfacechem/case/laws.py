@@ -12,7 +12,7 @@ from surfacechem import laws
 from surfacechem.case.fields import choice, items, mapping, number, shown, text
 from surfacechem.document import Tree
 from surfacechem.errors import InputError
-from surfacechem.terms import Factor, Law, Load, Spec, Varying
+from surfacechem.terms import Factor, Law, Load, Spec, Varying, resolved_unit
 
 L = TypeVar("L", bound=Law)
 Units = Mapping[str, str]
@@ -52,7 +52,7 @@ def build(kind: type[L], tree: Tree, units: Units, x: str = "", fields: Mapping[
         x = _unit_of(values.get("of", _default(kind, "of")), given.get("of", tree), units)
     for name, spec in specs.items():
         if name in given:
-            values[name] = _parameter(given[name], name, _resolved(spec, x), units)
+            values[name] = _parameter(given[name], name, spec.resolved(x), units)
     try:
         return kind(**values, place=tree.place)
     except InputError as error:
@@ -78,14 +78,6 @@ def _check_complete(kind: type[Law], given: Mapping[str, Tree], tree: Tree) -> N
 
 def _default(kind: type[Law], name: str) -> Any:
     return next(item.default for item in dataclasses.fields(kind) if item.name == name)
-
-
-def _resolved(spec: Spec, x: str) -> Spec:
-    return dataclasses.replace(spec, unit=_unit(spec.unit, x))
-
-
-def _unit(unit: str, x: str) -> str:
-    return x if unit == "[x]" else unit.replace("[x]", f"({x})")
 
 
 def _unit_of(name: str, tree: Tree, units: Units) -> str:
@@ -118,7 +110,7 @@ def _option(kind: type[Law], name: str, tree: Tree, x: str) -> Any:
             raise tree.error(f"{name} needs {len(arguments)} entries, got {len(entries)}.")
         return tuple(text(entry, name) for entry in entries)
     if origin is not None and float in arguments:
-        return _numbers(tree, name, _unit(_bracketed(dict(kind.options())[name]), x))
+        return _numbers(tree, name, resolved_unit(_bracketed(dict(kind.options())[name]), x))
     return tree.plain()
 
 

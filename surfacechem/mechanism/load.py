@@ -70,8 +70,10 @@ def load_mechanism(
     density = surface.site_density * KILO * AVOGADRO
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
+    temperatures = (float(surface.min_temp), float(surface.max_temp))
+    mixture = IdealMixture(species=species, temperatures=temperatures, place=_law_place(source, entry, "mechanism"))
     return Mechanism(
-        potentials=(IdealMixture(species=species, place=_law_place(source, entry, "mechanism")),),
+        potentials=(mixture,),
         reactions=_reactions(surface, source, entry, species),
         variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
         bonds=tuple(item.variable for item in chosen),
@@ -79,7 +81,7 @@ def load_mechanism(
         text=source.text,
         species={item.name: item.variable for item in species},
         phase=str(entry["name"]),
-        temperatures=(float(surface.min_temp), float(surface.max_temp)),
+        temperatures=temperatures,
     )
 
 

@@ -64,6 +64,12 @@ class IdealMixture(Potential):
     """
 
     species: tuple[Species, ...] = option("species of the surface phase")
+    temperatures: tuple[float, float] = option("range of the species' thermodynamic data [K]")
+
+    @property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """The temperatures for which the thermodynamic data hold."""
+        return {"T_c": self.temperatures}
 
     @property
     def energy(self) -> Formula:  # type: ignore[override]
