@@ -129,10 +129,12 @@ class Radau(Solver):
         tables = _tables(problem, rows, EVENT_ROWS if problem.margins else 0)
         _run_timed(tables, problem.max_seconds)
         _, _, events, records = map(int, tables.counts[0])
-        if events > tables.events.shape[1] or (problem.record_steps and records > rows):
-            # The tables were too short; the run is repeated with the sizes it turned out to need.
+        while events > tables.events.shape[1] or (problem.record_steps and records > tables.steps.shape[1]):
+            # The tables were too short; the run is repeated with the sizes it turned out to need, which a limit in
+            # seconds may change.
             tables = _tables(problem, records if problem.record_steps else 0, events)
             _run_timed(tables, problem.max_seconds)
+            _, _, events, records = map(int, tables.counts[0])
         return _result(problem, tables)
 
 
@@ -249,6 +251,8 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     rates = np.array(np.broadcast_to(np.asarray(ydot, dtype=float), shape)).reshape(-1, program.n)
     times = np.array(np.broadcast_to(np.asarray(t, dtype=float), shape[:-1])).reshape(-1)
     table = _contiguous(parameters).reshape(-1, program.n_parameters) if program.n_parameters else np.zeros((1, 0))
+    if len(table) not in (1, len(states)):
+        raise ValueError(f"{len(states)} states but {len(table)} parameter vectors; one is needed, or one a state.")
     outcomes = np.zeros(len(states), np.int64)
     stepper.make_consistent()(program.addresses, program.algebraic_mask, times, states, rates, table, outcomes)
     return Consistent(states.reshape(shape), rates.reshape(shape), (outcomes == 0).reshape(shape[:-1]))
