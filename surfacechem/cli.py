@@ -132,11 +132,7 @@ def _solved(run: Callable[[], Solution], quiet: bool) -> Solution:
     if not (quiet or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
 
-    def work() -> Solution:
-        stepper.compile_stepper()  # apart from the run, so that the run's time is its own
-        return run()
-
-    return interruptible(work)
+    return interruptible(run)
 
 
 def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:

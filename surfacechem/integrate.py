@@ -15,6 +15,7 @@ from surfacechem.compile import Function, Program, compile_function, compile_pro
 from surfacechem.errors import InputError, suggestion
 from surfacechem.solvers import solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Status
+from surfacechem.solvers.rates import output_rates
 from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
@@ -64,9 +65,14 @@ class Trajectory:
     seconds: float
 
     @cached_property
+    def rates(self) -> Array:
+        """Time derivatives of the states at the output times, shape (times, states)."""
+        return output_rates(self.result)
+
+    @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
-        return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.result.output_rates)
+        return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
 
 
 class Model:
@@ -147,6 +153,7 @@ class Model:
     def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
         method = solver(run.solver)
         problem = self.problem(run, values)
+        method.prepare()
         start = time.perf_counter()
         result = method.solve(problem)
         seconds = time.perf_counter() - start

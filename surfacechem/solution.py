@@ -192,7 +192,7 @@ class Solution:
     def attributes(self) -> dict[str, str | float | int]:
         """Global attributes: scalars and strings only."""
         run, result = self.trajectory.run, self.trajectory.result
-        counters = {f"count_{name}": int(value) for name, value in vars(result.counters).items()}
+        counters = {f"count_{name}": int(value) for name, value in result.counters._asdict().items()}
         books = self.audit
         return {
             "Conventions": CONVENTIONS,

@@ -61,7 +61,7 @@ class Start:
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
         self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
         self.named = dict(zip((item.name for item in system.outputs), run.outputs[0], strict=True))
-        rates = run.result.output_rates[0]
+        rates = run.rates[0]
         self.rates = {state.name: float(rate) for state, rate in zip(system.states, rates, strict=True)}
 
     def find(self, name: str) -> float | None:

@@ -8,7 +8,7 @@ is integrated beside the state, outside the error norm. A result always carries 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,8 +116,7 @@ def _require(condition: bool, message: str) -> None:
         raise ValueError(message)
 
 
-@dataclass(frozen=True)
-class Counters:
+class Counters(NamedTuple):
     """What a run cost."""
 
     steps: int = 0
@@ -145,13 +144,12 @@ class Events(Points):
     index: NDArray[np.int64] = field(kw_only=True)
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Result:
     """A trajectory up to where it ended. Outputs beyond the stop are absent."""
 
     problem: Problem
     status: Status
-    message: str
     t: float
     """The time reached: the end, the terminal event, or the last good state."""
     y: Array
@@ -165,21 +163,26 @@ class Result:
     events: Events
     counters: Counters
     steps: Points | None = None
+    note: str = ""
+    """What a library said of its failure."""
 
     @property
     def success(self) -> bool:
         return self.status.success
 
-    @cached_property
-    def output_rates(self) -> Array:
-        """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less
-        accurate.
-        """
-        from surfacechem.solvers.radau import consistent
-
-        segment = np.searchsorted(self.problem.segments[1:-1], self.times, side="left")
-        guess = np.zeros_like(self.outputs)
-        return consistent(self.problem.program, self.times, self.outputs, guess, self.problem.parameters[segment]).ydot
+    @property
+    def message(self) -> str:
+        """The status in words, with the time and the margin concerned; an adapter adds what its library says."""
+        text = f"{REASONS[self.status]} (t = {self.t:.9g})"
+        if self.note:
+            return f"{text}: {self.note}"
+        if self.status is Status.EVENT:
+            margins = self.problem.margins
+            return f"{text}: margin {next(int(i) for i in reversed(self.events.index) if margins[i].terminal)}"
+        if not self.success and len(self.margins) and np.all(np.isfinite(self.margins)):
+            nearest = int(np.argmin(np.abs(self.margins)))
+            return f"{text}; nearest margin: {nearest} = {self.margins[nearest]:.3g}"
+        return text
 
 
 class Solver(ABC):
@@ -187,19 +190,11 @@ class Solver(ABC):
 
     name: str
 
+    def prepare(self) -> None:  # noqa: B027 - most methods need nothing
+        """Load what the first solve needs, so that it does not count as run time."""
+
     @abstractmethod
     def solve(self, problem: Problem) -> Result:
         """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong
         number.
         """
-
-
-def explain(status: Status, t: float, margins: Array, index: int | None = None) -> str:
-    """The status in words, with the time and the margin concerned."""
-    text = f"{REASONS[status]} (t = {t:.9g})"
-    if index is not None:
-        return f"{text}: margin {index}"
-    if not status.success and len(margins) and np.all(np.isfinite(margins)):
-        nearest = int(np.argmin(np.abs(margins)))
-        return f"{text}; nearest margin: {nearest} = {margins[nearest]:.3g}"
-    return text

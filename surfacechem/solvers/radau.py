@@ -4,6 +4,7 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,6 @@ from surfacechem.solvers.contract import (
     Result,
     Solver,
     Status,
-    explain,
 )
 
 EVENT_ROWS = 64
@@ -28,6 +28,11 @@ STEP_ROWS = 512
 CHUNK = 256
 """Runs a thread takes at a time."""
 END, OUTPUTS, EVENTS, RECORDS = range(4)
+
+
+@lru_cache(maxsize=256)
+def _kinds(margins: tuple[Margin, ...]) -> NDArray[np.int64]:
+    return np.array([(margin.terminal, margin.direction) for margin in margins], np.int64).reshape(-1, 2)
 
 
 class _Tables:
@@ -55,7 +60,7 @@ class _Tables:
         self.outputs = np.empty((runs, len(times), n + q))
         self.steps = np.empty((runs, step_rows, 1 + 2 * n + q))
         self.events = np.empty((runs, event_rows, 2 + 2 * n + q))
-        kinds = np.array([(margin.terminal, margin.direction) for margin in margins], np.int64).reshape(-1, 2)
+        kinds = _kinds(margins)
         limits = np.array([max_steps, q], np.int64)
         self.arguments = (
             program.addresses,
@@ -75,6 +80,10 @@ class _Tables:
             self.steps,
             self.events,
         )
+
+    def too_short(self, counts: list[int]) -> bool:
+        """Whether a run met more events or steps than there are rows; tables without rows record nothing."""
+        return any(0 < kept.shape[1] < counts[i] for i, kept in ((EVENTS, self.events), (RECORDS, self.steps)))
 
     def run(self, first: int, last: int) -> None:
         stepper.run_batch()(first, last, *self.arguments)
@@ -100,16 +109,19 @@ def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
     )
 
 
-def _run_timed(tables: _Tables, seconds: float | None) -> None:
-    """Run once; the compiled loop looks at the stop flag before every step."""
+def _run_timed(tables: _Tables, seconds: float | None) -> list[int]:
+    """Run once and count; the compiled loop looks at the stop flag before every step."""
     if seconds is None:
-        return tables.run(0, 1)
-    timer = threading.Timer(seconds, tables.stop.fill, args=(1,))
-    timer.start()
-    try:
         tables.run(0, 1)
-    finally:
-        timer.cancel()
+    else:
+        timer = threading.Timer(seconds, tables.stop.fill, args=(1,))
+        timer.start()
+        try:
+            tables.run(0, 1)
+        finally:
+            timer.cancel()
+    counts: list[int] = tables.counts[0].tolist()
+    return counts
 
 
 def _points(rows: Array, n: int) -> tuple[Array, Array, Array, Array]:
@@ -124,44 +136,54 @@ class Radau(Solver):
 
     name = "radau"
 
+    def prepare(self) -> None:
+        stepper.compile_stepper()
+
     def solve(self, problem: Problem) -> Result:
         rows = STEP_ROWS if problem.record_steps else 0
         tables = _tables(problem, rows, EVENT_ROWS if problem.margins else 0)
-        _run_timed(tables, problem.max_seconds)
-        _, _, events, records = map(int, tables.counts[0])
-        while events > tables.events.shape[1] or (problem.record_steps and records > tables.steps.shape[1]):
+        counts = _run_timed(tables, problem.max_seconds)
+        while counts[EVENTS] > tables.events.shape[1] or (
+            problem.record_steps and counts[RECORDS] > tables.steps.shape[1]
+        ):
             # The tables were too short; the run is repeated with the sizes it turned out to need, which a limit in
             # seconds may change.
-            tables = _tables(problem, records if problem.record_steps else 0, events)
-            _run_timed(tables, problem.max_seconds)
-            _, _, events, records = map(int, tables.counts[0])
-        return _result(problem, tables)
+            tables = _tables(problem, counts[RECORDS] if problem.record_steps else 0, counts[EVENTS])
+            counts = _run_timed(tables, problem.max_seconds)
+        return _result(problem, tables, counts)
 
 
-def _result(problem: Problem, tables: _Tables) -> Result:
+def _result(problem: Problem, tables: _Tables, counts: list[int]) -> Result:
     program, n = problem.program, problem.program.n
-    status, outputs, events, records = map(int, tables.counts[0])
-    end = tables.ends[0]
-    m = len(end) - program.n_margins
-    found = tables.events[0, :events]
-    index = found[:, 0].astype(np.int64)
-    terminal = int(next(i for i in reversed(index) if problem.margins[i].terminal)) if status == Status.EVENT else None
+    outputs, end = counts[OUTPUTS], tables.ends[0]
+    m = 1 + 2 * n + program.n_ledger
+    values = tables.outputs[0, :outputs]
     return Result(
         problem=problem,
-        status=Status(status),
-        message=explain(Status(status), end[0], end[m:], terminal),
+        status=Status(counts[END]),
         t=float(end[0]),
         y=end[1 : 1 + n],
         ydot=end[1 + n : 1 + 2 * n],
         ledger=end[1 + 2 * n : m],
         margins=end[m:],
         times=problem.times[:outputs],
-        outputs=tables.outputs[0, :outputs, :n],
-        ledger_outputs=tables.outputs[0, :outputs, n:],
-        events=Events(*_points(found[:, 1:], n), index=index),
-        counters=Counters(*map(int, tables.counters[0])),
-        steps=Points(*_points(tables.steps[0, :records], n)) if problem.record_steps else None,
+        outputs=values[:, :n],
+        ledger_outputs=values[:, n:],
+        events=_events(tables.events[0, : counts[EVENTS]], n, program.n_ledger),
+        counters=Counters(*tables.counters[0].tolist()),
+        steps=Points(*_points(tables.steps[0, : counts[RECORDS]], n)) if problem.record_steps else None,
     )
+
+
+def _events(found: Array, n: int, q: int) -> Events:
+    if len(found) == 0:
+        return _no_events(n, q)
+    return Events(*_points(found[:, 1:], n), index=found[:, 0].astype(np.int64))
+
+
+@cache
+def _no_events(n: int, q: int) -> Events:
+    return Events(*_points(np.empty((0, 1 + 2 * n + q)), n), index=np.empty(0, np.int64))
 
 
 @dataclass(frozen=True)

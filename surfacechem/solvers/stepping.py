@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
-from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status, explain
+from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 
 POINTS = 16
@@ -277,13 +277,11 @@ def _rows(rows: list[tuple[float, Array, Array, Array]], problem: Problem) -> tu
 
 def _result(progress: Progress, status: Status) -> Result:
     problem, n = progress.problem, progress.problem.program.n
-    terminal = [event[0] for event in progress.events if problem.margins[event[0]].terminal]
     outputs = np.array(progress.outputs).reshape(-1, n + problem.program.n_ledger)
     index = np.array([event[0] for event in progress.events], dtype=np.int64)
     return Result(
         problem=problem,
         status=status,
-        message=explain(status, progress.t, progress.margins, terminal[-1] if status == Status.EVENT else None),
         t=progress.t,
         y=progress.y,
         ydot=progress.ydot,

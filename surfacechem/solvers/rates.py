@@ -1,0 +1,14 @@
+"""Rates along a trajectory."""
+
+import numpy as np
+
+from surfacechem.solvers.contract import Array, Result
+from surfacechem.solvers.radau import consistent
+
+
+def output_rates(result: Result) -> Array:
+    """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
+    problem = result.problem
+    segment = np.searchsorted(problem.segments[1:-1], result.times, side="left")
+    guess = np.zeros_like(result.outputs)
+    return consistent(problem.program, result.times, result.outputs, guess, problem.parameters[segment]).ydot
