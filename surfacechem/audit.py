@@ -19,6 +19,9 @@ from surfacechem.integrate import Trajectory
 
 Array = NDArray[np.float64]
 
+OPEN = 1e-6
+"""Relative residual above which a balance counts as open at tolerances up to 1e-9; more at looser ones."""
+
 SLACK = 10.0
 """Dissipation below zero by less than this many tolerances of the law's largest is error of the integration."""
 
@@ -61,8 +64,19 @@ class Audit:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """Laws that destroyed entropy beyond the tolerance of the run."""
-        return tuple(law for law, low in self.least.items() if low < -SLACK * self.rtol * abs(self.largest[law]))
+        """Laws that destroyed entropy beyond the tolerance of the run, or whose production is not a number."""
+        return tuple(law for law, low in self.least.items() if not low >= -SLACK * self.rtol * abs(self.largest[law]))
+
+    @cached_property
+    def findings(self) -> tuple[str, ...]:
+        """What is wrong with the balances, in words; nothing, as a rule."""
+        found = [f"the law {law.replace('_', ' ')} destroys entropy" for law in self.violations]
+        open_balances = (("energy", self.energy_error), ("sites", self.site_error))
+        limit = max(OPEN, OPEN * self.rtol / 1e-9)
+        found += [
+            f"the balance of {name} is open by {error:.1e}" for name, error in open_balances if not error <= limit
+        ]
+        return tuple(found)
 
 
 def _relative(residual: Array, scale: float) -> float:
@@ -129,15 +143,9 @@ class _Books:
 
     def production(self) -> tuple[dict[str, float], dict[str, float]]:
         """Least and largest entropy production of each law over outputs and steps."""
-        steps = self.trajectory.result.steps
-        rows = [self.outputs]
-        if steps is not None and len(steps.t):
-            rows.append(self.trajectory.model.evaluate(self.trajectory.result, steps.t, steps.y, steps.ydot))
-        values = np.concatenate(rows)
+        values = self.trajectory.everywhere
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
-        columns = {law: values[:, self.names.index(f"sigma_{law}")] for law in laws}
-        if len(values) == 0:
-            return {}, {}
+        columns = {law: values[f"sigma_{law}"] for law in laws if len(values[f"sigma_{law}"])}
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},

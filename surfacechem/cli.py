@@ -143,6 +143,8 @@ def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
         typer.echo(run_summary(solution, written))
     elif code:
         typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+    for warning in solution.warnings if quiet else ():
+        typer.echo(f"surfacechem: warning: {warning}", err=True)
     if code:
         raise typer.Exit(code)
 

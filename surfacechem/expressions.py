@@ -136,3 +136,10 @@ def absolute(x: Expression) -> Expression:
 def positive(x: Expression) -> Expression:
     """The positive part of x."""
     return where(x > 0, x, 0.0 * x)
+
+
+def power(base: Expression, exponent: Expression) -> Expression:
+    """base**exponent; a fractional power of what rounding has carried below zero is zero."""
+    if isinstance(exponent, int):
+        return base**exponent
+    return where(base > 0, positive(base) ** exponent, 0 * base)

@@ -31,6 +31,9 @@ ABSOLUTE = 1e-6
 STATE = Spec("", "initial value")
 """Initial values need only be finite here; margins say where they may be."""
 
+LARGEST_SLACK = 1e-3
+"""How far bonding may stray beyond its bounds at most, however loose the tolerance."""
+
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
 
@@ -70,6 +73,18 @@ class Trajectory:
         return output_rates(self.result)
 
     @cached_property
+    def everywhere(self) -> dict[str, Array]:
+        """States and named quantities at the output times and at every step."""
+        result, steps = self.result, self.result.steps
+        states, named = result.outputs, self.outputs
+        if steps is not None and len(steps.t):
+            states = np.concatenate([states, steps.y])
+            named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot)])
+        names = [state.name for state in self.model.system.states]
+        outputs = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, states.T, strict=True)) | dict(zip(outputs, named.T, strict=True))
+
+    @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
         return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
@@ -82,6 +97,8 @@ class Model:
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         self.system = system
+        self.margins = system.moving_margins()
+        """The margins that can close on the way; the rest is checked at the start only."""
         self.program: Program = compile_program(
             system.t,
             inputs[1 : n + 1],
@@ -89,7 +106,7 @@ class Model:
             inputs[2 * n + 1 :],
             system.residual(),
             [system.expand(account.rate) for account in system.ledger],
-            [system.expand(margin.expression) for margin in system.margins],
+            [system.expand(margin.expression) for margin in self.margins],
         )
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs)
@@ -99,10 +116,11 @@ class Model:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
         values |= {f"initial.{state.name}": state.initial for state in self.system.states}
+        fixed = {parameter.path for parameter in self.system.parameters if not parameter.changeable}
         specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
         for path, value in (changes or {}).items():
-            if path not in values:
-                raise InputError(f"no parameter '{path}'.{suggestion(path, values)}")
+            if path not in values or path in fixed:
+                raise InputError(f"no parameter '{path}' to change.{suggestion(path, set(values) - fixed)}")
             specs.get(path, STATE).check(path, float(value))
             values[path] = float(value)
         return values
@@ -123,7 +141,7 @@ class Model:
             parameters=self._segment_parameters(segments[:-1], run, values),
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
-            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in system.margins),
+            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in self.margins),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
@@ -135,7 +153,7 @@ class Model:
             if parameter.load is not None:
                 rows[:, j] = [parameter.at(float(start)) for start in starts]
             elif parameter.path == "run.slack":
-                rows[:, j] = max(values[parameter.path], 10 * run.rtol)
+                rows[:, j] = min(max(values[parameter.path], 10 * run.rtol), LARGEST_SLACK)
             else:
                 rows[:, j] = values[parameter.path]
         return rows
@@ -165,7 +183,7 @@ class Model:
         if result.status is Status.FINISHED:
             return "finished", f"reached the end at {where}"
         if result.status is Status.EVENT:
-            return "stopped", f"{self.system.margins[int(result.events.index[-1])].reason} at {where}"
+            return "stopped", f"{self.margins[int(result.events.index[-1])].reason} at {where}"
         shrunk = self._closest_margin(result)
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"
@@ -182,8 +200,8 @@ class Model:
         first = self._margins(result, 0)
         last = self._margins(result, -1)
         shrink = [abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
-        order = [i for i in np.argsort(shrink) if self.system.margins[i].terminal]
-        return self.system.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
+        order = [i for i in np.argsort(shrink) if self.margins[i].terminal]
+        return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 
     def _margins(self, result: Result, step: int) -> Array:
         steps = result.steps

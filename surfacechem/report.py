@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,6 +86,8 @@ def _accuracy(solution: Solution) -> str:
     assert accuracy is not None
     worst = max(accuracy.variables, key=lambda name: accuracy.variables[name], default="")
     where = f" in {worst}" if worst else ""
+    if math.isnan(accuracy.error):
+        return accuracy.source
     return f"{accuracy.error:.2g}{where} ({accuracy.source})"
 
 

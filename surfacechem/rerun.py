@@ -61,6 +61,8 @@ def run_again(record: Record) -> Solution:
         rtol=float(record.attribute("rtol")),
         times=tuple(departures.get("times", case.run.times)),
         atol=departures.get("atol", case.run.atol),
+        max_steps=departures.get("max_steps", case.run.max_steps),
+        max_seconds=None,
     )
     return Simulation(case).run(departures.get("changes"), run)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw
 
 
@@ -90,5 +90,3 @@ class Scene:
     surroundings: Load | None = None
     T_0: float | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
-    places: Mapping[str, Place] = field(default_factory=dict)
-    """Place in the case file of each path, for error messages."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -71,15 +72,15 @@ class Simulation:
             mechanism=case.mechanism_text or "",
             accuracy=self._accuracy(trajectory),
             changes=values,
-            case_times=case.run.times,
+            case_run=case.run,
         )
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
-        units = {parameter.path: parameter.spec.unit for parameter in self.system.parameters}
+        units = {p.path: p.spec.unit for p in self.system.parameters if p.changeable}
         units |= {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
-            raise InputError(f"no parameter '{unknown}'.{suggestion(unknown, units)}")
+            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, units)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
 
     def _accuracy(self, trajectory: Trajectory) -> Accuracy | None:
@@ -97,7 +98,7 @@ class Simulation:
     def _against_exact(self, trajectory: Trajectory, named: Reference) -> Accuracy:
         from surfacechem.references.matching import exact_values
 
-        exact = exact_values(named.name, named.options, self.case.scene.heat, trajectory)
+        exact = exact_values(named.name, named.options, self.case.scene, trajectory)
         columns, states = computed(trajectory), _states(trajectory)
         errors = {
             name: relative_error(columns[name], values, FLOOR if name in states else 1.0)
@@ -106,12 +107,16 @@ class Simulation:
         return Accuracy(max(errors.values()), f"exact solution {named.name}", errors, exact)
 
     def _against_tighter(self, trajectory: Trajectory) -> Accuracy:
-        tolerance = max(trajectory.run.rtol * TIGHTER, TIGHTEST)
-        second = self.model.resolve(trajectory, tolerance)
+        """Error estimated from a second run; at the tightest tolerance that run is the looser one."""
+        rtol = trajectory.run.rtol
+        other = max(rtol * TIGHTER, TIGHTEST) if rtol > TIGHTEST else rtol / TIGHTER
+        second = self.model.resolve(trajectory, other)
         ours, theirs = _states(trajectory), _states(second)
-        shared = min(len(second.result.times), len(trajectory.result.times))
-        errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
-        return Accuracy(max(errors.values()), f"estimate: a second run at rtol {tolerance:.0e}", errors)
+        if len(second.result.times) < len(trajectory.result.times) or len(trajectory.result.times) < 2:
+            return Accuracy(math.nan, f"not known: a second run at rtol {other:.0e} ended earlier: {second.reason}")
+        shared = len(trajectory.result.times)
+        errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
+        return Accuracy(max(errors.values()), f"estimate: a second run at rtol {other:.0e}", errors)
 
 
 def _states(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:

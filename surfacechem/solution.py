@@ -18,12 +18,16 @@ import numpy as np
 
 from surfacechem.audit import Audit, audit
 from surfacechem.errors import InputError, Place
-from surfacechem.integrate import Trajectory
+from surfacechem.integrate import Run, Trajectory
+from surfacechem.solvers.contract import Status
 
 if TYPE_CHECKING:
     import xarray
 
 CONVENTIONS = "CF-1.11"
+
+RECORDED = ("times", "atol", "max_steps")
+"""Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
 DATASET_NAMES = {"Q_1": "Q_ext_1", "Q_2": "Q_ext_2", "Q_c": "Q_ext_c"}
 """Names that differ in the dataset, where no two may be the same but for their case."""
@@ -85,8 +89,8 @@ class Solution:
     accuracy: Accuracy | None = None
     changes: Mapping[str, float] = field(default_factory=dict)
     """Parameters and initial values that differ from the case, by path."""
-    case_times: Sequence[float] = ()
-    """Output times of the case, where the run had others than these."""
+    case_run: Run | None = None
+    """How the case would be run; where the run was another, the dataset says so."""
 
     @property
     def status(self) -> str:
@@ -105,15 +109,20 @@ class Solution:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Laws that the run has extrapolated, in words."""
-        columns = {column.name: column.values for column in (*self._states(), *self._named())}
-        left = []
+        """What a reader of the results has to know, in words."""
+        system = self.trajectory.model.system
+        return (*self.audit.findings, *self._extrapolations(), *system.warnings)
+
+    def _extrapolations(self) -> list[str]:
+        """Laws that the run has used outside their range."""
+        found = []
         for limit in self.trajectory.model.system.ranges:
-            low, high = float(np.min(columns[limit.variable])), float(np.max(columns[limit.variable]))
+            values = self.trajectory.everywhere[limit.variable]
+            low, high = float(np.min(values)), float(np.max(values))
             if low < limit.low or high > limit.high:
                 span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
-                left.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
-        return tuple(left)
+                found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
+        return found
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
@@ -181,7 +190,7 @@ class Solution:
         events = self.trajectory.result.events
         if len(events.t) == 0:
             return []
-        margins = self.trajectory.model.system.margins
+        margins = self.trajectory.model.margins
         names = np.array([margins[i].reason for i in events.index], dtype=object)
         return [
             Column("event_time", ("event",), events.t, "s", "time of the event"),
@@ -224,10 +233,11 @@ class Solution:
         """In which way the run was not that of its case, for running it again."""
         run = self.trajectory.run
         departures: dict[str, object] = {"changes": dict(self.changes)} if self.changes else {}
-        if tuple(run.times) != tuple(self.case_times):
-            departures["times"] = [float(t) for t in run.times]
-        if run.atol is not None:
-            departures["atol"] = run.atol
+        if self.case_run is not None:
+            now, usual = ({name: getattr(r, name) for name in RECORDED} for r in (run, self.case_run))
+            departures |= {name: value for name, value in now.items() if value != usual[name]}
+        if self.trajectory.result.status is Status.STOPPED:
+            departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
         return {"departures": json.dumps(departures)} if departures else {}
 
     @cached_property

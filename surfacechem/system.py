@@ -25,6 +25,13 @@ class Parameter:
     load: Load | None = None
     """The history whose pieces change the value, if any."""
     field: str = ""
+    internal: bool = False
+    """Whether it belongs to the solution method, so that no run may change it."""
+
+    @property
+    def changeable(self) -> bool:
+        """Whether a run may give it another value."""
+        return not self.internal and self.load is None
 
     def at(self, start: float) -> float:
         """Value on the piece of time that begins at ``start`` [s]."""
@@ -153,6 +160,11 @@ class System:
     def residual(self) -> list[Expression]:
         """The equations, expanded, in the order of the rows."""
         return [self.expand(row) for row in self.rows.values()]
+
+    def moving_margins(self) -> tuple[Margin, ...]:
+        """The margins that change in the course of a run."""
+        moving = {self.t, *(x for state in self.states for x in (state.symbol, state.dot))}
+        return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving)
 
     def find(self, name: str) -> Named:
         """The named quantity of that name."""

@@ -101,6 +101,8 @@ class Law(ABC):
     """Name of the method that states the law."""
     positive: ClassVar[tuple[str, ...]] = ()
     """Variables that must stay above zero for the law to hold."""
+    nonnegative: ClassVar[tuple[str, ...]] = ()
+    """Variables that must not fall below zero."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""
@@ -271,6 +273,10 @@ class Load(Law):
 
     def breakpoints(self) -> tuple[float, ...]:
         """Times [s] at which the history or its slope jumps."""
+        return ()
+
+    def jumps(self) -> tuple[float, ...]:
+        """Times [s] at which the value itself jumps."""
         return ()
 
     def piece(self, start: float) -> Mapping[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
@@ -29,9 +30,17 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
 def _check(margin: Margin, value: Expression) -> None:
     if value.free_symbols:  # needs an algebraic variable or a derivative, which only the run can find
         return
-    if not float(value) > 0:
+    number = _number(value)
+    if not number > 0:
         remedy = f" {margin.remedy}" if margin.remedy else ""
-        raise InputError(f"at the start {margin.reason} ({margin.name} does not hold: {float(value):.6g}).{remedy}")
+        raise InputError(f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}")
+
+
+def _number(value: Expression) -> float:
+    try:
+        return float(value)
+    except (RuntimeError, TypeError):  # an undefined number, zero over zero for instance
+        return math.nan
 
 
 def _exact(value: float) -> Any:

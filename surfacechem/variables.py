@@ -50,10 +50,11 @@ class Parameters:
         """A new parameter of a law as a symbol; its name gives way to names that are taken."""
         return self._append(Parameter(symengine.Symbol(self._unique(name, path)), path, spec, value, load, field))
 
-    def constant(self, name: str, path: str, spec: Spec, value: float) -> Expression:
+    def constant(self, name: str, path: str, spec: Spec, value: float, internal: bool) -> Expression:
         """A scene-level number under exactly this name."""
+        spec.check(path, value)
         self._taken.add(name)
-        return self._append(Parameter(symengine.Symbol(name), path, spec, value))
+        return self._append(Parameter(symengine.Symbol(name), path, spec, value, internal=internal))
 
     def _append(self, parameter: Parameter) -> Expression:
         taken = {item.path for item in self.items}
@@ -148,5 +149,8 @@ class Variables:
         return self.parameters.add(name + suffix, path, spec, value)
 
     def _factor(self, factor: Factor) -> Expression:
+        if "T_0" in reads(factor.factor) and unit_of(factor.of) != "K":
+            message = f"the factor {factor.name()} is one of temperature; of: {factor.of} is none. Use `linear`."
+            raise InputError(message, factor.place)
         sources = {argument: factor.of if argument == "x" else argument for argument in reads(factor.factor)}
         return factor.factor(**{argument: self.get(source, factor) for argument, source in sources.items()})

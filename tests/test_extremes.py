@@ -12,13 +12,13 @@ from scenes import SITES, bodies, path, varying
 from surfacechem.assembly import assemble
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run, Trajectory
-from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bonding import BondEnergy, LinearEnthalpy
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.contact import InterfaceCapacity
-from surfacechem.laws.factors import Exponential
+from surfacechem.laws.contact import InterfaceCapacity, NormalStiffness
+from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power
 from surfacechem.laws.friction import Coulomb, Viscous
-from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.laws.kinetics import Arrhenius, LinearAffinity, Relaxation
+from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.scene import Body, Interface, Scene, Sites
 
 
@@ -160,9 +160,116 @@ def test_a_film_that_closes_stops_the_run_where_the_gap_is_zero():
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
 
 
-def test_a_negative_pressure_is_seen_in_the_audit():
-    from surfacechem.audit import audit
+def test_tension_has_no_coulomb_friction():
+    def scene(p):
+        return scenes.perfect_contact([], frictions=[Coulomb(mu=0.3)], loading={"v": Hold(level=0.1), "p": p})
 
-    loading = {"v": Hold(level=0.1), "p": Hold(level=-1e3)}
-    trajectory = run(scenes.perfect_contact([], frictions=[Coulomb(mu=0.3)], loading=loading), 0.1)
-    assert audit(trajectory).violations == ("coulomb",)
+    with pytest.raises(InputError, match="p fell below zero, where the law coulomb ends"):
+        run(scene(Hold(level=-1e3)), 0.1)
+    trajectory = run(scene(Ramp(start=1e3, rate=-1e4)), 1.0)
+    assert "p fell below zero" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(0.1, rel=1e-9)
+    assert run(scene(Table(times=[0.0, 0.5], values=[1e3, 0.0])), 1.0).status == "finished"
+
+
+ISOTHERMAL = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+
+
+def cooled_reservoir() -> Scene:
+    pair = Body("lower", Ramp(start=300.0, rate=-100.0)), bodies()[1]
+    return Scene(pair, Interface(), [path("lower", "upper", 1.0)], T_0=300.0, initial={"T_2": 300.0})
+
+
+def shrinking_surface() -> Scene:
+    loading = {"J_c": Ramp(start=1.0, rate=-0.5), "p": Hold(level=1.0), "v": Hold(level=1.0)}
+    return scenes.perfect_contact([], loading=loading, frictions=[Coulomb(mu=0.1)])
+
+
+def too_many_bonds() -> Scene:
+    return scenes.perfect_contact([BondEnergy(K_0=1.0)], loading={"phi": Ramp(rate=0.4)})
+
+
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        (cooled_reservoir, "the temperature T_1 reached zero"),
+        (shrinking_surface, "the area stretch J_c reached zero"),
+        (too_many_bonds, "phi rose above its bound 1"),
+    ],
+)
+def test_prescribed_variables_stay_in_their_range(scene, reason):
+    trajectory = run(scene(), 10.0)
+    assert trajectory.status == "stopped"
+    assert reason in trajectory.reason
+    assert np.isfinite(trajectory.outputs).all()
+
+
+@pytest.mark.parametrize("name", ["g_n", "phi", "T_1"])
+def test_what_stores_energy_cannot_jump(name):
+    jump = Table(times=[0.0, 1.0, 1.0, 2.0], values=[0.5, 0.5, 0.6, 0.6] if name != "T_1" else [300, 300, 310, 310])
+    scene = {
+        "g_n": scenes.perfect_contact([NormalStiffness(E_n=1e9)], loading={"g_n": jump}),
+        "phi": scenes.perfect_contact([BondEnergy(K_0=1.0)], loading={"phi": jump}),
+        "T_1": Scene((Body("lower", jump, Quadratic(C=1.0)), bodies()[1]), Interface(), [path("lower", "upper", 1.0)],
+                     T_0=300.0, initial={"T_2": 300.0}),
+    }[name]  # fmt: skip
+    with pytest.raises(InputError, match=f"{name} stores energy, so it cannot jump"):
+        assemble(scene)
+
+
+FOREIGN = {
+    "p": (BondEnergy(K_0=varying(1.0, Linear(of="p", slope=1e-6))), {"p": Ramp(rate=1.0)}),
+    "J_c": (BondEnergy(K_0=varying(1.0, Linear(of="J_c", slope=0.1))), {"J_c": Ramp(start=1.0, rate=0.1)}),
+    "T_1": (InterfaceCapacity(C_c=varying(1.0, LinearInTemperature(of="T_1", slope=1e-3))), {}),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_an_energy_varies_only_with_what_its_balance_knows(name):
+    potential, loading = FOREIGN[name]
+    interface = Interface("T_c", [potential], (), [Relaxation(tau=1.0)] if "K" in str(potential) else (), SITES)
+    heat = [path("interface", "lower", 1.0)]
+    initial = {"T_1": 300.0, "T_2": 300.0, "T_c": 300.0} | ({"phi": 0.1} if interface.reactions else {})
+    with pytest.raises(InputError, match=f"varies with {name}, which its balance does not know"):
+        assemble(Scene(bodies(), interface, heat, loading, None, 300.0, initial))
+
+
+def test_a_body_stores_energy_by_its_own_temperature():
+    pair = Body("lower", "T_1", Quadratic(C=varying(1.0, LinearInTemperature(slope=1e-3)))), bodies()[1]
+    interface = Interface("T_c", [InterfaceCapacity(C_c=1.0)])
+    initial = dict.fromkeys(("T_1", "T_2", "T_c"), 300.0)
+    scene = Scene(pair, interface, [path("interface", "lower", 1.0)], T_0=300.0, initial=initial)
+    with pytest.raises(InputError, match=r"the energy of quadratic varies with T_c.*It may vary with T_1"):
+        assemble(scene)
+
+
+def test_a_factor_of_temperature_is_given_a_temperature():
+    potential = NormalStiffness(E_n=varying(1e9, Power(of="g_n", exponent=2.0)))
+    with pytest.raises(InputError, match="the factor power is one of temperature; of: g_n is none"):
+        assemble(scenes.perfect_contact([potential], loading={"g_n": Hold(level=1e-6)}))
+
+
+def test_a_scene_with_nothing_to_solve_is_refused():
+    with pytest.raises(InputError, match="there is nothing to solve: everything is prescribed"):
+        assemble(Scene(ISOTHERMAL, Interface(), T_0=300.0))
+
+
+def test_bonds_that_pass_their_bound_leave_finite_numbers():
+    """A fractional order would make a number of what rounding has carried beyond complete bonding."""
+    reaction = Arrhenius(A=1.0, n=0.5)
+    trajectory = run(scenes.perfect_contact([LinearEnthalpy(H_r=1.0)], [reaction], energy=Constant), 10.0)
+    assert np.isfinite(trajectory.outputs).all()
+    assert np.isfinite(trajectory.result.ledger_outputs).all()
+
+
+def test_fluxes_where_a_shared_temperature_is_prescribed():
+    """What the interface gives off is what the bodies receive: q_1 + q_2 = D - dU_c/dt."""
+    loading = {"v": Hold(level=0.1), "p": Hold(level=1e6)}
+    interface = Interface("T_1", [InterfaceCapacity(C_c=3.0)], [Coulomb(mu=0.3)])
+    heat = [path("interface", "upper", 100.0)]
+    pair = Body("lower", "T_1", Quadratic(C=1000.0)), Body("upper", "T_2", Quadratic(C=50.0))
+    scene = Scene(pair, interface, heat, loading | {"T_1": Ramp(start=300.0, rate=1.0)}, None, 300.0, {"T_2": 290.0})
+    trajectory = run(scene, 2.0)
+    values = trajectory.everywhere
+    stored = 3.0 / 300.0 * values["T_1"] * 1.0
+    assert values["q_1"] + values["q_2"] == pytest.approx(values["D_coulomb"] - stored, rel=1e-12)

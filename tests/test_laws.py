@@ -46,7 +46,7 @@ def test_every_parameter_has_unit_meaning_and_range(law):
     for name, spec in law.specs():
         assert spec.unit, name
         assert spec.text, name
-        assert spec.range
+        assert not (math.isfinite(spec.above) and spec.at_least > -math.inf), "one lower bound is enough"
 
 
 @each_law
@@ -79,13 +79,13 @@ def test_friction_never_drives(law):
 
 @pytest.mark.parametrize("law", laws(RateLaw).values(), ids=lambda law: law.name())
 def test_reaction_runs_downhill(law):
-    """Laws that read the affinity are admissible for any sign of it; the others state their condition."""
+    """Laws that read the affinity are admissible for any sign of it; forward reactions where it drives them."""
     for seed in range(SAMPLES):
         instance = example(law, seed)
         values = point(instance, seed)
-        for mu in (values.get("mu", -1.0) * 1e-20, -1e-20):
+        for mu in (1e-20, -1e-20) if "mu" in values else (-1e-20,):
             state = values | ({"mu": mu} if "mu" in values else {})
-            assert -mu * instance.rate(**state) >= 0 or "mu" not in values
+            assert -mu * instance.rate(**state) > 0
 
 
 @pytest.mark.parametrize("law", laws(HeatTransfer).values(), ids=lambda law: law.name())

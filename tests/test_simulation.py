@@ -29,9 +29,13 @@ def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
     [
         ({"bodies.lower.C": -1}, r"bodies\.lower\.C = -1 is outside its range: > 0"),
         ({"bodies.lower.C": "1 m"}, r"1 m is a length; bodies\.lower\.C needs a heat capacity per area"),
-        ({"bodies.lower.c": 1}, r"no parameter 'bodies\.lower\.c'\. Did you mean 'bodies\.lower\.C'\?"),
+        ({"bodies.lower.c": 1}, r"no parameter 'bodies\.lower\.c' to change\. Did you mean 'bodies\.lower\.C'\?"),
         ({"initial.T": float("nan")}, r"initial\.T must be finite"),
         ({"initial.T": -3.0}, r"at the start the temperature T reached zero"),
+        ({"T_0": 0.0}, r"T_0 = 0 is outside its range: > 0"),
+        ({"interface.sites": 0.0}, r"interface\.sites = 0 is outside its range: > 0"),
+        ({"run.slack": 10.0}, r"no parameter 'run\.slack' to change"),
+        ({"phi_max": 5.0}, r"no parameter 'phi_max' to change"),
         ({"initial.phi": 1.5}, r"at the start phi rose above its bound 1"),
     ],
 )

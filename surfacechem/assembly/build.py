@@ -19,6 +19,9 @@ from surfacechem.variables import Parameters, Variables, unit_of
 
 MANY = range(2, 1000)
 
+NOTHING = 1e-9
+"""Amount, in SI units, by which rounding may carry a variable below zero."""
+
 
 @dataclass(frozen=True)
 class Bond:
@@ -59,6 +62,12 @@ class Build:
         """Heat that reaches each body other than through the interface [W/m^2]."""
         self.from_interface: dict[str, Expression] = {}
         """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
+        self.loads: dict[str, Load] = {}
+        """Histories that are in use, by variable."""
+        self.rates: dict[Any, Expression] = {}
+        """Time derivatives of what the interface's free energy depends on beside temperature."""
+        self.into_interface: list[Expression] = []
+        """Power and heat that flow into the interface [W/m^2]."""
         self.breakpoints: set[float] = set()
         self.ranges: list[Range] = []
         self.used_names: set[str] = set()
@@ -68,9 +77,9 @@ class Build:
         self.named.append(Named(quantity, expression, output))
         return symengine.Symbol(quantity.name)
 
-    def constant(self, name: str, path: str, unit: str, text: str, value: float) -> Expression:
+    def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
         """A scene-level number as a run-time parameter."""
-        return self.parameters.constant(name, path, Spec(unit, text), value)
+        return self.parameters.constant(name, path, spec, value, internal)
 
     def label(self, law: Law) -> str:
         """A short unique name of a law for its quantities."""
@@ -85,16 +94,42 @@ class Build:
     def history(self, name: str, load: Load) -> Expression:
         """A prescribed history as an expression of time; its breakpoints will end a step."""
         self.breakpoints.update(load.breakpoints())
+        self.loads[name] = load
         return self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t)
 
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
         """Make a prescribed variable a named quantity."""
         return self.name(quantity, self.history(quantity.name, load))
 
-    def rate_of(self, symbol: Any) -> Expression:
-        """Time derivative of a prescribed variable."""
-        expression = next(item.expression for item in self.named if item.name == str(symbol))
+    def slope_of(self, name: str) -> Expression:
+        """Time derivative of a prescribed variable between its jumps."""
+        expression = next(item.expression for item in self.named if item.name == name)
         return derivative(expression, self.t)
+
+    def rate_of(self, name: str) -> Expression:
+        """Time derivative of a prescribed variable that stores energy, which must not jump."""
+        load = self.loads[name]
+        if load.jumps():
+            raise InputError(
+                f"{name} stores energy, so it cannot jump (at t = {load.jumps()[0]:g} s): the work would be unknown. "
+                "Give the jump a duration.",
+                load.place,
+            )
+        return self.slope_of(name)
+
+    def refuse_foreign(self, F: Expression, own: set[Any], law: Law) -> None:
+        """A free energy depends on what its balance accounts for, and on constants."""
+        moving = {str(state.symbol) for state in self.states} | {node.name for node in self.nodes.values()}
+        moving |= {item.name for item in self.named if item.name in self.loads and self.slope_of(item.name) != 0}
+        moving -= {name for name, load in self.loads.items() if self.slope_of(name) == 0 and not load.jumps()}
+        foreign = {str(symbol) for symbol in symengine.sympify(F).free_symbols - own} & moving
+        if foreign:
+            allowed = ", ".join(sorted(str(symbol) for symbol in own))
+            raise InputError(
+                f"the energy of {law.name()} varies with {', '.join(sorted(foreign))}, which its balance does not "
+                f"know. It may vary with {allowed}.",
+                law.place,
+            )
 
     @property
     def stretch(self) -> Expression:
@@ -133,7 +168,7 @@ class Build:
         self.ledger.append(Account(integral, symbol, "entropy production", name))
 
     def law_ranges(self, law: Law) -> None:
-        """Where a law's ranges of variables are to be watched; constants need no watching."""
+        """Ranges of variables that a run watches for a law."""
         for name, (low, high) in law.ranges.items():
             self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
@@ -143,12 +178,17 @@ class Build:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} > 0", value, reason))
+        for name in law.nonnegative:
+            value = own[name] if name in own else self.variables.get(name, law)
+            reason = f"{name} fell below zero, where the law {law.name()} ends"
+            self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
 
     def shares(self) -> tuple[Expression, Expression]:
         """Fractions of the interface's heat that go into body 1 and 2 where there is no medium."""
         if not self.variables.has("partition"):
-            path, text, value = "interface.partition", "fraction of heat into body 1", self.interface.partition
-            self.variables.define("partition", lambda: self.constant("alpha", path, "1", text, value), "constant", path)
+            path, value = "interface.partition", self.interface.partition
+            spec = Spec("1", "fraction of heat into body 1", at_least=0, at_most=1)
+            self.variables.define("partition", lambda: self.constant("alpha", path, spec, value), "constant", path)
         alpha = self.variables.get("partition", "the interface")
         return alpha, 1 - alpha
 

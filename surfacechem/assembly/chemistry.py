@@ -63,6 +63,6 @@ def _prescribed_bonding(build: Build) -> None:
     if "phi" in build.bonding or not depends(build.psi, phi):
         return
     M = _potential_per_area(build, "phi", phi)
-    rate = build.rate_of(phi)
+    rate = build.rate_of("phi")
     if rate != 0:
         build.dissipation["prescribed_bonding"] = -M * rate

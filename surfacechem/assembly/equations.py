@@ -27,7 +27,7 @@ CAPACITY_REMEDY = (
 
 def equations(build: Build) -> None:
     """The work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
-    rates = _rates(build)
+    rates = build.rates = _rates(build)
     _dissipation(build)
     free = [node for node in build.nodes.values() if not node.prescribed]
     for node in free:
@@ -38,7 +38,10 @@ def equations(build: Build) -> None:
     build.rows |= balances.energy_rows(own_rows, _centre(build, own_rows))
     for node in build.nodes.values():
         if node.prescribed:
+            build.margins.append(_warm(node))
             _recovered_heat(build, node, rates)
+    if not build.states:
+        raise InputError("there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve.")
 
 
 def _centre(build: Build, free: Mapping[str, Expression]) -> str:
@@ -52,7 +55,7 @@ def _rates(build: Build) -> dict[Any, Expression]:
     rates = {bond.symbol: bond.dot for bond in build.bonding.values()} | _gaps(build)
     phi = symengine.Symbol("phi")
     if phi not in rates and depends(build.psi, phi):
-        rates[phi] = build.rate_of(phi)
+        rates[phi] = build.rate_of("phi")
     return rates
 
 
@@ -63,7 +66,7 @@ def _gaps(build: Build) -> dict[Any, Expression]:
         symbol = symengine.Symbol(gap)
         if not depends(build.psi, symbol):
             continue
-        rates[symbol] = build.rate_of(symbol)
+        rates[symbol] = build.rate_of(gap)
         power = derivative(build.psi, symbol) * rates[symbol]
         if power != 0:
             build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
@@ -72,6 +75,7 @@ def _gaps(build: Build) -> dict[Any, Expression]:
 
 
 def _give_power(build: Build, power: Expression) -> None:
+    build.into_interface.append(power)
     if "interface" in build.node_of:
         build.node_of["interface"].inflow.append(power)
 
@@ -117,7 +121,7 @@ def _guess(build: Build) -> float:
 
 
 def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
-    build.margins.append(Margin(f"{node.name} > 0", node.T - COLD, f"the temperature {node.name} reached zero"))
+    build.margins.append(_warm(node))
     if _is_algebraic(build, node):
         _fold_margin(build, node, row)
     elif "interface" in node.energies and balances.second(build.psi, node.T) != 0:
@@ -126,6 +130,10 @@ def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
         symbol = build.name(quantity, capacity)
         reason = f"the heat capacity at {node.name} was lost"
         build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY))
+
+
+def _warm(node: Node) -> Margin:
+    return Margin(f"{node.name} > 0", node.T - COLD, f"the temperature {node.name} reached zero")
 
 
 def _is_algebraic(build: Build, node: Node) -> bool:
@@ -141,13 +149,16 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
             f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
             "interface a capacity or a heat path, or let it share the temperature of a body."
         )
-    if slope.free_symbols & {state.symbol for state in build.states}:
-        reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
-        build.margins.append(Margin(f"stable {node.name}", slope, reason))
+    reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
+    if not slope.free_symbols & {state.symbol for state in build.states}:
+        reason = f"no heat path determines the temperature {node.name}"
+    build.margins.append(Margin(f"stable {node.name}", slope, reason))
 
 
 def _recovered_heat(build: Build, node: Node, rates: Mapping[Any, Expression]) -> None:
     """The heat that must be supplied from outside to keep a prescribed temperature."""
+    if node.energies:
+        build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
     supply = balances.node_row(node, rates, build.about)
     if supply != 0:
         symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", f"heat supplied to keep {node.name}"), supply)

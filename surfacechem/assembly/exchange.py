@@ -30,9 +30,8 @@ def friction(build: Build) -> None:
 
 
 def _reversal(build: Build) -> None:
-    v = symengine.Symbol("v")
-    if build.rate_of(v) != 0 and not any(margin.name == "v" for margin in build.margins):
-        build.margins.append(Margin("v", v, "sliding reverses", terminal=False))
+    if build.slope_of("v") != 0 and not any(margin.name == "v" for margin in build.margins):
+        build.margins.append(Margin("v", symengine.Symbol("v"), "sliding reverses", terminal=False))
 
 
 def heat_paths(build: Build) -> None:
@@ -82,6 +81,8 @@ def _received(build: Build, law: HeatTransfer, flux: Expression) -> None:
     for end, heat in zip(law.between, (-flux, flux), strict=True):
         if end in group:
             group[end] += heat
+        elif end == "interface":
+            build.into_interface.append(heat)
 
 
 def _path_name(build: Build, law: HeatTransfer) -> str:
@@ -112,3 +113,5 @@ def _external_heat(build: Build, member: str, name: str) -> None:
         _share(build, Q)
     if member in build.into_body:
         build.into_body[member] += Q
+    else:
+        build.into_interface.append(Q)

@@ -7,11 +7,12 @@ from typing import Any
 
 import symengine
 
-from surfacechem.assembly.build import Bond, Build
+from surfacechem.assembly.build import NOTHING, Bond, Build
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
+from surfacechem.terms import Load, Spec
 
 LOADABLE = ("phi", "g_n", "g_t", "v", "p", "J_c", "Q_1", "Q_2", "Q_c")
 """Variables that a case may prescribe, beside the temperatures."""
@@ -31,24 +32,32 @@ def prescribed_variables(build: Build) -> None:
         if name not in LOADABLE:
             known = [*LOADABLE, *build.nodes]
             raise InputError(f"loading: nothing is called '{name}'.{suggestion(name, known)}")
-        build.variables.define(name, partial(build.prescribe, VARIABLES[name], load), "prescribed", "loading")
+        build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
+
+
+def _prescribed(build: Build, name: str, load: Load) -> Expression:
+    symbol = build.prescribe(VARIABLES[name], load)
+    if name == "J_c":
+        build.margins.append(Margin("J_c > 0", symbol - NOTHING, "the area stretch J_c reached zero"))
+    if name == "phi":
+        _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
+    return symbol
 
 
 def bonding_variables(build: Build) -> None:
     """Bonding states, site densities and their bounds."""
     sites = build.interface.sites
     if sites is not None:
-        text, density = "nominal density of reference bonding sites", sites.density
-        nominal = partial(build.constant, "N_c", "interface.sites", "1/m^2", text, density)
+        spec = Spec("1/m^2", "nominal density of reference bonding sites", above=0)
+        nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
         build.variables.define("N_c", nominal, "constant", "interface.sites")
         build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
     if any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
         _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding reaction"), limit)
     for variable in build.interface.variables:
-        amount = build.constant(
-            f"N_{variable.name}", f"interface.{variable.name}.density", "1/m^2", "site density", variable.density
-        )
+        spec = Spec("1/m^2", "site density", above=0)
+        amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
         _bonding_state(build, Quantity(variable.name, "1", variable.long_name), amount, 1.0)
         _amounts(build, variable.name, amount)
     if build.interface.bonds:
@@ -82,19 +91,19 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.")
     build.variables.define(name, lambda: symbol, "evolved", "bonding")
     build.bonding[name] = Bond(symbol, dot, density)
-    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", "1", f"initial {name}", initial)
+    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", Spec("1", f"initial {name}"), initial)
     build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
     _bounds(build, name, symbol, limit)
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     if not build.variables.has("slack"):
-        text = "how far rounding may carry a bonding variable beyond its bounds"
-        build.variables.define(
-            "slack", partial(build.constant, "slack", "run.slack", "1", text, 1e-9), "constant", "run"
-        )
+        spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
+        number = partial(build.constant, "slack", "run.slack", spec, 1e-9, internal=True)
+        build.variables.define("slack", number, "constant", "run")
     slack = build.variables.get("slack", "the bounds")
-    top = build.constant(f"{name}_max", f"{name}_max", "1", f"upper bound of {name}", limit)
+    spec = Spec("1", f"upper bound of {name}")
+    top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)
     build.margins.append(Margin(f"{name} >= 0", symbol + slack, f"{name} fell below its bound 0"))
     build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, f"{name} rose above its bound {limit:g}"))
 
@@ -103,7 +112,9 @@ def free_energy(build: Build) -> None:
     """The sum of the interface's potentials, and the tractions that follow."""
     for law in build.interface.potentials:
         bound = build.variables.bind(law, f"interface.potential.{law.name()}")
-        build.psi += build.variables.call(bound, bound.statement)
+        F = build.variables.call(bound, bound.statement)
+        build.refuse_foreign(F, _known(build), law)
+        build.psi += F
         build.law_ranges(law)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]
@@ -114,6 +125,14 @@ def free_energy(build: Build) -> None:
             "Give `interface.temperature` a name."
         )
     _tractions(build)
+
+
+def _known(build: Build) -> set[Any]:
+    """What the balance of the interface accounts for: its own temperature, bonds and gaps."""
+    names = {"phi", "g_n", "g_t", *build.bonding}
+    if build.interface.temperature is not None:
+        names.add(build.node_of["interface"].name)
+    return {symengine.Symbol(name) for name in names}
 
 
 def _tractions(build: Build) -> None:

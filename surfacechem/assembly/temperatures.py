@@ -13,16 +13,14 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
-from surfacechem.terms import Load
+from surfacechem.terms import Load, Spec
 
 
 def temperatures(build: Build) -> None:
     """Nodes: who carries which temperature, and which are prescribed."""
     if build.scene.T_0 is not None:
-        value = build.scene.T_0
-        build.variables.define(
-            "T_0", lambda: build.constant("T_0", "T_0", "K", "reference temperature", value), "constant", "T_0"
-        )
+        spec = Spec("K", "reference temperature", above=0)
+        build.variables.define("T_0", partial(build.constant, "T_0", "T_0", spec, build.scene.T_0), "constant", "T_0")
     for k, body in enumerate(build.scene.bodies, start=1):
         _join(build, f"T_{k}", body.temperature, body.name)
     if build.interface.temperature is not None:
@@ -58,7 +56,7 @@ def _new_node(build: Build, name: str, load: Load | None) -> Node:
         node = Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
     else:
         build.prescribe(quantity, load)
-        node = Node(name, symbol, build.rate_of(symbol), prescribed=True)
+        node = Node(name, symbol, build.slope_of(name), prescribed=True)
     build.nodes[name] = node
     return node
 
@@ -73,4 +71,6 @@ def _body_energy(build: Build, body: Body, suffix: str) -> None:
     node = build.node_of[body.name]
     if body.energy is not None:
         law = build.variables.bind(body.energy, f"bodies.{body.name}", suffix)
-        node.energies[body.name] = law.energy(T=node.T, T_0=build.variables.get("T_0", f"the body {body.name}"))
+        F = law.energy(T=node.T, T_0=build.variables.get("T_0", f"the body {body.name}"))
+        build.refuse_foreign(F, {node.T}, body.energy)
+        node.energies[body.name] = F

@@ -48,30 +48,46 @@ def _suffix(build: Build, member: str) -> str:
 def _fluxes(build: Build) -> None:
     fluxes = [_flux(build, k, body) for k, body in enumerate(build.scene.bodies, start=1)]
     known = [flux for flux in fluxes if flux is not None]
+    if all(flux == 0 for flux in known):
+        return
+    for k, body, flux in zip((1, 2), build.scene.bodies, fluxes, strict=True):
+        if flux is not None:
+            text = f"heat flux from the interface into {body.name}"
+            build.areal(Quantity(f"q_{k}", "W/m^2", text, tag="e:qc_k1"), flux)
     if len(known) == 2:
-        build.name(Quantity("q_m", "W/m^2", "mean heat flux into the bodies", tag="e:qm_def"), sum(known) / 2)
-        build.name(
-            Quantity("q_t", "W/m^2", "transfer heat flux from body 2 to body 1", tag="e:qt_def"),
-            (known[0] - known[1]) / 2,
-        )
+        q_1, q_2 = symengine.symbols("q_1 q_2")
+        build.name(Quantity("q_m", "W/m^2", "mean heat flux into the bodies", tag="e:qm_def"), (q_1 + q_2) / 2)
+        text = "transfer heat flux from body 2 to body 1"
+        build.name(Quantity("q_t", "W/m^2", text, tag="e:qt_def"), (q_1 - q_2) / 2)
 
 
 def _flux(build: Build, k: int, body: Body) -> Expression | None:
-    """Heat into a body from the interface: stated by its laws, or recovered where they share a temperature."""
+    """Heat into a body from the interface: stated by its laws, or recovered from a balance where it has none.
+
+    Two bodies that share a prescribed temperature leave open which of them the heat goes into.
+    """
     node = build.node_of[body.name]
-    recovered = None
-    if body.name in node.energies:
+    sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
+    flux = build.from_interface[body.name]
+    if sharing and node.prescribed:
+        if sharing != ["interface"]:
+            return None
+        flux = flux + sum(build.into_interface) - balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
+    elif body.name in node.energies:
         rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
         recovered = rate - build.into_body[body.name]
+        flux = recovered if sharing else flux
+        if not node.prescribed:
+            _book_heat(build, k, body, recovered)
+            return flux
+    _book_heat(build, k, body, flux)
+    return flux
+
+
+def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
+    if flux != 0:
         account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
-        build.ledger.append(Account(account, recovered, "heat"))
-    shared = any(other is node for name, other in build.node_of.items() if name != body.name)
-    flux = recovered if shared else build.from_interface[body.name]
-    if flux is None or flux == 0:
-        return None
-    quantity = Quantity(f"q_{k}", "W/m^2", f"heat flux from the interface into {body.name}", tag="e:qc_k1")
-    build.areal(quantity, flux)
-    return symengine.Symbol(quantity.name)
+        build.ledger.append(Account(account, flux, "heat"))
 
 
 def regime(build: Build) -> str:

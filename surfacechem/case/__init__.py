@@ -129,7 +129,7 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         if key not in top:
             raise tree.error(f"the case needs `{key}`, for example `{example}`.")
     places = dict(tree.places())
-    reader = SceneReader(Source(top, source.base, source.mechanism_text), places)
+    reader = SceneReader(Source(top, source.base, source.mechanism_text))
     titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
     return Case(
         name=name,

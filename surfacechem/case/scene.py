@@ -13,7 +13,7 @@ from surfacechem.case.fields import choice, items, mapping, number
 from surfacechem.case.laws import build, history, law, law_list
 from surfacechem.case.mechanism import read_mechanism
 from surfacechem.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw, Spec
@@ -43,8 +43,7 @@ class Source:
 class SceneReader:
     """Reads the parts of a scene; each part knows the names that the others have given."""
 
-    def __init__(self, source: Source, places: Mapping[str, Place]) -> None:
-        self.places = places
+    def __init__(self, source: Source) -> None:
         self.top = source.top
         self.bodies = self._body_trees()
         self.interface = mapping(source.top.get("interface"), INTERFACE_KEYS)
@@ -72,7 +71,6 @@ class SceneReader:
             surroundings=surroundings,
             T_0=self._reference_temperature(),
             initial=self._initial(interface, loading),
-            places=self.places,
         )
 
     # -- bodies and temperatures ----------------------------------------------------------------------------------

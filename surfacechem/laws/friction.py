@@ -17,6 +17,8 @@ class Coulomb(Friction):
     30000.0
     """
 
+    nonnegative = ("p",)
+
     mu: float = parameter("1", "sliding friction coefficient", at_least=0)
 
     def traction(self, p: Expression, v: Expression) -> Expression:

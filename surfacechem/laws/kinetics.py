@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, exp, expm1
+from surfacechem.expressions import Expression, exp, expm1, power
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.terms import RateLaw, parameter
 
@@ -88,4 +88,4 @@ class Arrhenius(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, T_c: Expression, T_0: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         k = self.A * (T_c / T_0) ** self.b * exp(-self.E_a / (GAS_CONSTANT * T_c))
-        return n_c * k * (1 - phi) ** self.n
+        return n_c * k * power(1 - phi, self.n)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import ClassVar
 
 from surfacechem.errors import InputError
@@ -75,7 +76,8 @@ class Table(Load):
 
     .. math:: x(t) = x_j + s_j (t - t_j) \quad \text{for } t_j \le t < t_{j+1}
 
-    A time given twice is a jump. Source: definition. The run stops at every point, so no pulse is stepped over.
+    A time given twice is a jump, which variables that store energy (gaps, bonds, temperatures of bodies) may not have.
+    Source: definition. The run stops at every point, so no pulse is stepped over.
 
     >>> table = Table(times=[0.0, 1.0], values=[0.0, 2.0])
     >>> table.bind(table.piece(0.5)).value(t=0.5)
@@ -96,12 +98,17 @@ class Table(Load):
             )
         if not all(math.isfinite(x) for x in (*self.times, *self.values)):
             raise InputError("times and values of a table must be finite.")
-        if any(b < a for a, b in zip(self.times, self.times[1:], strict=False)):
+        if any(b < a for a, b in pairwise(self.times)):
             raise InputError("times of a table must never decrease.")
 
     def breakpoints(self) -> tuple[float, ...]:
         """Every time of the table."""
         return tuple(dict.fromkeys(self.times))
+
+    def jumps(self) -> tuple[float, ...]:
+        """Times given twice with different values."""
+        points = list(zip(self.times, self.values, strict=True))
+        return tuple(t for (t, x), (s, y) in pairwise(points) if t == s and x != y)
 
     def piece(self, start: float) -> Mapping[str, float]:
         """Origin, level and slope of the line that holds from ``start`` on."""

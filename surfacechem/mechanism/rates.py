@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from surfacechem.expressions import Expression, exp, log, positive, where
+from surfacechem.expressions import Expression, exp, log, power, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.terms import RateLaw, Spec, option, parameter
@@ -140,7 +140,7 @@ class SurfaceReaction(RateLaw):
         for item in self.species:
             order = orders.get(item.variable, 0)
             if order:
-                product *= power(values[item.concentration] * values[item.variable], order)
+                product *= power(values[item.concentration] * values[item.variable], plain(order))
         return product
 
 
@@ -229,11 +229,3 @@ def plain(number: float) -> int | float:
     (2, 0.5)
     """
     return int(number) if float(number).is_integer() else float(number)
-
-
-def power(amount: Expression, order: float) -> Expression:
-    """amount**order; a fractional order takes the positive part, so that rounding below zero stays harmless."""
-    exponent = plain(order)
-    if isinstance(exponent, int):
-        return amount**exponent
-    return where(amount > 0, positive(amount) ** exponent, 0 * amount)

@@ -7,7 +7,7 @@ satisfy the assembled equations.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.integrate import Trajectory
 from surfacechem.references.base import Reference
-from surfacechem.terms import HeatTransfer
+from surfacechem.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -27,11 +27,9 @@ PROBES = 7
 """Times at which the equations are tested."""
 
 
-def exact_values(
-    name: str, options: Mapping[str, float], heat: Sequence[HeatTransfer], run: Trajectory
-) -> dict[str, Array]:
+def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
-    reference = match(references.get(name), options, Start(run, heat))
+    reference = match(references.get(name), options, Start(run, scene))
     exact = _renamed(reference.solution(run.result.times), run)
     _check_start(exact, run)
     _check(reference, run)
@@ -55,8 +53,8 @@ def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> 
 class Start:
     """What a scene says of itself at the start, by the names that exact solutions use."""
 
-    def __init__(self, run: Trajectory, heat: Sequence[HeatTransfer] = ()) -> None:
-        self.run, self.heat = run, heat
+    def __init__(self, run: Trajectory, scene: Scene) -> None:
+        self.run, self.scene = run, scene
         system = run.model.system
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
         self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
@@ -106,19 +104,14 @@ class Start:
 
     def conductance(self, chosen: Callable[[tuple[str, str]], bool]) -> float:
         """Sum of the conductances of the chosen heat paths."""
-        laws = [law for law in self.heat if chosen(law.between)]
+        laws = [law for law in self.scene.heat if chosen(law.between)]
         if not laws:
             raise KeyError("no such heat path")
         return sum(self.run.values[f"{law.path}.h"] for law in laws)
 
-    def body(self, k: int) -> str:
-        """Name of body k among the ends of the heat paths."""
-        return next(law.between[1 - law.between.index("interface")] for law in self.heat if self._into(law, k))
-
-    def _into(self, law: HeatTransfer, k: int) -> bool:
-        names = [item.name for item in self.run.model.system.outputs if item.name in (f"q_c{k}", f"q_{k}c")]
-        text = next(i.quantity.long_name for i in self.run.model.system.outputs if i.name in names)
-        return "interface" in law.between and all(end in text for end in law.between)
+    def into(self, k: int) -> float:
+        """Sum of the conductances between the interface and body k."""
+        return self.conductance(lambda ends: set(ends) == {"interface", self.scene.bodies[k - 1].name})
 
 
 RULES: dict[str, Callable[[Start], float]] = {
@@ -135,8 +128,8 @@ RULES: dict[str, Callable[[Start], float]] = {
     "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
     "h": lambda s: s.conductance(lambda ends: True),
     "H": lambda s: s.conductance(lambda ends: True),
-    "h_1": lambda s: s.conductance(lambda ends: s.body(1) in ends),
-    "h_2": lambda s: s.conductance(lambda ends: s.body(2) in ends),
+    "h_1": lambda s: s.into(1),
+    "h_2": lambda s: s.into(2),
     "T_a": lambda s: s.named["T_a"] if "T_a" in s.named else s.named["T_2"] if "T_2" in s.named else s.named["T_1"],
 }
 """Parameters of exact solutions that are not parameters of the scene under the same name."""
