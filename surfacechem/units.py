@@ -146,9 +146,16 @@ def _converted(number: str, given: str, unit: str, name: str, difference: bool) 
             raise InputError(f"{shown} is a temperature, {name} a difference of temperatures; give it in K.")
         if not source.is_compatible_with(target):
             raise InputError(f"{shown} is {_described(source)}; {name} needs {needed(unit)}.")
+        if _has_angle(source) and not _has_angle(target):
+            raise InputError(f"{shown} counts an angle; {name} needs {needed(unit)}: cycles per second in Hz, say.")
         return _as_float(registry.Quantity(Decimal(number), source).m_as(target))
     except ArithmeticError:
         raise InputError(f"{shown} is too large or too small to convert to {unit}.") from None
+
+
+def _has_angle(unit: Any) -> bool:
+    """Whether a unit counts radians, which are dimensionless but not one: 1 rpm is no frequency of 1/60 Hz to Pint."""
+    return "radian" in str(_registry().Quantity(1, unit).to_root_units().units)
 
 
 def _per_particle(source: Any, target: Any) -> Any:

@@ -173,3 +173,11 @@ def test_cantera_agrees_on_every_unit_that_both_know():
         assert units.parse(f"3.7 {unit}", to) == pytest.approx(theirs, rel=1e-12), f"{unit}: {ours}"
         seen += 1
     assert seen > 100
+
+
+@pytest.mark.parametrize("given", ["60 rpm", "3 rad/s", "1 deg/s", "1 cycle/s"])
+def test_an_angular_velocity_is_no_frequency(given):
+    with pytest.raises(InputError, match="counts an angle"):
+        units.parse(given, "1/s", name="frequency")
+    assert units.parse("60 Hz", "1/s") == 60.0
+    assert units.parse("180 deg", "rad") == pytest.approx(3.141592653589793)
