@@ -64,6 +64,31 @@ def test_output_rates_come_from_the_equations() -> None:
     np.testing.assert_allclose(output_rates(result)[:, 1], 2.0 * np.exp(-2.0 * result.times), rtol=1e-7)
 
 
+def follower(times) -> Problem:
+    """A variable that follows another within 1e-9 s, and its ledger."""
+    t, x, y, dx, dy = se.symbols("t x y dx dy")
+    program = compile_program(t, [x, y], [dx, dy], [], [dx + x, dy - 1e9 * (1 / (1 + x**4) - y)], ledger=[y])
+    return problem(program, [3.0, 1 / 82], [0.0, 3.0], 1e-11, times=times)
+
+
+def test_outputs_are_as_good_as_step_ends_where_a_variable_follows_another() -> None:
+    times = np.linspace(0.0, 3.0, 61)
+    result = radau.solve(follower(times))
+    exact = 1 / (1 + (3.0 * np.exp(-times)) ** 4)
+    lag = 4 * exact**2 * (3.0 * np.exp(-times)) ** 4 * 1e-9
+    np.testing.assert_allclose(result.outputs[5:, 1], (exact - lag)[5:], rtol=1e-10)
+    integral = np.log((np.exp(4 * times) + 81) / 82) / 4 - 1e-9 * (exact - exact[0])
+    np.testing.assert_allclose(result.ledger_outputs[:, 0], integral, rtol=1e-10, atol=1e-12)
+    assert result.counters.factorizations > result.counters.steps
+
+
+def test_outputs_do_not_change_the_steps() -> None:
+    with_outputs, without = (radau.solve(follower(times)) for times in (np.linspace(0.0, 3.0, 61), ()))
+    assert with_outputs.counters.steps == without.counters.steps
+    np.testing.assert_array_equal(with_outputs.y, without.y)
+    np.testing.assert_array_equal(with_outputs.ledger, without.ledger)
+
+
 @pytest.mark.parametrize("make", [robertson, robertson_dae])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_robertson(make, rtol: float) -> None:

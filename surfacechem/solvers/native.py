@@ -30,7 +30,7 @@ RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
 
 ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = range(13)
 """Rows of the vectors of length n."""
-Q, Q_TRIAL, Q_CORRECTION = range(3)
+Q, Q_TRIAL, Q_CORRECTION, Q_PROBE = range(4)
 """Rows of the vectors of length n_ledger."""
 M_NOW, M_SIDE, M_BEFORE, M_LARGEST, M_SLOPE = range(5)
 """Rows of the vectors of length n_margins: value, side of zero it was last seen on, value before, largest
@@ -202,7 +202,7 @@ def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_marg
         np.zeros((3, n, n), np.complex128),
         np.zeros((4, n), np.int64),
         np.zeros(8),
-        np.zeros((3, n_ledger)),
+        np.zeros((4, n_ledger)),
         np.zeros((7, n_ledger)),
         np.zeros((8, n_ledger)),
         np.zeros((5, n_margins)),

@@ -80,8 +80,8 @@ def loosening(rtol: float) -> float:
 
 
 @compiled
-def _filter(w: Any) -> bool:
-    """Residual of the trial state with the polynomial's starting slope, through the real Newton matrix, into ERROR."""
+def filter_residual(w: Any) -> bool:
+    """Residual at the inputs through the real Newton matrix, an error of the state, into ERROR."""
     error = w.vector[ERROR]
     evaluate(w, RESIDUAL, error.ctypes.data)
     w.count[RESIDUALS] += 1
@@ -115,7 +115,7 @@ def estimate_error(w: Any, h: float) -> float:
         w.vector[DELTA, m] = slope / h
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
     set_inputs(w, w.vector[Y], w.vector[DELTA])
-    if not _filter(w):
+    if not filter_residual(w):
         return np.inf
     norm = _error_norm(w, 0.0)
     if norm < NOISY:
@@ -129,7 +129,7 @@ def estimate_again(w: Any) -> float:
     """The estimate filtered a second time, where a stiff transient made the first one too large."""
     for m in range(w.algebraic.shape[0]):
         w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
-    if not _filter(w):
+    if not filter_residual(w):
         return np.inf
     return float(max(_error_norm(w, MAGNIFIED), NOISY))
 

@@ -213,6 +213,25 @@ def _defect(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(product.integ().coeffs[::-1][1:])
 
 
+def _probe(nodes: NDArray[np.float64]) -> np.float64:
+    """Where the interpolation error x prod_i (x - c_i) is largest."""
+    x = np.linspace(0.0, 1.0, 1001)
+    return np.float64(x[np.argmax(np.abs(x * np.prod(x[:, None] - nodes, axis=1)))])
+
+
+def _probe_rate(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
+    """Values at x of the Lagrange polynomials on c_1, ..., c_s and, last of eight, on 0."""
+    points = np.append(nodes, 0.0)
+    values = [np.prod((x - np.delete(points, i)) / (c - np.delete(points, i))) for i, c in enumerate(points)]
+    return np.concatenate([values[:-1], np.zeros(8 - len(points)), values[-1:]])
+
+
+def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
+    """Coefficients of x^2, x^3, ... in the integral from 0 of x prod_i (x - c_i), which is one at the probe."""
+    product = np.poly1d(np.append(nodes, 0.0), r=True)
+    return np.asarray((product / product(x)).integ().coeffs[::-1][2:])
+
+
 _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
 LAGRANGE = np.array([np.pad(_lagrange(c), (0, 7 - len(c))) for c in _members])
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
@@ -222,3 +241,9 @@ START_SLOPE = np.array([np.pad(-_lagrange(c) * np.prod(-c) / c, (0, 7 - len(c)))
 estimate."""
 DEFECT = np.array([np.pad(_defect(c), (0, 7 - len(c))) for c in _members])
 """Shape of the error of the collocation polynomial, per unit defect of its derivative at 0."""
+PROBE = np.array([_probe(c) for c in _members])
+"""Fraction of the step at which a component that the stages only interpolate is worst."""
+PROBE_RATE = np.array([_probe_rate(c, x) for c, x in zip(_members, PROBE, strict=True)])
+"""Extrapolates the rates of the stages and of the start (last) to the probe."""
+PROBE_SHAPE = np.array([np.pad(_probe_shape(c, x), (0, 7 - len(c))) for c, x in zip(_members, PROBE, strict=True)])
+"""Shape of a quadrature's error, per unit defect of its rate at the probe."""

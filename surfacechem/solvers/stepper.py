@@ -22,6 +22,7 @@ _SOURCES = (
     "consistency",
     "dense",
     "locate",
+    "radau_outputs",
     "trajectory",
 )
 _LOCK = threading.Lock()

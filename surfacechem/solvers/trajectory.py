@@ -2,20 +2,17 @@
 
 from typing import Any
 
-from surfacechem.solvers.consistency import CONSISTENT, find_consistent
+from surfacechem.solvers.consistency import find_consistent
 from surfacechem.solvers.contract import Status
-from surfacechem.solvers.dense import interpolate
 from surfacechem.solvers.locate import find_event, start_margins
 from surfacechem.solvers.native import (
     ATOL,
     BASE,
-    FRESH,
     H_FACTORED,
     LOOSE,
     M_LARGEST,
     M_NOW,
     M_SLOPE,
-    Q_TRIAL,
     RTOL,
     TAU,
     TRIAL,
@@ -34,7 +31,6 @@ from surfacechem.solvers.native import (
 )
 from surfacechem.solvers.radau_advance import (
     GOOD,
-    INVALID,
     accept,
     advance,
     finish_step,
@@ -42,6 +38,7 @@ from surfacechem.solvers.radau_advance import (
     restart,
     store_polynomial,
 )
+from surfacechem.solvers.radau_outputs import write_outputs
 from surfacechem.solvers.radau_step import first_size, loosening
 
 FINISHED = int(Status.FINISHED)
@@ -62,35 +59,6 @@ def _write_state(w: Any, row: Any, t: float) -> None:
         row[1 + n + j] = w.vector[YDOT, j]
     for m in range(w.ledger.shape[1]):
         row[1 + 2 * n + m] = w.ledger[Q, m]
-
-
-@compiled_once
-def _write_output(w: Any, row: Any, t: float, x: float) -> None:
-    """[y | ledger] at the fraction x of the step; algebraic variables are made consistent with the rest."""
-    interpolate(w, x)
-    n = w.algebraic.shape[0]
-    for j in range(n):
-        row[j] = w.vector[TRIAL, j]
-        w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
-    for m in range(w.ledger.shape[1]):
-        row[n + m] = w.ledger[Q_TRIAL, m]
-    if any_true(w.algebraic):
-        w.inputs[0] = t
-        w.clock[H_FACTORED] = 0.0
-        w.count[FRESH] = INVALID
-        if find_consistent(w) == CONSISTENT:
-            for j in range(n):
-                row[j] = w.vector[TRIAL, j]
-
-
-@compiled_once
-def _write_outputs(w: Any, times: Any, outputs: Any, written: int, h: float, end: float) -> int:
-    """Outputs up to the end of the step; returns how many the run has now."""
-    while written < times.shape[0] and times[written] <= end:
-        x = ((times[written] - w.clock[BASE]) - w.clock[TAU]) / h
-        _write_output(w, outputs[written], times[written], min(max(x, 0.0), 1.0))
-        written += 1
-    return written
 
 
 @compiled_once
@@ -170,7 +138,7 @@ def _run_segment(
                 w.clock[H_FACTORED] = 0.0
                 continue
         reached = end if size == remaining else w.clock[BASE] + (w.clock[TAU] + size)
-        counts[OUTPUTS] = _write_outputs(w, times, outputs, counts[OUTPUTS], size, reached)
+        counts[OUTPUTS] = write_outputs(w, times, outputs, counts[OUTPUTS], size, reached)
         store_polynomial(w, size, 1.0)
         accept(w, size)
         if size == remaining:
