@@ -107,6 +107,8 @@ def run(
     simulation = load(case, changes or ())
     settings = _settings(simulation, solver, rtol)
     target = output or Path(f"{simulation.case.name}.nc")
+    if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
+        raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(target)
     solution = _solved(lambda: simulation.run(run=settings), quiet)
     solution.write(target)

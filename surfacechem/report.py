@@ -110,7 +110,7 @@ def check_summary(
         labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"),
         labelled("run", _plan(system, run)),
         _section("States", _state_rows(system)),
-        _section("Roles", [(role.variable, role.role, role.by) for role in system.roles]),
+        _section("Roles", [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]),
         _section("Laws", _law_rows(scene)),
         _section("Numbers", [(g.name, _value(g), g.text) for g in groups]),
         _section("Warnings", [(warning,) for warning in warnings]),

@@ -45,6 +45,10 @@ class Simulation:
     def __init__(self, case: Case) -> None:
         self.case = case
 
+    def __repr__(self) -> str:
+        """Title and states in a line."""
+        return f"<Simulation {self.case.title!r}: {', '.join(state.name for state in self.system.states)}>"
+
     @cached_property
     def system(self) -> System:
         """The assembled equations."""
@@ -78,6 +82,7 @@ class Simulation:
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = {p.path: p.spec.unit for p in self.system.parameters if p.changeable}
         units |= {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
+        changes = {path if path in units else _level(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, units)}")
@@ -117,6 +122,11 @@ class Simulation:
         shared = len(trajectory.result.times)
         errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
         return Accuracy(max(errors.values()), f"estimate: a second run at rtol {other:.0e}", errors)
+
+
+def _level(path: str, known: Mapping[str, str]) -> str:
+    """The path of a constant history may leave out its one parameter."""
+    return f"{path}.level" if f"{path}.level" in known else path
 
 
 def _states(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -77,7 +78,7 @@ def cf_unit(unit: str) -> str:
     return " ".join(factors) or "1"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
 
@@ -91,6 +92,11 @@ class Solution:
     """Parameters and initial values that differ from the case, by path."""
     case_run: Run | None = None
     """How the case would be run; where the run was another, the dataset says so."""
+
+    def __repr__(self) -> str:
+        """Title, end and error in a line."""
+        error = f", error {self.accuracy.error:.1e}" if self.accuracy else ""
+        return f"<Solution {self.title!r}: {self.status}, {self.reason}{error}>"
 
     @property
     def status(self) -> str:
@@ -265,9 +271,19 @@ def _versions() -> str:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A temporary file beside the target that takes its place when all went well; InputError if it cannot be made."""
+    """A temporary file beside the target that takes its place when all went well; InputError if it cannot be made.
+
+    A link is followed; what is no regular file, or protected, is left alone.
+    """
+    target = target.resolve()
     if target.is_dir():
         raise InputError("is a directory; give a file name to write to.", Place(str(target)))
+    if target.exists() and not target.is_file():
+        raise InputError("is no regular file; give a file name to write to.", Place(str(target)))
+    if target.exists() and not target.stat().st_mode & stat.S_IWUSR:
+        raise InputError("cannot be written: it is read-only.", Place(str(target)))
+    if not target.parent.is_dir():
+        raise InputError(f"cannot be written: there is no folder {target.parent}.", Place(str(target)))
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
         os.close(handle)

@@ -15,6 +15,7 @@ import math
 import re
 from decimal import Decimal
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
@@ -103,7 +104,7 @@ def parse(
 
 
 def _number(value: object, unit: str, name: str, difference: bool) -> float:
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, Real) and not isinstance(value, bool):
         return _as_float(value)
     if not isinstance(value, str):
         raise InputError(f"{name} needs {needed(unit)}, got {_kind(value)}.")
@@ -116,7 +117,7 @@ def _number(value: object, unit: str, name: str, difference: bool) -> float:
     return _converted(found[1], found[2], unit, name, difference) if found[2] else float(found[1])
 
 
-def _as_float(value: float | Decimal) -> float:
+def _as_float(value: Real | Decimal) -> float:
     try:
         return float(value)
     except OverflowError:

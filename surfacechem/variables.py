@@ -129,7 +129,7 @@ class Variables:
         law = law if law.place else replace(law, place=Place(path=path))
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
-            values[name] = self._parameter(law, name, law.refine(name, spec), suffix)
+            values[name] = self._parameter(law, name, law.refine(name, spec).resolved(unit), suffix)
         if isinstance(law, Load):
             for name, local_unit in law.local.items():
                 spec = Spec(resolved_unit(local_unit, unit), f"{name} of the present piece")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from surfacechem import data
 from surfacechem.cli import app
 
 BONDING = """\
@@ -146,7 +147,7 @@ class TestCheck:
     def test_says_the_scene_back(self, call):
         done = call("check", "bonding.yaml")
         assert done.exit_code == 0
-        for words in ("perfect contact:", "T_c    merged", "phi  [1]  evolved", "bonding    linear-affinity"):
+        for words in ("perfect contact:", "T_c  merged", "phi  [1]  evolved", "bonding    linear-affinity"):
             assert words in done.stdout
 
     def test_numbers(self, call):
@@ -285,3 +286,12 @@ class TestPlot:
     def test_of_a_stopped_case_ends_like_the_run(self, call, tmp_path):
         assert call("plot", "cooling.yaml").exit_code == 3
         assert files(tmp_path) == {"cooling.png"}
+
+
+def test_a_case_is_not_overwritten_by_its_own_dataset(call, tmp_path):
+    case = tmp_path / "mine.yaml"
+    case.write_text((data.cases() / "exothermic.yaml").read_text())
+    result = call("run", case, "-o", case)
+    assert result.exit_code == 2
+    assert "is the case itself" in result.stderr
+    assert case.read_text().startswith("title")

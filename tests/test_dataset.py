@@ -1,5 +1,7 @@
 """The dataset: conventions, units, attributes, and files that appear whole or not at all."""
 
+import os
+
 import numpy as np
 import pytest
 import xarray
@@ -105,3 +107,24 @@ def test_an_unwritable_target_is_refused(solution, tmp_path, target):
 def test_units_in_the_notation_of_the_conventions():
     assert cf_unit("1/(J s m^2)") == "J-1 s-1 m-2"
     assert cf_unit("Pa s") == "Pa s"
+
+
+def test_a_link_is_followed_and_what_is_no_file_is_left_alone(solution, tmp_path):
+    real = tmp_path / "real.nc"
+    real.write_text("old")
+    (tmp_path / "link.nc").symlink_to(real)
+    solution.write(tmp_path / "link.nc")
+    assert (tmp_path / "link.nc").is_symlink()
+    assert xarray.open_dataset(real)["T"].size == 201
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is no regular file"):
+        solution.write(tmp_path / "pipe")
+    real.chmod(0o444)
+    with pytest.raises(InputError, match="it is read-only"):
+        solution.write(real)
+
+
+def test_a_solution_says_itself_in_a_line(solution):
+    assert repr(solution).startswith(
+        "<Solution 'Exothermic bonding, kappa = 0.5': finished, reached the end at t = 2.5 s"
+    )

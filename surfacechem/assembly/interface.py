@@ -100,7 +100,7 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     if not build.variables.has("slack"):
         spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
         number = partial(build.constant, "slack", "run.slack", spec, 1e-9, internal=True)
-        build.variables.define("slack", number, "constant", "run")
+        build.variables.define("slack", number, "internal", "run")
     slack = build.variables.get("slack", "the bounds")
     spec = Spec("1", f"upper bound of {name}")
     top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)

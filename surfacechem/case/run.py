@@ -116,8 +116,10 @@ def _spaced(fields: Mapping[str, Tree]) -> tuple[float, ...]:
     return (0.0, *(first * math.exp(ratio * i / steps) for i in range(count - 2)), end)
 
 
-def read_reference(tree: Tree) -> Reference:
-    """The exact solution, by name or as ``{name: ..., parameter: value}``."""
+def read_reference(tree: Tree) -> Reference | None:
+    """The exact solution, by name or as ``{name: ..., parameter: value}``; none where it is left empty."""
+    if tree.value is None or tree.value == "":
+        return None
     fields = mapping(tree) if isinstance(tree.value, dict) else {"name": tree}
     if "name" not in fields:
         raise tree.error("the exact solution needs a `name`.")
