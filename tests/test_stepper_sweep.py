@@ -10,6 +10,7 @@ from surfacechem.assembly import assemble
 from surfacechem.integrate import Model, Run
 from surfacechem.solvers.contract import Status
 from surfacechem.solvers.radau import Radau
+from surfacechem.solvers.radau_stages import COARSE
 
 TOLERANCES = [10.0**-digits for digits in range(3, 14)]
 ROBERTSON = [2.083340149701255e-08, 8.333360770334713e-14]
@@ -56,14 +57,16 @@ def test_smooth_tables(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in MAKERS if name not in SMOOTH])
 def test_extreme_tables(name: str) -> None:
-    """Layers of 1e-300 s and slopes beyond 1e200: solved whenever the tolerance resolves the bounds of the states."""
+    """Layers of 1e-300 s and slopes beyond 1e200: solved, or where the tolerance does not resolve them, given up."""
     table = MAKERS[name]()
     model = Model(assemble(table.scene))
-    for rtol in TOLERANCES[3:]:
+    for rtol in TOLERANCES:
         trajectory = model.solve(Run(times=with_start(table), rtol=rtol))
+        if rtol > COARSE and not trajectory.result.success:
+            continue
         assert trajectory.status == "finished", trajectory.reason
         assert max(errors(table, trajectory).values()) < CONDITION * rtol
-        assert trajectory.result.counters.steps < 2000
+        assert trajectory.result.counters.steps < 2000 or rtol > COARSE
 
 
 def with_start(table: tables.Table) -> np.ndarray:

@@ -25,6 +25,7 @@ from surfacechem.solvers.native import (
     RESIDUAL,
     RESIDUALS,
     ROUNDING,
+    RTOL,
     SCALE,
     TAU,
     THETA,
@@ -54,8 +55,14 @@ from surfacechem.solvers.radau_tables import (
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
-TIGHT = 0.05
-"""Newton error allowed, in units of the tolerance."""
+TIGHT = 0.001
+"""Newton error allowed, in units of the tolerance. The order of the method makes steps better than the tolerance, so
+that a looser limit would set the error; and a Jacobian taken where the equations are far stiffer than at the solution
+makes the corrections small before the residual is.
+"""
+
+COARSE = 3e-6
+"""Tolerance above which one correction is not believed: a layer thinner than that may hide behind its Jacobian."""
 
 SLOWEST_KNOWN = 0.02
 """Contraction never assumed better than this: a component that converges at once hides a slower one behind its first
@@ -222,7 +229,8 @@ def solve_stages(w: Any, h: float) -> int:
                 return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
             w.clock[THETA] = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
-        if contraction * norm <= TIGHT or norm <= 8.0 * rounding:
+        believed = iteration > 0 or w.clock[RTOL] < COARSE
+        if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * rounding:
             w.clock[CONTRACTION] = contraction
             return CONVERGED
         norm_last = max(norm, 1e-300)
