@@ -53,6 +53,7 @@ class _Tables:
         event_rows: int,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
+        self.step_rows, self.event_rows = step_rows, event_rows
         self.stop = np.zeros(1, np.int64)
         self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
         self.counts = np.zeros((runs, 4), np.int64)
@@ -83,13 +84,15 @@ class _Tables:
 
     def too_short(self, counts: list[int]) -> bool:
         """Whether a run met more events or steps than there are rows; tables without rows record nothing."""
-        return any(0 < kept.shape[1] < counts[i] for i, kept in ((EVENTS, self.events), (RECORDS, self.steps)))
+        return 0 < self.event_rows < counts[EVENTS] or 0 < self.step_rows < counts[RECORDS]
 
     def run(self, first: int, last: int) -> None:
         stepper.run_batch()(first, last, *self.arguments)
 
 
 def _contiguous(values: ArrayLike) -> Array:
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.c_contiguous:
+        return values
     return np.ascontiguousarray(values, dtype=float)
 
 
