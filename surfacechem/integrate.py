@@ -73,6 +73,19 @@ class Trajectory:
         return output_rates(self.result)
 
     @cached_property
+    def roundings(self) -> dict[str, float]:
+        """By how much the last bit of a state changes each named quantity at most."""
+        result = self.result
+        worst = np.zeros(self.outputs.shape[1])
+        for j in range(result.outputs.shape[1]):
+            nudged = result.outputs.copy()
+            nudged[:, j] *= 1 + np.finfo(float).eps
+            values = self.model.evaluate(result, result.times, nudged, self.rates)
+            worst = np.maximum(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
+        names = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, worst, strict=True))
+
+    @cached_property
     def everywhere(self) -> dict[str, Array]:
         """States and named quantities at the output times and at every step."""
         result, steps = self.result, self.result.steps

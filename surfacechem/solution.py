@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 CONVENTIONS = "CF-1.11"
 
+LOST = 1e-4
+"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
+
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
@@ -117,7 +120,15 @@ class Solution:
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the results has to know, in words."""
         system = self.trajectory.model.system
-        return (*self.audit.findings, *self._extrapolations(), *system.warnings)
+        return (*self.audit.findings, *self._extrapolations(), *self._lost_fluxes(), *system.warnings)
+
+    def _lost_fluxes(self) -> list[str]:
+        """Fluxes through conductances so large that the temperature difference is rounding."""
+        fluxes = {name: size for name, size in self.trajectory.roundings.items() if name.startswith("q_")}
+        largest = max((float(np.max(np.abs(self.trajectory.everywhere[name]))) for name in fluxes), default=0.0)
+        lost = [name for name, size in fluxes.items() if size > LOST * largest]
+        advice = "let the two share one temperature, or use the heat_into variables, which are exact"
+        return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
     def _extrapolations(self) -> list[str]:
         """Laws that the run has used outside their range."""

@@ -18,6 +18,7 @@ from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.kinetics import ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.scene import Body, Interface, Scene
+from surfacechem.solution import Solution
 
 
 def solve(scene, end, outputs=11, **settings):
@@ -100,6 +101,14 @@ def test_infinite_direct_conductance_is_one_temperature(h):
 def test_an_interface_temperature_that_nothing_determines_is_refused():
     with pytest.raises(InputError, match="nothing determines the interface temperature T_c"):
         assemble(Scene(bodies(), Interface("T_c"), (), {}, None, 300.0, {"T_1": 300.0, "T_2": 300.0}))
+
+
+@pytest.mark.parametrize(("h", "lost"), [(1e3, False), (1e9, False), (1e20, True)])
+def test_fluxes_that_are_rounding_are_called_out(h, lost):
+    """The states and the heat received stay right at any conductance; h times a difference of rounding does not."""
+    trajectory = solve(exchange(h), 2.0)
+    warnings = [text for text in Solution(trajectory).warnings if "lost to rounding" in text]
+    assert bool(warnings) is lost
 
 
 def test_one_sided_contact_is_the_limit_of_one_large_conductance():
