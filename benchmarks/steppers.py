@@ -237,8 +237,8 @@ def main() -> None:
     """Run everything."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     print(machine())
-    curves = [curve for rtol in (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-12) for curve in p1_curves(rtol)]
-    curves += [curve for rtol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
+    curves = [curve for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for curve in p1_curves(rtol)]
+    curves += [curve for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
     measure(curves)
     report(curves, folder)
     plot(curves, folder)
