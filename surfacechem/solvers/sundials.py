@@ -15,7 +15,7 @@ class _Stretch(Method):
     """Single steps of either library; interpolation inside the last step is a step back to it."""
 
     def __init__(self, library: Any, t: float, end: float, *start: Array) -> None:
-        self.library = library
+        self.integrator = library
         self.end = end
         self.t = t
         self.x = start[0]
@@ -34,7 +34,7 @@ class _Stretch(Method):
         before = self.t
         # After an interpolation the library first returns to where it was.
         for _attempt in range(2):
-            answer = self._call(lambda: self.library.step(self.end, method="onestep", tstop=self.end))
+            answer = self._call(lambda: self.integrator.step(self.end, method="onestep", tstop=self.end))
             self.t, self.x = float(answer.t), np.array(answer.y)
             if self.t > before:
                 break
@@ -43,7 +43,7 @@ class _Stretch(Method):
     def at(self, t: float) -> Array:
         if t == self.t:
             return self.x
-        answer = self._call(lambda: self.library.step(t, method="normal", tstop=self.end))
+        answer = self._call(lambda: self.integrator.step(t, method="normal", tstop=self.end))
         if not abs(answer.t - t) <= 1e-12 * abs(t):
             raise StepError(f"asked for t = {t}, given t = {answer.t}")
         return np.array(answer.y)
