@@ -19,7 +19,8 @@ L = TypeVar("L", bound=Law)
 REMEDIES = {
     "g_n": "Prescribe `g_n` under `loading`.",
     "g_t": "Prescribe `g_t` under `loading`.",
-    "v": "Prescribe `v` under `loading`.",
+    "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
+    "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
     "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
     "T_0": "Give the reference temperature `T_0` at the top of the case.",

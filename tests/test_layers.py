@@ -15,8 +15,8 @@ FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
     "contracts": ["terms", "scene"],
     "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
-    "time": ["solvers.*", "events", "integrate"],
-    "results": ["solution", "audit"],
+    "time": ["solvers.*", "jumps", "events", "integrate"],
+    "results": ["solution", "audit", "event_table"],
     "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }

@@ -13,6 +13,7 @@ from surfacechem.terms import (
     Friction,
     HeatTransfer,
     Law,
+    Limit,
     Load,
     Potential,
     RateLaw,
@@ -24,6 +25,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     RateLaw: ("kinetics",),
     Friction: ("friction",),
     HeatTransfer: ("heat",),
+    Limit: ("limits",),
     Load: ("loading",),
     Factor: ("factors",),
 }

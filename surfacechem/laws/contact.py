@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, log
+from surfacechem.expressions import Expression, log, positive
 from surfacechem.terms import Potential, parameter
 
 
@@ -23,6 +23,24 @@ class NormalStiffness(Potential):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return self.E_n * g_n**2 / 2
+
+
+class BondedContact(Potential):
+    r"""Linear elastic contact that carries tension only while it is bonded.
+
+    .. math:: \Psi = \tfrac12 E_n g_n^2 \quad \text{if bonded or } g_n < 0, \quad \text{else } 0
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c with its remark 5.6. Any g_n.
+
+    >>> BondedContact(E_n=1e12).energy(g_n=1e-6, bonded=1.0), BondedContact(E_n=1e12).energy(g_n=1e-6, bonded=0.0)
+    (0.5, 0.0)
+    """
+
+    E_n: float = parameter("Pa/m", "normal contact stiffness", at_least=0)
+
+    def energy(self, g_n: Expression, bonded: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.E_n * (bonded * positive(g_n) ** 2 + positive(-g_n) ** 2) / 2
 
 
 class TangentialStiffness(Potential):

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, sign
+from surfacechem.expressions import Expression
 from surfacechem.terms import Friction, parameter
 
 
 class Coulomb(Friction):
     r"""Amontons-Coulomb dry friction.
 
-    .. math:: t_t = \mu\,p\,\mathrm{sgn}(v)
+    .. math:: t_t = \mu\,p\,\mathrm{sgn}(v), \quad |t_t| \le \mu_s\,p \text{ at rest}
 
-    Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric. Any v; p >= 0. Dissipates :math:`t_t v \ge 0`.
+    Source: Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max. Any v; p >= 0. Dissipates
+    :math:`t_t v \ge 0`. Without a static coefficient, or with one below mu, the interface sticks up to mu p.
 
-    >>> Coulomb(mu=0.3).traction(p=1e5, v=0.02)
-    30000.0
+    >>> Coulomb(mu=0.3).traction(p=1e5, direction=1.0), Coulomb(mu=0.3, mu_s=0.5).limit(p=1e5)
+    (30000.0, 50000.0)
     """
 
     nonnegative = ("p",)
 
     mu: float = parameter("1", "sliding friction coefficient", at_least=0)
+    mu_s: float = parameter("1", "static friction coefficient, where it is above mu", default=0.0, at_least=0)
 
-    def traction(self, p: Expression, v: Expression) -> Expression:
+    def traction(self, p: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""
-        return self.mu * p * sign(v)
+        return self.mu * p * direction
+
+    def limit(self, p: Expression) -> Expression:
+        """Traction that sticking bears [Pa]."""
+        return self.mu_s * p
 
 
 class Viscous(Friction):
