@@ -182,6 +182,9 @@ def test_every_table_is_used():
         "x02_capacity_validity",
         "x03_exponential_overflow",
         "x06_stiff_exchange",
+        "i_lj_flat_flat",
+        "i_lj_sphere_plane",
+        "h_damage_equilibrium",
     }
     assert used == {file.stem for file in FOLDER.glob("*.json")}
 
