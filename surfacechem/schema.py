@@ -195,7 +195,7 @@ def _default(law: type[Law], name: str) -> Any:
 
 def _with_default(law: type[Law], name: str, entry: Schema) -> Schema:
     default = _default(law, name)
-    return entry if default is dataclasses.MISSING else {**entry, "default": default}
+    return entry if default in (dataclasses.MISSING, None) else {**entry, "default": default}
 
 
 def _parameter(spec: Spec) -> Schema:

@@ -82,7 +82,10 @@ def parameter(
     at_most: float = math.inf,
     varies: bool = True,
 ) -> Any:
-    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors."""
+    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors.
+
+    With the default None the formula says what stands for what is not given.
+    """
     spec = Spec(unit, text, above, at_least, at_most, varies)
     return field(default=default, metadata={"spec": spec})
 

@@ -145,6 +145,8 @@ class Variables:
             for factor in value.factors:
                 symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}", unit=unit_of(factor.of)))
             return symbol
+        if value is None:
+            return None
         if law.is_default(name):
             return int(value) if float(value).is_integer() else value
         return self.parameters.add(name + suffix, path, spec, value)

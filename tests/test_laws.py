@@ -79,15 +79,34 @@ def test_friction_never_drives(law):
             assert instance.traction(**{name: own.get(name, value) for name, value in values.items()}) * v >= 0
 
 
+def limited() -> list[type[Friction]]:
+    return [law for law in laws(Friction).values() if hasattr(law, "limit")]
+
+
+@pytest.mark.parametrize("law", limited(), ids=lambda law: law.name())
+def test_sticking_bears_a_traction_at_rest(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        draw = random.Random(seed)
+        values = {name: draw.uniform(0.1, 0.9) for name in reads(instance.limit)}
+        assert "v" not in values
+        assert set(values) <= READABLE
+        number = instance.limit(**values)
+        assert number >= 0
+        symbols = {name: symengine.Symbol(name) for name in values}
+        symbolic = instance.limit(**symbols).subs({symbols[name]: value for name, value in values.items()})
+        assert float(symbolic) == pytest.approx(number, rel=1e-12)
+
+
 @pytest.mark.parametrize("law", laws(RateLaw).values(), ids=lambda law: law.name())
 def test_reaction_runs_downhill(law):
     """Laws that read the affinity are admissible for any sign of it; forward reactions where it drives them."""
     for seed in range(SAMPLES):
         instance = example(law, seed)
         values = point(instance, seed)
-        for mu in (1e-20, -1e-20) if "mu" in values else (-1e-20,):
-            state = values | ({"mu": mu} if "mu" in values else {})
-            assert -mu * instance.rate(**state) > 0
+        signs = (1e-20, -1e-20) if "mu" in values else (-1e-20,)
+        dissipated = [-mu * instance.rate(**values | ({"mu": mu} if "mu" in values else {})) for mu in signs]
+        assert min(dissipated) >= 0 < max(dissipated)
 
 
 @pytest.mark.parametrize("law", laws(HeatTransfer).values(), ids=lambda law: law.name())
@@ -112,7 +131,7 @@ def test_refuses_what_is_not_finite_or_out_of_range(law):
 def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest():
     assert find(Friction, "coulomb").name() == "coulomb"
     with pytest.raises(
-        InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: coulomb, viscous"
+        InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: bonded-coulomb, coulomb, "
     ):
         find(Friction, "colomb")
 

@@ -21,8 +21,8 @@ from surfacechem.terms import (
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact"),
-    RateLaw: ("kinetics",),
+    Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange"),
+    RateLaw: ("kinetics", "adhesion"),
     Friction: ("friction",),
     HeatTransfer: ("heat",),
     Limit: ("limits",),
