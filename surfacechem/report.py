@@ -66,6 +66,7 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
         labelled("time", f"{_time(solution)}; {work}"),
         labelled("balances", _balances(solution.audit)),
+        *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
         *([labelled("written", str(written))] if written else []),
     ]

@@ -16,7 +16,7 @@ FLOORS = {
     "contracts": ["terms", "scene"],
     "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "events", "integrate"],
-    "results": ["solution", "audit"],
+    "results": ["solution", "audit", "detailedbalance"],
     "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }

@@ -48,6 +48,7 @@ def assemble(scene: Scene) -> System:
         margins=tuple(build.margins),
         roles=tuple(build.variables.roles),
         ranges=tuple(build.ranges),
+        pairs=tuple(build.pairs),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
         warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Margin, Named, Range, State
+from surfacechem.system import Account, Margin, Named, Pair, Range, State
 from surfacechem.terms import Law, Load, Spec
 from surfacechem.variables import Parameters, Variables, unit_of
 
@@ -70,6 +70,7 @@ class Build:
         """Power and heat that flow into the interface [W/m^2]."""
         self.breakpoints: set[float] = set()
         self.ranges: list[Range] = []
+        self.pairs: list[Pair] = []
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
