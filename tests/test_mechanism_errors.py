@@ -65,7 +65,7 @@ REFUSED = {
     "another file": ("  species: [A(s), B(s), AB(s)]", "  species: [{gri30.yaml/species: [H2]}]", "one file"),
     "broken YAML": ("units: {length: m,", "units: {length: m", "expected"),
     "a unit of the wrong kind": ("1.0e-4 mol/m^2", "1.0e-4 mol/m^3", "Cantera: "),
-    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "Cantera: "),
+    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "no species 'D(s)'"),
     "lost sites": ("  sites: 2\n", "", "Cantera: "),
 }
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
-
 from surfacechem.assembly.build import Build
 from surfacechem.expressions import Expression, exp, log, where
 from surfacechem.quantities import BOLTZMANN, Quantity

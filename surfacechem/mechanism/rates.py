@@ -59,6 +59,8 @@ class SurfaceReaction(RateLaw):
 
     kind: ClassVar[str] = ""
     """Cantera's name of the rate type."""
+    keys: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Keys of a reaction of this type beside those that every reaction may have, with the keys inside."""
 
     number: str = option("short name of the reaction")
     equation: str = option("the reaction as the mechanism writes it")
@@ -172,6 +174,7 @@ class InterfaceArrhenius(SurfaceReaction):
     """
 
     kind = "interface-Arrhenius"
+    keys: ClassVar = {"rate-constant": ("A", "b", "Ea"), "coverage-dependencies": ("a", "m", "E")}
 
     A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
     b: float = parameter("1", "temperature exponent", default=0.0)
