@@ -11,24 +11,24 @@ from surfacechem.mechanism.rates import SurfaceReaction, kinds
 from surfacechem.mechanism.source import Source, chosen, sections, sides
 
 FILE = frozenset(
-    [
+    (
         "description",
         "generator",
         "date",
         "input-files",
         "cantera-version",
         "git-commit",
+        "note",
         "units",
         "phases",
         "species",
         "reactions",
         "elements",
         "extensions",
-        "note",
-    ]
+    )
 )
 PHASE = frozenset(
-    [
+    (
         "name",
         "elements",
         "species",
@@ -40,14 +40,14 @@ PHASE = frozenset(
         "transport",
         "note",
         "description",
-    ]
+    )
 )
-SPECIES = frozenset(["name", "composition", "thermo", "sites", "units", "note", "description", "transport"])
-CONSTANT_CP = frozenset(["model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"])
-POLYNOMIAL = frozenset(["model", "temperature-ranges", "data", "reference-pressure", "note"])
+SPECIES = frozenset(("name", "composition", "thermo", "sites", "units", "note", "description", "transport"))
+CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
+POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
 REACTION = frozenset(
-    [
+    (
         "equation",
         "type",
         "orders",
@@ -58,9 +58,9 @@ REACTION = frozenset(
         "id",
         "note",
         "description",
-    ]
+    )
 )
-STATE = frozenset(["T", "P", "coverages"])
+STATE = frozenset(("T", "P", "coverages"))
 
 REMEDIES = {
     "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
@@ -100,6 +100,7 @@ def check(source: Source, phase: Any) -> None:
     entries = list(source.species(phase))
     for entry in entries:
         _check_species(source, entry)
+        _check_composition(source, phase, entry)
     names = _names(source, phase, entries)
     _check_state(source, phase, names)
     for entry in source.reactions(phase):
@@ -162,6 +163,18 @@ def _check_species(source: Source, entry: Any) -> None:
         values.check_kelvin(source, thermo, key, title)
     for key in ("h0", "s0", "cp0"):
         values.check_bare(source, thermo, key, title, entry)
+
+
+def _check_composition(source: Source, phase: Any, entry: Any) -> None:
+    import cantera
+
+    own = [str(element.get("symbol")) for element in source.data.get("elements") or []]
+    known = phase.get("elements", [*cantera.Element.element_symbols, "E", *own])
+    for element in entry.get("composition") or {}:
+        if element not in known:
+            guess = suggestion(str(element), known) if "elements" in phase else ""
+            message = f"species {entry.get('name')}: composition: no element '{element}'.{guess}"
+            raise InputError(message, source.place(entry["composition"], element))
 
 
 def _names(source: Source, phase: Any, entries: list[Any]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
@@ -37,8 +38,11 @@ class Source:
         """The phase of that name, or the only one."""
         phases = {str(entry.get("name")): entry for entry in self.phases()}
         if not phases:
-            known = suggestion("phases", map(str, self.data))
-            raise InputError(f"no `phases` in the mechanism.{known}", Place(self.file))
+            known = [str(key) for key in self.data]
+            guess = next(iter(get_close_matches("phases", known, 1)), None)
+            raise InputError(
+                f"no `phases` in the mechanism.{suggestion('phases', known)}", self.place(self.data, guess)
+            )
         if name is None and len(phases) == 1:
             return next(iter(phases.values()))
         if name is None:

@@ -10,7 +10,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.mechanism.source import Source
 
 UNITS = frozenset(
-    ["length", "mass", "time", "quantity", "current", "temperature", "pressure", "energy", "activation-energy"]
+    ("length", "mass", "time", "quantity", "current", "temperature", "pressure", "energy", "activation-energy")
 )
 """Dimensions for which a file may say what a bare number means."""
 
