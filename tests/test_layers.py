@@ -17,7 +17,20 @@ FLOORS = {
     "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit", "detailedbalance"],
-    "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
+    "studies": [
+        "references.*",
+        "sweep",
+        "precision",
+        "stability",
+        "check",
+        "listing",
+        "plots",
+        "printing",
+        "report",
+        "ratecurves",
+        "mechanismsheet",
+        "rateplots",
+    ],
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.

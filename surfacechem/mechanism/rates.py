@@ -117,9 +117,14 @@ class SurfaceReaction(RateLaw):
         return self._formula(self._reverse)
 
     @property
+    def log_forward(self) -> Formula:
+        """Logarithm of the forward rate [ln 1/(m^2 s)]."""
+        return self._formula(self._log_forward)
+
+    @property
     def log_rate(self) -> Formula | None:
-        """Logarithm of the forward rate where the reaction is irreversible."""
-        return None if self.reversible else self._formula(self._log_forward)
+        """Logarithm of the rate where the reaction is irreversible."""
+        return None if self.reversible else self.log_forward
 
     def _formula(self, evaluate: Any) -> Formula:
         names = (name for item in self.species for name in (item.variable, item.concentration))

@@ -65,6 +65,11 @@ class Source:
         """The species entries that the phase may use."""
         yield from self._entries(phase, "species")
 
+    def all_species(self) -> Iterator[Any]:
+        """The species entries of all phases."""
+        for phase in self.phases():
+            yield from self.species(phase)
+
     def reactions(self, phase: Any) -> Iterator[Any]:
         """The reaction entries that the phase may use, in order."""
         if phase.get("reactions", "all") != "none":
