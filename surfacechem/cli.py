@@ -213,6 +213,42 @@ def cases() -> None:
 
 
 @app.command(epilog=EXIT_CODES)
+def mechanism(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
+    phase: Annotated[str | None, typer.Option("--phase", help="The phase, where the file has several.")] = None,
+    temperature: Annotated[str, typer.Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
+    force: Annotated[str, typer.Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
+) -> None:
+    """Print species, reactions, rates over temperature and force, and what is consistent."""
+    from surfacechem.mechanismsheet import sheet, span
+
+    temperatures = span(temperature, "K", "--temperature", above=0.0)
+    forces = span(force, "N", "--force")
+    kind = _format(output) if output else ""
+    from surfacechem.mechanism import load_mechanism
+    from surfacechem.ratecurves import Curves
+
+    curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase))
+    typer.echo(sheet(curves, temperatures, forces))
+    if output:
+        from surfacechem import plots, rateplots
+        from surfacechem.solution import replacing
+
+        with replacing(output) as temporary:
+            plots.save(rateplots.figure(curves, temperatures, forces), temporary, kind)
+        typer.echo(f"\nwritten to {output}")
+
+
+def _format(target: Path) -> str:
+    """The kind of picture that a file name asks for."""
+    kind = target.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    return kind
+
+
+@app.command(epilog=EXIT_CODES)
 def plot(
     source: Annotated[str, typer.Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
     output: Annotated[
@@ -226,9 +262,7 @@ def plot(
     """Plot a dataset or a case over time."""
     is_file = source.endswith((".nc", ".nc4", ".cdf"))
     target = output or Path(f"{Path(source).stem}.png")
-    kind = target.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    kind = _format(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     from surfacechem import plots

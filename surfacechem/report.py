@@ -69,6 +69,7 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         labelled("time", f"{_time(solution)}; {work}"),
         *([labelled("events", event_summary(trajectory.jumps))] if trajectory.jumps else []),
         labelled("balances", _balances(solution.audit)),
+        *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
         *([labelled("written", str(written))] if written else []),
     ]

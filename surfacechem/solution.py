@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem.audit import Audit, audit
+from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.errors import InputError, Place
 from surfacechem.event_table import event_columns, event_findings
 from surfacechem.integrate import Run, Trajectory
@@ -118,11 +119,24 @@ class Solution:
         return audit(self.trajectory)
 
     @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Whether pairs of one-way reactions keep detailed balance."""
+        return verdicts(self.trajectory, self.audit)
+
+    @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the results has to know, in words."""
         system = self.trajectory.model.system
         jumps = event_findings(self.trajectory.jumps)
-        return (*self.audit.findings, *jumps, *self._extrapolations(), *self._lost_fluxes(), *system.warnings)
+        unbalanced = (str(verdict) for verdict in self.verdicts if not verdict.consistent)
+        return (
+            *self.audit.findings,
+            *unbalanced,
+            *jumps,
+            *self._extrapolations(),
+            *self._lost_fluxes(),
+            *system.warnings,
+        )
 
     def _lost_fluxes(self) -> list[str]:
         """Fluxes through conductances so large that the temperature difference is rounding."""
@@ -237,6 +251,7 @@ class Solution:
             "entropy_error": books.entropy_error,
             "site_error": books.site_error,
             "entropy_violations": ", ".join(books.violations) or "none",
+            **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": _versions(),
         }
 

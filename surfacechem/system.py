@@ -181,6 +181,18 @@ class Range:
 
 
 @dataclass(frozen=True)
+class Pair:
+    """One-way reactions that undo each other, held against equilibrium along a run.
+
+    ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy they produce together.
+    """
+
+    departure: str
+    title: str
+    law: str
+
+
+@dataclass(frozen=True)
 class Role:
     """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
 
@@ -214,6 +226,7 @@ class System:
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the energy that a jump releases, by the kind of the jump."""
+    pairs: tuple[Pair, ...] = ()
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:

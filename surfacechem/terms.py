@@ -263,6 +263,14 @@ class RateLaw(Law):
         """Change of each bonding variable, in its own amounts, per unit of reaction."""
         return {"phi": 1}
 
+    @property
+    def log_rate(self) -> Callable[..., Expression] | None:
+        """Logarithm of the rate where the law runs one way only; None where its rate vanishes with the affinity.
+
+        A one-way law and one that undoes it are held against the equilibrium of the potential.
+        """
+        return None
+
 
 class HeatTransfer(Law):
     """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold."""

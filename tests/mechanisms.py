@@ -145,7 +145,8 @@ def mechanism_texts(draw):
     }
     # Two of each kind, so that every reaction is the duplicate of another.
     reactions = [entry for entry in entries if entry] * 2
-    return json.dumps({"phases": [phase], "species": species, "reactions": reactions})
+    units = {"length": "m", "quantity": "kmol", "activation-energy": "J/kmol"}
+    return json.dumps({"units": units, "phases": [phase], "species": species, "reactions": reactions})
 
 
 @st.composite

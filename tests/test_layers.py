@@ -16,8 +16,21 @@ FLOORS = {
     "contracts": ["terms", "scene"],
     "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "jumps", "events", "integrate"],
-    "results": ["solution", "audit", "event_table"],
-    "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
+    "results": ["solution", "audit", "event_table", "detailedbalance"],
+    "studies": [
+        "references.*",
+        "sweep",
+        "precision",
+        "stability",
+        "check",
+        "listing",
+        "plots",
+        "printing",
+        "report",
+        "ratecurves",
+        "mechanismsheet",
+        "rateplots",
+    ],
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.

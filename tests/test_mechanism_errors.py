@@ -10,6 +10,9 @@ from surfacechem.mechanism import load_mechanism
 
 TEXT = (mechanisms() / "dna-film.yaml").read_text(encoding="utf-8")
 
+REACTION = TEXT[TEXT.index("- equation") :]
+BARE = TEXT.replace("units: {length: m, quantity: mol, activation-energy: kJ/mol}", "units: {length: m}")
+
 # What to replace in the file by what, the line of the error ("+n" after the replaced one) and its words.
 REFUSED = {
     "a key of the phase": ("site-density: 1.0e-4", "site-densty: 1.0e-4", "Did you mean 'site-density'?"),
@@ -64,8 +67,42 @@ REFUSED = {
     "a missing site density": ("  site-density: 1.0e-4 mol/m^2\n", "", "no `site-density`"),
     "another file": ("  species: [A(s), B(s), AB(s)]", "  species: [{gri30.yaml/species: [H2]}]", "one file"),
     "broken YAML": ("units: {length: m,", "units: {length: m", "expected"),
+    "a negative rate": ("A: 5.13e8 m^2/mol/s", "A: -5.13e8 m^2/mol/s", "'A' is negative"),
+    "a declared negative rate": (
+        "  rate-constant:",
+        "  negative-A: true\n  rate-constant:",
+        "'negative-A' cannot be used here",
+    ),
+    "no site density": ("1.0e-4 mol/m^2", "0 mol/m^2", "no number above zero"),
+    "sites that are none": ("sites: 2", "sites: 0", "no number above zero"),
+    "degrees Celsius": ("T0: 298.15 K, h0: -", "T0: 25 C, h0: -", "write `T0: 298.15 K`"),
+    "degrees Celsius of a state": ("state: {T: 298.15 K", "state: {T: 25 C", "write `T: 298.15 K`"),
+    "temperatures in other units": ("{length: m,", "{temperature: C, length: m,", "temperatures are in K"),
+    "units of nothing": ("{length: m,", "{lenght: m,", "Did you mean 'length'?"),
+    "a unit that is none": ("{length: m,", "{length: furlong,", "'furlong' is no unit"),
+    "a third body": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) + M <=> AB(s) + M", "third bodies belong to gases"),
+    "a falloff reaction": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) (+M) <=> AB(s) (+M)", "third bodies"),
+    "a rate that depends on pressure": ("  rate-constant:", "  type: falloff\n  rate-constant:", "belongs to gases"),
+    "efficiencies": ("  rate-constant:", "  efficiencies: {A(s): 2}\n  rate-constant:", "third bodies"),
+    "an arrow that is none": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) -> AB(s)", "two sides"),
+    "a reaction of nothing": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) <=> B(s) + A(s)", "nothing changes"),
+    "a coverage of nothing": ("coverages: {A(s): 0.5", "coverages: {a(s): 0.5", "Did you mean 'A(s)'?"),
+    "a species that is not there": ("species: [A(s), B(s),", "species: [A(s), C(s),", "no species 'C(s)'"),
+    "skipped elements": ("  reactions: all", "  reactions: all\n  skip-undeclared-elements: true", "would vanish"),
+    "a list for a mapping": (
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "[5.13e8, 0, 0]",
+        "write `rate-constant: {A, b, Ea}`",
+    ),
+    "a duplicate": ("reactions:\n- eq", f"reactions:\n{REACTION}- eq", "duplicate reactions"),
+    "a duplicate the other way": (
+        "reactions:\n- eq",
+        f"reactions:\n{REACTION.replace('A(s) + B(s) <=> AB(s)', 'AB(s) => A(s) + B(s)').replace('m^2/mol', '1')}- eq",
+        "duplicate reactions",
+    ),
+    "a key twice": ("b: 0, Ea: 0}", "b: 0, b: 1, Ea: 0}", "duplicate key"),
     "a unit of the wrong kind": ("1.0e-4 mol/m^2", "1.0e-4 mol/m^3", "Cantera: "),
-    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "Cantera: "),
+    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "no species 'D(s)'"),
     "lost sites": ("  sites: 2\n", "", "Cantera: "),
 }
 
@@ -83,6 +120,40 @@ def test_refused(what, tmp_path):
     assert place.file == str(file)
     assert abs(place.line - changed) <= 6, f"{caught.value} is not near line {changed}"
     assert "*" not in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "5.13e8 m^2/mol/s",
+            "5.13e8",
+            "A(s) + B(s) <=> AB(s): A: 5.13e+08 without a unit counts in powers of",
+        ),
+        ("Ea: 0", "Ea: 50", "Ea: 50 without a unit counts in J/kmol. Write it with its unit, such as `Ea: 50 kJ/mol`"),
+        ("1.0e-4 mol/m^2", "1.0e-4", "phase film: site-density: 0.0001 without a unit counts in kmol/m^2"),
+        ("-172.3808 kJ/mol", "-172.3808", "species AB(s): h0: -172.381 without a unit counts in J/kmol"),
+    ],
+)
+def test_numbers_without_a_unit_need_one_from_the_file(old, new, words, tmp_path):
+    """Cantera counts in kmol, which nobody means."""
+    file = tmp_path / "film.yaml"
+    file.write_text(BARE, encoding="utf-8")
+    load_mechanism(file)
+    file.write_text(BARE.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_mechanism(file)
+    assert new in BARE.replace(old, new).splitlines()[caught.value.place.line - 1]
+    file.write_text(TEXT.replace(old, new), encoding="utf-8")
+    load_mechanism(file)
+
+
+def test_a_rate_of_first_order_needs_no_amount(tmp_path):
+    file = tmp_path / "tethers.yaml"
+    text = (mechanisms() / "dna-tethers.yaml").read_text(encoding="utf-8")
+    text = re.sub(r"^units: .*$", "", text, flags=re.MULTILINE)
+    file.write_text(re.sub(r"A: ([0-9.e+]+)[^,]*,", r"A: \1,", text), encoding="utf-8")
+    assert load_mechanism(file).reactions[0].A == 2.565e4
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,7 @@ def assemble(scene: Scene) -> System:
         margins=tuple(build.margins),
         roles=tuple(build.variables.roles),
         ranges=tuple(build.ranges),
+        pairs=tuple(build.pairs),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
         modes=tuple(build.modes),

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Equilibrium, Margin, Mode, Named, Range, State, Transition
+from surfacechem.system import Account, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
 from surfacechem.terms import Law, Load, Spec
 from surfacechem.variables import Parameters, Variables, unit_of
 
@@ -88,6 +88,7 @@ class Build:
         """Tangential traction that sticking can bear."""
         self.gap_rates: dict[str, Expression] = {}
         """Rates of the gaps that move by a balance."""
+        self.pairs: list[Pair] = []
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:

@@ -8,6 +8,7 @@ import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Bond, Build
+from surfacechem.assembly.pairs import departure, opposed
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account
@@ -18,13 +19,20 @@ def reactions(build: Build) -> None:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
     change = {name: symengine.Integer(0) for name in build.bonding}
-    for law in build.interface.reactions:
-        label, nu = build.label(law), law.stoichiometry()
+    laws = {build.label(law): _bound(build, law) for law in build.interface.reactions}
+    pairs = opposed(laws)
+    together = {label: pair.label for pair in pairs for label in pair.labels}
+    for label, law in laws.items():
+        nu = law.stoichiometry()
         affinity = sum(n * mu[x] for x, n in nu.items())
         rate = _rate(build, law, label, affinity)
-        build.dissipation[label] = -build.stretch * rate * affinity
+        # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
+        owner = together.get(label, label)
+        build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
         for x, n in nu.items():
             change[x] += n * rate
+    for pair in pairs:
+        departure(build, pair, mu)
     for name, bond in build.bonding.items():
         build.rows[name] = balances.site_balance(change[name], bond.dot, bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
@@ -47,13 +55,16 @@ def _chemical_potential(build: Build, name: str, bond: Bond) -> Expression:
     return build.name(quantity, M / bond.density, output=False)
 
 
+def _bound(build: Build, law: RateLaw) -> RateLaw:
+    return build.variables.bind(law, f"interface.bonding.{law.name()}")
+
+
 def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:
-    bound = build.variables.bind(law, f"interface.bonding.{law.name()}")
     own = {"mu": affinity, "t": build.t}
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
         own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
-    rate = build.variables.call(bound, bound.statement, own)
+    rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     return build.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
 

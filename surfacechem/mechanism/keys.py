@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.rates import kinds
+from surfacechem.mechanism import values
+from surfacechem.mechanism.rates import SurfaceReaction, kinds
+from surfacechem.mechanism.source import Source, chosen, sections, sides
 
+FILE = frozenset(
+    (
+        "description",
+        "generator",
+        "date",
+        "input-files",
+        "cantera-version",
+        "git-commit",
+        "note",
+        "units",
+        "phases",
+        "species",
+        "reactions",
+        "elements",
+        "extensions",
+    )
+)
 PHASE = frozenset(
-    [
+    (
         "name",
         "elements",
         "species",
@@ -22,55 +40,27 @@ PHASE = frozenset(
         "transport",
         "note",
         "description",
-        "skip-undeclared-elements",
-        "skip-undeclared-third-bodies",
-        "explicit-third-body-duplicates",
-    ]
+    )
 )
-SPECIES = frozenset(["name", "composition", "thermo", "sites", "note", "description", "transport"])
-THERMO = {
-    "constant-cp": frozenset(["model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"]),
-    "NASA7": frozenset(["model", "temperature-ranges", "data", "reference-pressure", "note"]),
-    "NASA9": frozenset(["model", "temperature-ranges", "data", "reference-pressure", "note"]),
-    "Shomate": frozenset(["model", "temperature-ranges", "data", "reference-pressure", "note"]),
-}
+SPECIES = frozenset(("name", "composition", "thermo", "sites", "units", "note", "description", "transport"))
+CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
+POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
+THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
 REACTION = frozenset(
-    [
+    (
         "equation",
         "type",
-        "rate-constant",
-        "coverage-dependencies",
         "orders",
         "negative-orders",
         "nonreactant-orders",
         "duplicate",
-        "negative-A",
         "units",
         "id",
         "note",
         "description",
-    ]
+    )
 )
-RATE_CONSTANT = frozenset(("A", "b", "Ea"))
-COVERAGE = frozenset(("a", "m", "E"))
 STATE = frozenset(("T", "P", "coverages"))
-FILE = frozenset(
-    [
-        "description",
-        "generator",
-        "date",
-        "input-files",
-        "cantera-version",
-        "git-commit",
-        "units",
-        "phases",
-        "species",
-        "reactions",
-        "elements",
-        "extensions",
-        "note",
-    ]
-)
 
 REMEDIES = {
     "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
@@ -85,165 +75,221 @@ REMEDIES = {
     "exchange-current-density-formulation": "charge transfer needs an electric potential; give a plain "
     "`rate-constant` instead.",
     "efficiencies": "third bodies belong to gases; remove it.",
+    "default-efficiency": "third bodies belong to gases; remove it.",
+    "explicit-third-body-duplicates": "third bodies belong to gases; remove it.",
+    "skip-undeclared-elements": "species would vanish without a word; write down their elements instead.",
+    "skip-undeclared-third-bodies": "third bodies belong to gases; remove it.",
+    "negative-A": "a negative rate goes on where nothing is left to react; use a positive `A`.",
     "equation-of-state": "a surface species has no volume; remove it.",
     "critical-parameters": "a surface species has no critical point; remove it.",
 }
 """What Cantera knows and the compiled path does not, with the way out."""
 
-
-class Source:
-    """The text of a mechanism with the line of every entry."""
-
-    def __init__(self, file: str, text: str) -> None:
-        self.file = file
-        self.text = text
-        self.data = _parse(file, text)
-
-    def place(self, node: Any, key: Any = None, path: str = "") -> Place:
-        """Place of a mapping or list, or of one of its entries."""
-        marks = getattr(node, "lc", None)
-        if marks is None:
-            return Place(self.file, 0, path)
-        where = (marks.data or {}).get(key)
-        return Place(self.file, (where[0] if where else marks.line) + 1, path)
-
-    def phases(self) -> list[Any]:
-        """The phase entries."""
-        return list(self.data.get("phases") or [])
-
-    def phase(self, name: str | None, place: Place | None) -> Any:
-        """The phase of that name, or the only one."""
-        phases = {str(entry.get("name")): entry for entry in self.phases()}
-        if not phases:
-            raise InputError("no `phases` in the mechanism.", Place(self.file))
-        if name is None and len(phases) == 1:
-            return next(iter(phases.values()))
-        if name is None:
-            raise InputError(f"the mechanism has several phases, name one.{suggestion('', phases)}", place)
-        if name not in phases:
-            raise InputError(f"{self.file} has no phase '{name}'.{suggestion(name, phases)}", place)
-        return phases[name]
-
-    def section(self, name: str, node: Any, key: str) -> list[Any]:
-        """A list of species or reactions in this file."""
-        if name not in self.data:
-            known = [k for k, v in self.data.items() if isinstance(v, list) and k != "phases"]
-            raise InputError(
-                f"no section '{name}' in this file.{suggestion(name, known)} A mechanism is one file.",
-                self.place(node, key, key),
-            )
-        return list(self.data[name] or [])
-
-    def species(self, phase: Any) -> Iterator[Any]:
-        """The species entries that the phase may use."""
-        yield from self._entries(phase, "species", "species")
-
-    def reactions(self, phase: Any) -> Iterator[Any]:
-        """The reaction entries that the phase may use, in order."""
-        if phase.get("reactions", "all") != "none":
-            yield from self._entries(phase, "reactions", "reactions")
-
-    def _entries(self, phase: Any, key: str, default: str) -> Iterator[Any]:
-        for name in _sections(phase.get(key, "all"), default):
-            if name in self.data or phase.get(key) is not None:
-                yield from self.section(name, phase, key)
-
-
-def _sections(declared: Any, default: str) -> list[str]:
-    """Names of the sections that a phase's `species` or `reactions` refers to."""
-    if isinstance(declared, str):
-        return [default]
-    names = [next(iter(item)) if isinstance(item, Mapping) else None for item in declared]
-    plain = [item for item in declared if not isinstance(item, Mapping)]
-    if default == "species":
-        return [*([default] if plain else []), *(name for name in names if name)]
-    return [*plain, *(name for name in names if name)]
-
-
-def _parse(file: str, text: str) -> Any:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError
-
-    try:
-        data = YAML(typ="rt").load(io.StringIO(text))
-    except MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 0
-        raise InputError(f"{error.problem}.", Place(file, line)) from None
-    if not isinstance(data, Mapping):
-        raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
-    return data
+MODELS = {
+    "edge": "a contact line has rates per length; write the reactions on a surface.",
+    "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free energy; use "
+    "`ideal-surface` and put the dependence into the reactions' activation energies.",
+}
+"""Phase models that are not plain surfaces, with the way out."""
 
 
 def check(source: Source, phase: Any) -> None:
-    """Raise InputError at the first key of the file that means nothing, or that cannot be lowered."""
+    """Raise InputError at the first entry that means nothing, means something else, or cannot be lowered."""
     _check_file(source)
-    _keys(source, phase, PHASE, f"phase {phase.get('name')}")
-    if "site-density" not in phase:
-        message = "the phase has no `site-density`. Give one, for instance `site-density: 1e-9 mol/cm^2`."
-        raise InputError(message, source.place(phase))
-    if isinstance(phase.get("state"), Mapping):
-        _keys(source, phase["state"], STATE, "state")
-    for entry in source.species(phase):
+    _check_phase(source, phase)
+    entries = list(source.species(phase))
+    for entry in entries:
         _check_species(source, entry)
-    species = frozenset(str(entry.get("name")) for entry in source.species(phase))
+        _check_composition(source, phase, entry)
+    names = _names(source, phase, entries)
+    _check_state(source, phase, names)
     for entry in source.reactions(phase):
-        _check_reaction(source, entry, species)
+        _check_reaction(source, phase, entry, names)
 
 
 def _check_file(source: Source) -> None:
-    sections = {
+    declared = {
         name
         for phase in source.phases()
         for key in ("species", "reactions")
-        for name in _sections(phase.get(key, "all"), key)
+        for name in sections(phase.get(key, "all"), key)
     }
-    _keys(source, source.data, FILE | sections, "the file")
+    _keys(source, source.data, FILE | declared, "the file")
+    values.check_units(source, source.data)
+
+
+def _check_phase(source: Source, phase: Any) -> None:
+    title = f"phase {phase.get('name')}"
+    _keys(source, phase, PHASE, title)
+    model = str(phase.get("thermo"))
+    if model != "ideal-surface":
+        message = f"{title}: thermo '{model}' is not lowered: {MODELS.get(model, 'use `ideal-surface`.')}"
+        raise InputError(message, source.place(phase, "thermo"))
+    if phase.get("kinetics", "surface") != "surface":
+        message = f"{title}: kinetics '{phase['kinetics']}' is not lowered; use `kinetics: surface`."
+        raise InputError(message, source.place(phase, "kinetics"))
+    if "site-density" not in phase:
+        message = "the phase has no `site-density`. Give one, for instance `site-density: 1e-9 mol/cm^2`."
+        raise InputError(message, source.place(phase))
+    values.check_positive(source, phase, "site-density", title)
+    values.check_bare(source, phase, "site-density", title)
+
+
+def _check_state(source: Source, phase: Any, names: Iterable[str]) -> None:
+    state = phase.get("state")
+    if not isinstance(state, Mapping):
+        return
+    _keys(source, state, STATE, "state")
+    values.check_kelvin(source, state, "T", "state")
+    if isinstance(state.get("coverages"), Mapping):
+        _known(source, state["coverages"], names, "state: coverages")
 
 
 def _check_species(source: Source, entry: Any) -> None:
     title = f"species {entry.get('name')}"
     _keys(source, entry, SPECIES, title)
+    values.check_units(source, entry)
+    values.check_positive(source, entry, "sites", title)
     thermo = entry.get("thermo")
     if not isinstance(thermo, Mapping):
         raise InputError(f"{title} has no `thermo`.", source.place(entry))
     model = str(thermo.get("model"))
-    if model not in THERMO:
+    if "model" in thermo and model not in THERMO:
         message = f"{title}: thermo model '{model}' is not lowered.{suggestion(model, THERMO)}"
         raise InputError(message, source.place(thermo, "model"))
-    _keys(source, thermo, THERMO[model], f"{title}: thermo")
+    known = THERMO.get(model, CONSTANT_CP | POLYNOMIAL)
+    _keys(source, thermo, known, f"{title}: thermo")
+    for key in ("T0", "T-min", "T-max"):
+        values.check_kelvin(source, thermo, key, title)
+    for key in ("h0", "s0", "cp0"):
+        values.check_bare(source, thermo, key, title, entry)
 
 
-def _check_reaction(source: Source, entry: Any, species: frozenset[str]) -> None:
+def _check_composition(source: Source, phase: Any, entry: Any) -> None:
+    import cantera
+
+    own = [str(element.get("symbol")) for element in source.data.get("elements") or []]
+    known = phase.get("elements", [*cantera.Element.element_symbols, "E", *own])
+    for element in entry.get("composition") or {}:
+        if element not in known:
+            guess = suggestion(str(element), known) if "elements" in phase else ""
+            message = f"species {entry.get('name')}: composition: no element '{element}'.{guess}"
+            raise InputError(message, source.place(entry["composition"], element))
+
+
+def _names(source: Source, phase: Any, entries: list[Any]) -> list[str]:
+    """The species of the phase, each of which the file must hold."""
+    known = [str(entry.get("name")) for entry in entries]
+    declared = phase.get("species", "all")
+    names = chosen(declared, known)
+    for name in names:
+        if name not in known:
+            raise InputError(f"species: no species '{name}'.{suggestion(name, known)}", source.place(phase, "species"))
+    return names
+
+
+def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) -> None:
     title = f"reaction {entry.get('equation')}"
-    _keys(source, entry, REACTION, title)
-    _check_type(source, entry, title)
-    if not isinstance(entry.get("rate-constant"), Mapping):
-        raise InputError(f"{title} has no `rate-constant: {{A, b, Ea}}`.", source.place(entry))
-    _keys(source, entry["rate-constant"], RATE_CONSTANT, f"{title}: rate-constant")
-    for name, terms in (entry.get("coverage-dependencies") or {}).items():
-        if name not in species:
-            message = f"{title}: coverage-dependencies: no species '{name}'.{suggestion(str(name), species)}"
-            raise InputError(message, source.place(entry["coverage-dependencies"], name))
-        if isinstance(terms, Mapping):
-            _keys(source, terms, COVERAGE, f"{title}: coverage-dependencies: {name}")
+    _keys(source, entry, REACTION.union(*(law.keys for law in kinds().values())), title)
+    values.check_units(source, entry)
+    if "equation" not in entry:
+        raise InputError("a reaction has no `equation`.", source.place(entry))
+    law = _law(source, entry, title)
+    for key in entry:
+        if key not in REACTION | set(law.keys):
+            having = ", ".join(sorted(kind for kind, other in kinds().items() if key in other.keys))
+            message = f"{title}: '{key}' is no key of {law.kind}; it belongs to {having}."
+            raise InputError(message, source.place(entry, key))
+    left_out = _check_equation(source, phase, entry, names, title)
+    _check_rate(source, entry, law, [] if left_out else names, title)
 
 
-def _check_type(source: Source, entry: Any, title: str) -> None:
-    """Cantera writes a type with or without its prefix; a plain rate needs none."""
-    kind = str(entry.get("type", "Arrhenius"))
-    known = kinds()
-    if kind not in known and f"interface-{kind}" not in known and kind != "elementary":
+def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
+    """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
+    kind, known = str(entry.get("type", "Arrhenius")), kinds()
+    if kind in ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev"):
+        message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
+        raise InputError(message, source.place(entry, "type"))
+    law = known.get(kind) or known.get(f"interface-{kind}")
+    if law is None:
         message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, known)}"
         raise InputError(message, source.place(entry, "type"))
+    return law
 
 
-def _keys(source: Source, node: Any, known: Sequence[str] | frozenset[str], title: str) -> None:
+def _check_equation(source: Source, phase: Any, entry: Any, names: list[str], title: str) -> bool:
+    """Whether the reaction is left out, because the phase takes only those of its own species."""
+    reactants, products, _ = sides(str(entry["equation"]))
+    place = source.place(entry, "equation")
+    for name in (*reactants, *products):
+        if name.strip("(+)") == "M":
+            raise InputError(f"{title}: third bodies belong to gases; remove '{name}'.", place)
+    if not reactants or not products:
+        raise InputError(f"{title}: an equation has two sides with `<=>` or `=>` between them.", place)
+    unknown = [name for name in (*reactants, *products) if name not in names]
+    if unknown and phase.get("reactions", "all") == "declared-species":
+        return True
+    if unknown:
+        raise InputError(f"{title}: no species '{unknown[0]}'.{suggestion(unknown[0], names)}", place)
+    if reactants == products:
+        raise InputError(f"{title}: both sides are the same, so that nothing changes.", place)
+    return False
+
+
+def _check_rate(source: Source, entry: Any, law: type[SurfaceReaction], names: list[str], title: str) -> None:
+    for key, inner in law.keys.items():
+        node = entry.get(key)
+        if key == "coverage-dependencies":
+            _check_coverages(source, entry, inner, names, title)
+        elif inner and key in entry and not isinstance(node, Mapping):
+            wanted = f"{key}: {{{', '.join(inner)}}}"
+            raise InputError(f"{title}: write `{wanted}`, not {node!r}.", source.place(entry, key))
+        elif inner and isinstance(node, Mapping):
+            _keys(source, node, inner, f"{title}: {key}")
+    if isinstance(entry.get("orders"), Mapping) and names:
+        _known(source, entry["orders"], names, f"{title}: orders")
+    _check_numbers(source, entry, title)
+
+
+def _check_coverages(source: Source, entry: Any, inner: Iterable[str], names: list[str], title: str) -> None:
+    node = entry.get("coverage-dependencies")
+    if not isinstance(node, Mapping):
+        return
+    if names:
+        _known(source, node, names, f"{title}: coverage-dependencies")
+    for name, terms in node.items():
+        if isinstance(terms, Mapping):
+            _keys(source, terms, inner, f"{title}: coverage-dependencies: {name}")
+            values.check_bare(source, terms, "E", title, entry)
+
+
+def _check_numbers(source: Source, entry: Any, title: str) -> None:
+    rate = entry.get("rate-constant")
+    if not isinstance(rate, Mapping):
+        raise InputError(f"{title} has no `rate-constant: {{A, b, Ea}}`.", source.place(entry))
+    if values.leading(rate.get("A")) < 0:
+        raise InputError(f"{title}: 'A' is negative: {REMEDIES['negative-A']}", source.place(rate, "A"))
+    orders = {**sides(str(entry["equation"]))[0], **(entry.get("orders") or {})}
+    if sum(map(values.leading, orders.values())) != 1:
+        values.check_bare(source, rate, "A", title, entry)
+    values.check_bare(source, rate, "Ea", title, entry)
+
+
+def _known(source: Source, node: Any, names: Iterable[str], title: str) -> None:
+    """Every key is a species."""
+    for name in node:
+        if name not in names:
+            raise InputError(f"{title}: no species '{name}'.{suggestion(str(name), names)}", source.place(node, name))
+
+
+def _keys(source: Source, node: Any, known: Iterable[str], title: str) -> None:
     if not isinstance(node, Mapping):
         raise InputError(f"{title} is not a mapping: {node!r}.", Place(source.file))
+    allowed = set(known)
     for key in node:
-        if key in known:
+        if key in allowed:
             continue
         place = source.place(node, key)
         if key in REMEDIES:
             raise InputError(f"{title}: '{key}' cannot be used here: {REMEDIES[key]}", place)
-        raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), known)}", place)
+        raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), allowed)}", place)

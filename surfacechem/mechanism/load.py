@@ -10,9 +10,10 @@ from typing import Any
 
 from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.keys import Source, check
+from surfacechem.mechanism.keys import check
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
 from surfacechem.mechanism.rates import KILO, SurfaceReaction, kinds, plain
+from surfacechem.mechanism.source import Source, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.scene import BondingVariable, Sites
 from surfacechem.terms import Potential, RateLaw
@@ -62,7 +63,6 @@ def load_mechanism(
     path = _find(Path(path), place)
     source = Source(str(path), path.read_text(encoding="utf-8"))
     entry = source.phase(phase, place)
-    _check_phase(source, entry)
     check(source, entry)
     surface = _cantera(source, str(entry["name"]))
     species = _species(surface, source, entry)
@@ -95,23 +95,6 @@ def _find(path: Path, place: Place | None) -> Path:
     raise InputError(f"no mechanism file {path}.{suggestion(path.name, known)}", place)
 
 
-def _check_phase(source: Source, entry: Any) -> None:
-    """Raise InputError for a phase that is no plain surface."""
-    model = entry.get("thermo")
-    if model != "ideal-surface":
-        remedies = {
-            "edge": "a contact line has rates per length; write the reactions on a surface.",
-            "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free "
-            "energy; use `ideal-surface`.",
-        }
-        remedy = remedies.get(str(model), "use `ideal-surface`.")
-        message = f"phase {entry.get('name')}: thermo '{model}' is not lowered: {remedy}"
-        raise InputError(message, source.place(entry, "thermo"))
-    if entry.get("kinetics", "surface") != "surface":
-        message = f"phase {entry.get('name')}: kinetics '{entry['kinetics']}' is not lowered; use `kinetics: surface`."
-        raise InputError(message, source.place(entry, "kinetics"))
-
-
 def _cantera(source: Source, phase: str) -> Any:
     """The phase as Cantera reads it; its errors keep their line."""
     import cantera
@@ -124,8 +107,8 @@ def _cantera(source: Source, phase: str) -> Any:
 
 def _translated(text: str, source: Source) -> InputError:
     """Cantera's message without its frame, at the line it names."""
-    found = re.search(r"[Ee]rror on line (\d+)", text)
-    noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on line")
+    found = re.search(r"[Ee]rror on lines? (\d+)", text)
+    noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
     lines = [line.strip() for line in text.splitlines()]
     message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
     return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
@@ -182,17 +165,12 @@ def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species,
 def _kept(source: Source, phase: Any, species: tuple[Species, ...]) -> list[Any]:
     """The entries that Cantera keeps: with `reactions: declared-species` those of other species are left out."""
     known = {item.name for item in species}
-    return [entry for entry in source.reactions(phase) if set(_names(str(entry["equation"]))) <= known]
+    return [entry for entry in source.reactions(phase) if _species_of(entry) <= known]
 
 
-def _names(equation: str) -> list[str]:
-    """Species in an equation.
-
-    >>> _names("2 a(s) + b(s) <=> c(s)")
-    ['a(s)', 'b(s)', 'c(s)']
-    """
-    words = equation.split()
-    return [word for word in words if word not in ("+", "<=>", "=>", "=") and not re.fullmatch(r"[0-9.]+", word)]
+def _species_of(entry: Any) -> set[str]:
+    reactants, products, _ = sides(str(entry["equation"]))
+    return {*reactants, *products}
 
 
 def _reaction(reaction: Any, number: str, place: Place, species: tuple[Species, ...]) -> SurfaceReaction:

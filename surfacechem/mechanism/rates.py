@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from surfacechem.expressions import Expression, exp, log, power, where
+from surfacechem.expressions import Expression, exp, log, log_fraction, power, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.terms import RateLaw, Spec, option, parameter
@@ -59,6 +59,8 @@ class SurfaceReaction(RateLaw):
 
     kind: ClassVar[str] = ""
     """Cantera's name of the rate type."""
+    keys: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Keys of a reaction of this type beside those that every reaction may have, with the keys inside."""
 
     number: str = option("short name of the reaction")
     equation: str = option("the reaction as the mechanism writes it")
@@ -76,6 +78,10 @@ class SurfaceReaction(RateLaw):
     @abstractmethod
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
         """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
+
+    @abstractmethod
+    def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
+        """Logarithm of the rate coefficient."""
 
     def own_reads(self) -> tuple[str, ...]:
         """Variables that the coefficient reads beside the temperature."""
@@ -110,12 +116,30 @@ class SurfaceReaction(RateLaw):
         """Reverse rate [1/(m^2 s)]; zero where the reaction is irreversible."""
         return self._formula(self._reverse)
 
+    @property
+    def log_forward(self) -> Formula:
+        """Logarithm of the forward rate [ln 1/(m^2 s)]."""
+        return self._formula(self._log_forward)
+
+    @property
+    def log_rate(self) -> Formula | None:
+        """Logarithm of the rate where the reaction is irreversible."""
+        return None if self.reversible else self.log_forward
+
     def _formula(self, evaluate: Any) -> Formula:
         names = (name for item in self.species for name in (item.variable, item.concentration))
         return Formula(("T_c", *names, *self.own_reads()), evaluate)
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
         return self.coefficient(values, 0) * self._amounts(values, self.orders)
+
+    def _log_forward(self, values: Mapping[str, Expression]) -> Expression:
+        total = self.log_coefficient(values)
+        for item in self.species:
+            order = self.orders.get(item.variable, 0)
+            if order:
+                total += plain(order) * (log(values[item.concentration]) + log_fraction(values[item.variable]))
+        return total
 
     def _reverse(self, values: Mapping[str, Expression]) -> Expression:
         if not self.reversible:
@@ -155,6 +179,7 @@ class InterfaceArrhenius(SurfaceReaction):
     """
 
     kind = "interface-Arrhenius"
+    keys: ClassVar = {"rate-constant": ("A", "b", "Ea"), "coverage-dependencies": ("a", "m", "E")}
 
     A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
     b: float = parameter("1", "temperature exponent", default=0.0)
@@ -188,6 +213,10 @@ class InterfaceArrhenius(SurfaceReaction):
         for term in self.coverage:
             value += term.exponent(values[term.variable], T)
         return value
+
+    def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
+        """Logarithm of the rate coefficient."""
+        return log(self.A) + self.b * log(values["T_c"]) + self.exponent(values)
 
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
         """The rate coefficient times exp(shift)."""

@@ -1,0 +1,118 @@
+"""Numbers of a mechanism over temperature and force: standard thermo, equilibrium constants, rates, and their verdicts.
+
+Everything is kept as logarithms, so that no exponent is too large to be shown. Rates are those at coverages of one, per
+possible bond, so that forward over reverse is the equilibrium constant of the coverages whatever the order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import symengine
+from numpy.typing import NDArray
+
+from surfacechem.assembly.pairs import Opposed, log_sum, opposed
+from surfacechem.expressions import Expression, derivative, log
+from surfacechem.mechanism import Mechanism
+from surfacechem.mechanism.mixture import IdealMixture, Species
+from surfacechem.mechanism.rates import SurfaceReaction
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
+from surfacechem.terms import reads
+
+Array = NDArray[np.float64]
+
+TEMPERATURE, FORCE = symengine.symbols("T_c f")
+
+
+@dataclass(frozen=True)
+class Thermo:
+    """Standard enthalpy, entropy and Gibbs energy of a species [J/mol, J/(mol K), J/mol]."""
+
+    h: float
+    s: float
+    g: float
+
+
+class Curves:
+    """Functions of temperature [K] and force per bond [N] that follow from a mechanism."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, SurfaceReaction)}
+        self.pairs: Sequence[Opposed] = opposed(self.laws)
+        self._amounts = {variable.name: variable.density for variable in mechanism.variables}
+        self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
+        self._psi = sum(self._call(law.statement) for law in mechanism.potentials)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether a force changes any rate."""
+        return any("f" in reads(law.log_forward) for law in self.laws.values())
+
+    @property
+    def species(self) -> dict[str, Species]:
+        """The species by name."""
+        mixtures = (law for law in self.mechanism.potentials if isinstance(law, IdealMixture))
+        return {item.name: item for law in mixtures for item in law.species}
+
+    @property
+    def site_density(self) -> float:
+        """Sites per reference area [1/m^2]."""
+        item = next(iter(self.species.values()))
+        return self._amounts[item.variable] * item.sites
+
+    def thermo(self, temperature: float) -> dict[str, Thermo]:
+        """Standard thermo of every species at a temperature [K], without force."""
+        return {name: _thermo(item, temperature) for name, item in self.species.items()}
+
+    def log_forward(self, label: str, temperatures: Array, forces: Array) -> Array:
+        """Logarithm of the forward rate per possible bond [1/s]."""
+        return self._evaluate(self._log_rate([label], self.laws[label].change), temperatures, forces)
+
+    def log_reverse(self, label: str, temperatures: Array, forces: Array) -> Array | None:
+        """Logarithm of the reverse rate per possible bond [1/s]; None where the reaction is irreversible."""
+        if not self.laws[label].reversible:
+            return None
+        return self.log_forward(label, temperatures, forces) - self.log_equilibrium(label, temperatures, forces)
+
+    def log_equilibrium(self, label: str, temperatures: Array, forces: Array) -> Array:
+        """Logarithm of the equilibrium constant of the coverages."""
+        return self._evaluate(self._log_equilibrium(self.laws[label].change), temperatures, forces)
+
+    def departure(self, pair: Opposed, temperatures: Array, forces: Array) -> Array:
+        """ln(k_f/k_r) - ln K of reactions that undo each other."""
+        forward, backward = (self._log_rate(laws, pair.change) for laws in (pair.forward, pair.backward))
+        return self._evaluate(forward - backward - self._log_equilibrium(pair.change), temperatures, forces)
+
+    def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
+        """At coverages of one, over the amount of the bond that the reaction makes or breaks."""
+        total = log_sum([self._call(self.laws[label].log_forward) for label in labels])
+        return self._filled(total) - log(min(self._amounts[name] for name in change))
+
+    def _log_equilibrium(self, change: Mapping[str, int | float]) -> Expression:
+        total: Expression = 0
+        for name, nu in change.items():
+            total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]
+        return self._filled(-total / (BOLTZMANN * TEMPERATURE))
+
+    def _filled(self, expression: Expression) -> Expression:
+        return symengine.sympify(expression).subs(dict.fromkeys(self._coverages.values(), 1))
+
+    def _call(self, formula: Callable[..., Expression]) -> Expression:
+        known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE}
+        known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
+        return formula(**{name: known[name] for name in reads(formula)})
+
+    def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
+        function = symengine.Lambdify([TEMPERATURE, FORCE], [expression])
+        points = np.stack(np.broadcast_arrays(temperatures, forces), axis=-1)
+        return np.asarray(function(points), dtype=np.float64)[..., 0]
+
+
+def _thermo(species: Species, temperature: float) -> Thermo:
+    g = symengine.sympify(species.gibbs(TEMPERATURE))
+    function = symengine.Lambdify([TEMPERATURE], [g, derivative(g, TEMPERATURE)])
+    value, slope = (GAS_CONSTANT * float(x) for x in function([temperature]))
+    return Thermo(value - temperature * slope, -slope, value)
