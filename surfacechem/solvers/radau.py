@@ -270,14 +270,22 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses;
     parameters are one vector or one for each state.
     """
-    values = np.array(y, dtype=float)
-    shape = values.shape
-    states = np.ascontiguousarray(values.reshape(-1, program.n))
-    rates = np.array(np.broadcast_to(np.asarray(ydot, dtype=float), shape)).reshape(-1, program.n)
-    times = np.array(np.broadcast_to(np.asarray(t, dtype=float), shape[:-1])).reshape(-1)
-    table = _contiguous(parameters).reshape(-1, program.n_parameters) if program.n_parameters else np.zeros((1, 0))
-    if len(table) not in (1, len(states)):
-        raise ValueError(f"{len(states)} states but {len(table)} parameter vectors; one is needed, or one a state.")
-    outcomes = np.zeros(len(states), np.int64)
-    stepper.make_consistent()(program.addresses, program.algebraic_mask, times, states, rates, table, outcomes)
-    return Consistent(states.reshape(shape), rates.reshape(shape), (outcomes == 0).reshape(shape[:-1]))
+    values = np.asarray(y, dtype=float)
+    n, shape = program.n, values.shape
+    ends = np.empty((values.size // n, 1 + 2 * n))
+    ends[:, 0] = np.broadcast_to(t, shape[:-1]).reshape(-1)
+    ends[:, 1 : 1 + n] = values.reshape(-1, n)
+    ends[:, 1 + n :] = np.broadcast_to(ydot, shape).reshape(-1, n)
+    table = (
+        _contiguous(parameters).reshape(-1, 1, program.n_parameters) if program.n_parameters else np.zeros((1, 1, 0))
+    )
+    if len(table) not in (1, len(ends)):
+        raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
+    counts = np.zeros((len(ends), 4), np.int64)
+    none, nothing, limits = np.zeros(0), np.zeros((len(ends), 0, 0)), np.zeros(2, np.int64)
+    stepper.run_batch()(
+        0, len(ends), program.addresses, program.algebraic_mask, limits, limits, np.ones(1 + n), counts[:0], ends, table, none, none,
+        ends, counts, counts, nothing, nothing, nothing,
+    )  # fmt: skip
+    valid = (counts[:, END] == 0).reshape(shape[:-1])
+    return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)

@@ -27,7 +27,6 @@ from surfacechem.solvers.native import (
     Q,
     Y,
     compiled,
-    compiled_once,
     evaluate,
     set_inputs,
 )
@@ -93,7 +92,7 @@ def restart(w: Any) -> int:
     return GOOD
 
 
-@compiled_once
+@compiled
 def _prepare(w: Any, h: float) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.clock[H_FACTORED] == h:
@@ -115,7 +114,7 @@ def too_small(w: Any, h: float) -> bool:
     return not (h > TINIEST and h > 4e-16 * w.clock[TAU])
 
 
-@compiled_once
+@compiled
 def advance(
     w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
 ) -> tuple[int, float, float, float]:
@@ -160,7 +159,7 @@ def advance(
         h = smaller
 
 
-@compiled_once
+@compiled
 def finish_step(w: Any, h: float) -> None:
     """What interpolation inside the step needs beyond the stages."""
     keep_correction(w)

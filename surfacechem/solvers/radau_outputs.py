@@ -26,7 +26,6 @@ from surfacechem.solvers.native import (
     Q,
     clear,
     compiled,
-    compiled_once,
     copy,
     evaluate,
     set_inputs,
@@ -53,7 +52,7 @@ def _largest(w: Any, floor: float) -> float:
     return norm
 
 
-@compiled_once
+@compiled
 def _polynomial_serves(w: Any, h: float) -> bool:
     """Whether the equations hold at the probe, midway between the stages, where the polynomial is worst."""
     x = PROBE[w.count[MEMBER]]
@@ -68,7 +67,7 @@ def _polynomial_serves(w: Any, h: float) -> bool:
     return bool(_largest(w, MAGNIFIED) <= ALLOWED)
 
 
-@compiled_once
+@compiled
 def _probe_ledger(w: Any, h: float) -> None:
     """Sample the rates of the ledger at the probe. The correction of the state there comes first: a fast rate would
     magnify its error.
@@ -86,7 +85,7 @@ def _probe_ledger(w: Any, h: float) -> None:
         w.ledger[Q_PROBE, m] = h * defect
 
 
-@compiled_once
+@compiled
 def _recall_step(w: Any, h: float) -> None:
     """Stages and quadratures of the main step, from its stored polynomial."""
     for i in range(stage_count(w.count[MEMBER])):
@@ -95,7 +94,7 @@ def _recall_step(w: Any, h: float) -> None:
         integrate_ledger(w, h)
 
 
-@compiled_once
+@compiled
 def _step_aside(w: Any, size: float) -> bool:
     """State and ledger at the end of a step of this size, as trial values; False where Newton's method fails."""
     if not factor_newton(w, size):
@@ -139,7 +138,7 @@ def _write(w: Any, row: Any) -> None:
     copy(w.ledger[Q_TRIAL], row[n:])
 
 
-@compiled_once
+@compiled
 def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
     """Each output by a step of its own; leaves the main step as it was."""
     theta, contraction, tries = w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES]
@@ -156,7 +155,7 @@ def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: 
     w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES] = theta, contraction, tries
 
 
-@compiled_once
+@compiled
 def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
     """Outputs up to the end of the step; returns how many the run has now."""
     last, inside = first, False

@@ -35,7 +35,6 @@ from surfacechem.solvers.native import (
     Y,
     clear,
     compiled,
-    compiled_once,
     evaluate,
     finite,
     set_inputs,
@@ -155,7 +154,7 @@ def set_stage(w: Any, i: int, h: float) -> None:
         w.inputs[1 + n + m] = slope / h
 
 
-@compiled_once
+@compiled
 def _stage_residuals(w: Any, h: float) -> bool:
     s = stage_count(w.count[MEMBER])
     w.count[RESIDUALS] += s
@@ -167,7 +166,7 @@ def _stage_residuals(w: Any, h: float) -> bool:
     return True
 
 
-@compiled_once
+@compiled
 def _correct(w: Any) -> float:
     """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
     k = w.count[MEMBER]
