@@ -64,13 +64,11 @@ def _writable(folder: Path) -> None:
 def _settings(folder: Path | None) -> Iterator[None]:
     """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
 
-    Loops here run over a handful of states: vectorising and unrolling them doubles the compile time and slows them
-    down.
+    Loops here run over a handful of states: vectorising them slows them down.
     """
     import numba
 
-    level = type(getattr(numba.config, "OPT"))  # noqa: B009 - Numba sets it dynamically
-    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0, "OPT": level(1)}
+    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0}
     usual = {name: getattr(numba.config, name) for name in chosen}
     try:
         for name, value in chosen.items():

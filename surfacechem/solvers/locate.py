@@ -6,7 +6,7 @@ bracketed on the corrected polynomial, then the step is repeated onto it with th
 
 from typing import Any
 
-from surfacechem.solvers.dense import interpolate, interpolate_rate
+from surfacechem.solvers.dense import interpolate_rate, keep_polynomial
 from surfacechem.solvers.native import (
     BASE,
     H_FACTORED,
@@ -38,7 +38,6 @@ NOISE = 4e-15
 @compiled
 def margins_inside(w: Any, h: float, x: float) -> None:
     """Margins at the fraction x of the step, from the polynomial."""
-    interpolate(w, x)
     interpolate_rate(w, h, x)
     w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
     set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
@@ -197,6 +196,7 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
     repeated.
     """
+    keep_polynomial(w)
     end = _scan(w, h, kinds)
     if end == 0.0:
         return h

@@ -68,16 +68,18 @@ class Work(NamedTuple):
     real: Any
     complex: Any
     order: Any
-    basis: Any
+    z_polynomial: Any
     ledger: Any
     q_stage: Any
     rates: Any
+    polynomial: Any
+    q_polynomial: Any
     margin: Any
     fired: Any
 
 
 class WorkType(types.Type):
-    """Pointer to a Work. By value its twenty arrays would be 140 arguments of every call."""
+    """Pointer to a Work. By value its arrays would be 140 arguments of every call."""
 
     def __init__(self, content: Any) -> None:
         self.content = content
@@ -233,10 +235,12 @@ def lay_out(code: Any, algebraic: Any, cursor: Any, n_parameters: int, n_ledger:
         _take(cursor, (n, n), np.float64),
         _take(cursor, (3, n, n), np.complex128),
         _take(cursor, (4, n), np.int64),
-        _take(cursor, (8,), np.float64),
+        _take(cursor, (n, 9), np.float64),
         _take(cursor, (4, n_ledger), np.float64),
         _take(cursor, (7, n_ledger), np.float64),
         _take(cursor, (8, n_ledger), np.float64),
+        _take(cursor, (n, 9), np.float64),
+        _take(cursor, (n_ledger, 9), np.float64),
         _take(cursor, (5, n_margins), np.float64),
         _take(cursor, (n_margins,), np.int64),
     )

@@ -44,8 +44,8 @@ FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
 
 END, OUTPUTS, EVENTS, RECORDS = range(4)
-"""Entries of the per-run table of counts after the counters: status, outputs written, events, recorded steps."""
-N_COUNTERS = 6
+"""Entries of the per-run table of counts: status, outputs written, events, recorded steps; then the counters."""
+FIRST_COUNTER, COUNTERS = 4, 6
 
 
 @compiled
@@ -122,7 +122,7 @@ def _run_segment(
     w: Any,
     end: float,
     kinds: Any,
-    limits: Any,
+    max_steps: int,
     stop: Any,
     times: Any,
     outputs: Any,
@@ -139,7 +139,7 @@ def _run_segment(
                 return outcome
             h, size_last, norm_last = first_size(w, end - w.clock[BASE]), 0.0, 1.0
         remaining = (end - w.clock[BASE]) - w.clock[TAU]
-        outcome, h, norm, proposed = advance(w, _next_try(h, remaining), limits[0], stop, size_last, norm_last)
+        outcome, h, norm, proposed = advance(w, _next_try(h, remaining), max_steps, stop, size_last, norm_last)
         if outcome != GOOD:
             return outcome
         finish_step(w, h)
@@ -171,11 +171,10 @@ def _run(
     segments: Any,
     times: Any,
     kinds: Any,
-    limits: Any,
+    max_steps: int,
     stop: Any,
     end: Any,
     counts: Any,
-    counters: Any,
     outputs: Any,
     steps: Any,
     events: Any,
@@ -192,7 +191,7 @@ def _run(
         w.clock[BASE] = segments[segment]
         w.clock[TAU] = 0.0
         copy(parameters[segment], w.inputs[1 + 2 * n :])
-        status = _run_segment(w, segments[segment + 1], kinds, limits, stop, times, outputs, steps, events, counts)
+        status = _run_segment(w, segments[segment + 1], kinds, max_steps, stop, times, outputs, steps, events, counts)
         if status != GOOD:
             break
     counts[END] = FINISHED if status == GOOD else status
@@ -200,8 +199,8 @@ def _run(
     if kinds.shape[0] > 0:
         start_margins(w)
         copy(w.margin[M_NOW], end[end.shape[0] - kinds.shape[0] :])
-    for i in range(N_COUNTERS):
-        counters[i] = w.count[i]
+    for i in range(COUNTERS):
+        counts[FIRST_COUNTER + i] = w.count[i]
 
 
 @compiled
@@ -222,9 +221,11 @@ def run_batch(
     last: int,
     code: Any,
     algebraic: Any,
-    limits: Any,
+    n_ledger: int,
+    max_steps: int,
     stop: Any,
-    tolerances: Any,
+    rtol: float,
+    atol: Any,
     kinds: Any,
     y0: Any,
     parameters: Any,
@@ -232,7 +233,6 @@ def run_batch(
     times: Any,
     ends: Any,
     counts: Any,
-    counters: Any,
     outputs: Any,
     steps: Any,
     events: Any,
@@ -241,13 +241,13 @@ def run_batch(
     threads. Without segments the rows of ``ends`` are made consistent; parameters may then be one row for all.
     """
     place = np.zeros(1, np.int64)
-    lay_out(code, algebraic, place, parameters.shape[2], limits[1], kinds.shape[0])
+    lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0])
     memory = np.zeros(place[0] // 8, np.int64)
     place[0] = memory.ctypes.data
-    w = reference(lay_out(code, algebraic, place, parameters.shape[2], limits[1], kinds.shape[0]))
-    w.clock[RTOL] = tolerances[0]
-    w.clock[LOOSE] = loosening(tolerances[0])
-    copy(tolerances[1:], w.vector[ATOL])
+    w = reference(lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0]))
+    w.clock[RTOL] = rtol
+    w.clock[LOOSE] = loosening(rtol)
+    copy(atol, w.vector[ATOL])
     for i in range(first, last):
         if segments.shape[0] == 0:
             _make_consistent(w, parameters[i if parameters.shape[0] > 1 else 0], ends[i], counts[i])
@@ -259,11 +259,10 @@ def run_batch(
             segments,
             times,
             kinds,
-            limits,
+            max_steps,
             stop,
             ends[i],
             counts[i],
-            counters[i],
             outputs[i],
             steps[i],
             events[i],
