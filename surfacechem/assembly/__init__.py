@@ -1,6 +1,6 @@
 """From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
 
-Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals.
+Each stage is a module: temperatures, interface, force, chemistry, exchange, equations, totals.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
+from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, totals
@@ -23,7 +24,9 @@ STAGES = (
     prescribed_variables,
     bonding_variables,
     free_energy,
+    force,
     reactions,
+    rupture,
     friction,
     heat_paths,
     equations,

@@ -21,7 +21,7 @@ from surfacechem.terms import (
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
     Potential: ("bonding", "contact"),
-    RateLaw: ("kinetics",),
+    RateLaw: ("kinetics", "bonds"),
     Friction: ("friction",),
     HeatTransfer: ("heat",),
     Load: ("loading",),
