@@ -61,8 +61,8 @@ class InterfaceBell(LoadedReaction, BellFactor):
 
     .. math:: k = A\,T^b \exp\left( -\frac{E_a}{R_g T} + \frac{f x_\beta}{k_B T} \right)
 
-    Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575. As ``x-beta`` is that of the forward direction, a
-    reversible reaction keeps detailed balance if its bond has a stiffness.
+    ``x-beta`` is that of the forward direction; the reverse follows from the potential, which contains the elastic
+    energy of bonds that have a stiffness. Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575.
     """
 
     kind = "interface-Bell"
@@ -95,8 +95,8 @@ class InterfaceTwoPathway(LoadedReaction, TwoPathwayFactor):
 
     .. math:: k = A\,T^b e^{-E_a / R_g T} \left( e^{f x_{slip} / k_B T} + r_c\,e^{-f x_{catch} / k_B T} \right)
 
-    Source: Pereverzev, Prezhdo, Forero, Sokurenko & Thomas (2005), doi 10.1529/biophysj.105.062158. Pathways with
-    activation energies of their own are two reactions of type Bell.
+    Pathways with activation energies of their own are two reactions of type Bell, one with a negative ``x-beta``.
+    Source: Pereverzev, Prezhdo, Forero, Sokurenko & Thomas (2005), doi 10.1529/biophysj.105.062158.
     """
 
     kind = "interface-two-pathway"

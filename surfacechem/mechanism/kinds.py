@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import inspect
 
-from surfacechem.mechanism import bonds, rates
+from surfacechem.mechanism import affinity, bonds, cure, rates
 from surfacechem.mechanism.rates import SurfaceReaction
 
-FAMILIES = (rates, bonds)
+FAMILIES = (rates, bonds, affinity, cure)
 """The modules in which rate types stand."""
 
 PREFIX = "interface-"
