@@ -17,7 +17,7 @@ from surfacechem.scene import Body, Interface, Scene, Sites
 
 SITES = 1e16
 RESOLVED = 1e-8
-"""Part of its life that a cluster must have left: closer to its end, the last digits of that life decide on its state."""
+"""Part of its life that a cluster must have left; closer to its end, the last digits of that life decide."""
 
 
 def isothermal(law, loading, phi=1.0, T=300.0, sites=SITES, potentials=()) -> Scene:
