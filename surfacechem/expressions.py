@@ -7,6 +7,8 @@ SymEngine differentiates exactly and compiles. Every function here keeps its val
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from functools import reduce
 from typing import Any, TypeAlias
 
 Expression: TypeAlias = Any
@@ -116,6 +118,19 @@ def log_fraction(x: Expression) -> Expression:
     import symengine
 
     return where(x > FRACTION_FLOOR, symengine.log(x), math.log(FRACTION_FLOOR))
+
+
+def log_sum(logarithms: Iterable[Expression]) -> Expression:
+    """Logarithm of a sum of which only the logarithms are known.
+
+    >>> log_sum([-1000.0, -1000.0])
+    -999.3068528194401
+    """
+
+    def add(a: Expression, b: Expression) -> Expression:
+        return where(a > b, a + log(1 + exp(b - a)), b + log(1 + exp(a - b)))
+
+    return reduce(add, logarithms)
 
 
 def sqrt(x: Expression) -> Expression:

@@ -13,8 +13,8 @@ import numpy as np
 import symengine
 from numpy.typing import NDArray
 
-from surfacechem.assembly.pairs import Opposed, log_sum, opposed
-from surfacechem.expressions import Expression, derivative, log
+from surfacechem.assembly.pairs import Opposed, opposed
+from surfacechem.expressions import Expression, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import SurfaceReaction
@@ -49,7 +49,8 @@ class Curves:
     @property
     def loaded(self) -> bool:
         """Whether a force changes any rate."""
-        return any("f" in reads(law.log_forward) for law in self.laws.values())
+        names = {name for law in self.laws.values() for name in reads(law.log_forward)}
+        return any(name == "f" or name.startswith("f_") for name in names)
 
     @property
     def species(self) -> dict[str, Species]:
@@ -103,7 +104,16 @@ class Curves:
     def _call(self, formula: Callable[..., Expression]) -> Expression:
         known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE}
         known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
+        known |= self._stretched()
         return formula(**{name: known[name] for name in reads(formula)})
+
+    def _stretched(self) -> dict[str, Expression]:
+        """The gap at which the first of the elastic bonds carries the force, and what the others carry there."""
+        springs = {item.variable: item.spring for item in self.species.values() if item.spring}
+        first = next(iter(springs.values()), None)
+        gap = first.rest_length + FORCE / first.stiffness if first else 0.0
+        forces = {f"f_{name}": spring.stiffness * (gap - spring.rest_length) for name, spring in springs.items()}
+        return {"g_n": gap, **forces}
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
         function = symengine.Lambdify([TEMPERATURE, FORCE], [expression])

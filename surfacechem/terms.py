@@ -11,6 +11,7 @@ contract           states                                              audited f
 :class:`BodyEnergy`    free energy of a body as a function of T            capacity > 0
 :class:`Friction`      traction that opposes sliding                       traction * v >= 0
 :class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
+:class:`RateFactor`    logarithm of what load does to a rate coefficient   --
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
 :class:`Load`          prescribed history of a variable                    --
 :class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
@@ -270,6 +271,15 @@ class RateLaw(Law):
         A one-way law and one that undoes it are held against the equilibrium of the potential.
         """
         return None
+
+
+class RateFactor(Law):
+    """What multiplies a rate coefficient under load; stated as its logarithm, so that no factor can overflow."""
+
+    contract = "rate factor"
+    formula = "log_factor"
+
+    log_factor: ClassVar[Callable[..., Expression]]
 
 
 class HeatTransfer(Law):

@@ -22,11 +22,15 @@ REMEDIES = {
     "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
     "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
+    "t_n": "Prescribe `t_n` under `loading`, or give the interface a potential that reads the normal gap.",
+    "f": "Prescribe `f` under `loading`, or a load on the bonds: `t_n`, or a potential that reads the normal gap.",
     "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
     "T_0": "Give the reference temperature `T_0` at the top of the case.",
     "T_c": "Give `interface.temperature`, or both bodies a temperature.",
     "N_c": "Give `interface.sites`.",
     "n_c": "Give `interface.sites`.",
+    "n_1": "Give `interface.sites`.",
+    "n_2": "Give `interface.sites`.",
     "mu": "Give `interface.sites` and a potential that reads the bonding state.",
 }
 

@@ -7,7 +7,7 @@ import pytest
 import thermodynamics as laws
 
 import surfacechem
-from surfacechem.assembly.pairs import log_sum
+from surfacechem.expressions import log_sum
 from surfacechem.quantities import GAS_CONSTANT
 
 DH, DS = -20e3, -50.0

@@ -1,6 +1,6 @@
 """From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
 
-Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals.
+Each stage is a module: temperatures, interface, force, chemistry, exchange, equations, totals.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
+from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
@@ -32,8 +33,10 @@ STAGES = (
     tangential_gap,
     bonded_mode,
     free_energy,
+    force,
     limits,
     reactions,
+    rupture,
     friction,
     normal_motion,
     tangential_motion,

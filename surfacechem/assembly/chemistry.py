@@ -66,6 +66,7 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
         own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
+    build.law_ranges(law)
     return build.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
 
 

@@ -14,7 +14,10 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
 from surfacechem.terms import Load, Spec
 
-LOADABLE = ("phi", "g_n", "g_t", "v", "p", "J_c", "Q_1", "Q_2", "Q_c", "w_n", "w_t", "F_n", "F_t", "u_t")
+LOADABLE = (
+    *("phi", "g_n", "g_t", "v", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c"),
+    *("w_n", "w_t", "F_n", "F_t", "u_t"),
+)
 """Variables that a case may prescribe, beside the temperatures."""
 
 TRACTIONS = (
@@ -52,6 +55,8 @@ def bonding_variables(build: Build) -> None:
         nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
         build.variables.define("N_c", nominal, "constant", "interface.sites")
         build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
+        for k, side in enumerate((sites.density_1, sites.density_2), start=1):
+            build.variables.define(f"n_{k}", partial(_side_density, build, k, side), "derived", "interface.sites")
     breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
@@ -70,6 +75,16 @@ def _current_density(build: Build) -> Expression:
     if not build.variables.has("J_c"):
         return nominal
     return build.name(VARIABLES["n_c"], nominal / build.stretch)
+
+
+def _side_density(build: Build, k: int, density: float) -> Expression:
+    """Sites of one body; those of the reference are the reference density itself."""
+    sites = build.interface.sites
+    if sites is not None and density == sites.density:
+        return build.variables.get("n_c", "the interface")
+    spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
+    path = f"interface.sites.{build.scene.bodies[k - 1].name}"
+    return build.constant(f"N_{k}", path, spec, density) / build.stretch
 
 
 def _amounts(build: Build, name: str, density: Expression) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import reduce
-from typing import Any
 
 from surfacechem.assembly.build import Build
-from surfacechem.expressions import Expression, exp, log, where
+from surfacechem.expressions import Expression, log_sum, where
 from surfacechem.quantities import BOLTZMANN, Quantity
 from surfacechem.system import Pair
 from surfacechem.terms import RateLaw
@@ -74,16 +72,3 @@ def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Non
 
 def _log_rate(build: Build, laws: Iterable[RateLaw]) -> Expression:
     return log_sum([build.variables.call(law, law.log_rate) for law in laws if law.log_rate is not None])
-
-
-def log_sum(logarithms: Sequence[Any]) -> Expression:
-    """Logarithm of a sum of which only the logarithms are known.
-
-    >>> log_sum([-1000.0, -1000.0])
-    -999.3068528194401
-    """
-
-    def add(a: Expression, b: Expression) -> Expression:
-        return where(a > b, a + log(1 + exp(b - a)), b + log(1 + exp(a - b)))
-
-    return reduce(add, logarithms)

@@ -22,7 +22,7 @@ from surfacechem.terms import (
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
     Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange"),
-    RateLaw: ("kinetics", "adhesion"),
+    RateLaw: ("kinetics", "bonds", "adhesion"),
     Friction: ("friction",),
     HeatTransfer: ("heat",),
     Limit: ("limits",),

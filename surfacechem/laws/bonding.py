@@ -1,4 +1,4 @@
-"""Chemical part of the interface's free energy: bond energy, linear enthalpy, lattice gas."""
+"""Chemical part of the interface's free energy: bond energy, linear enthalpy, lattice gas, bond springs."""
 
 from __future__ import annotations
 
@@ -72,3 +72,23 @@ class LatticeGas(Potential):
         """Free energy [J/m^2]."""
         mixing = phi * log_fraction(phi) + (1 - phi) * log_fraction(1 - phi)
         return N_c * (BOLTZMANN * T_c * mixing - self.epsilon * phi)
+
+
+class BondSprings(Potential):
+    r"""Elastic energy of the bonds, each a spring across the gap.
+
+    .. math:: \Psi = N_c\,\phi\,\tfrac12 k_b (g_n - l_0)^2, \quad f = k_b (g_n - l_0), \quad t_n = n_c\,\phi\,f
+
+    Stretched bonds are worth less: the chemical potential contains the energy of the spring. Source: Dembo, Torney,
+    Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038. Any g_n; bonds are compressed below :math:`l_0`.
+
+    >>> round(BondSprings(k_b=1e-3).energy(phi=0.5, g_n=1e-8, N_c=1e16), 12)
+    0.00025
+    """
+
+    k_b: float = parameter("N/m", "stiffness of a bond", at_least=0)
+    l_0: float = parameter("m", "gap at which bonds are not stretched", default=0.0)
+
+    def energy(self, phi: Expression, g_n: Expression, N_c: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return N_c * phi * self.k_b * (g_n - self.l_0) ** 2 / 2

@@ -1,4 +1,4 @@
-"""Bonding kinetics: linear affinity, exponential affinity, relaxation, Arrhenius."""
+"""Bonding kinetics: affinity laws, relaxation, Arrhenius, mass action, bimolecular, cure."""
 
 from __future__ import annotations
 
@@ -89,3 +89,69 @@ class Arrhenius(RateLaw):
         """Net rate [1/(m^2 s)]."""
         k = self.A * (T_c / T_0) ** self.b * exp(-self.E_a / (GAS_CONSTANT * T_c))
         return n_c * k * power(1 - phi, self.n)
+
+
+class MassAction(RateLaw):
+    r"""Bonds form and break at constant rates.
+
+    .. math:: R = n_c \left[ k_{on} (1 - \phi) - k_{off}\,\phi \right]
+
+    Source: Guldberg & Waage (1864), law of mass action. 0 <= phi <= 1. Admissible with the lattice gas if
+    :math:`k_{off} / k_{on} = e^{-\varepsilon / k_B T}`.
+
+    >>> MassAction(k_on=3.0, k_off=1.0).rate(phi=0.5, n_c=1e16)
+    1e+16
+    """
+
+    k_on: float = parameter("1/s", "rate of formation", at_least=0)
+    k_off: float = parameter("1/s", "rate of rupture", at_least=0)
+
+    def rate(self, phi: Expression, n_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        return n_c * (self.k_on * (1 - phi) - self.k_off * phi)
+
+
+class Bimolecular(RateLaw):
+    r"""Two surfaces with different densities of partners, each of which finds any partner.
+
+    .. math:: R = k_f (n_1 - n_c \phi)(n_2 - n_c \phi) - k_r n_c \phi
+
+    Source: Sauer, Duong & Mandadapu (2021), section 4, for n_b = n_c phi bonds. phi <= min(n_1, n_2) / n_c.
+
+    >>> Bimolecular(k_f=1e-16, k_r=1.0).rate(phi=0.5, n_c=1e16, n_1=1e16, n_2=2e16)
+    2500000000000000.0
+    """
+
+    k_f: float = parameter("m^2/s", "rate coefficient of formation", at_least=0)
+    k_r: float = parameter("1/s", "rate of rupture", at_least=0)
+
+    def rate(self, phi: Expression, n_c: Expression, n_1: Expression, n_2: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        bonds = n_c * phi
+        return self.k_f * (n_1 - bonds) * (n_2 - bonds) - self.k_r * bonds
+
+
+class KamalSourour(RateLaw):
+    r"""Autocatalytic cure: bonds speed up the formation of further bonds.
+
+    .. math:: R = n_c (k_1 + k_2 \phi^m)(1 - \phi)^n, \quad k_i = A_i e^{-E_i / R_g T_c}
+
+    Source: Kamal & Sourour (1973), Polym. Eng. Sci. 13, 59, doi 10.1002/pen.760130110. 0 <= phi <= 1. Admissible
+    while mu <= 0: it has no reverse.
+
+    >>> KamalSourour(A_1=1.0, A_2=4.0, m=0.5, n=2.0).rate(phi=0.25, n_c=1e16, T_c=300.0)
+    1.6875e+16
+    """
+
+    A_1: float = parameter("1/s", "pre-exponential factor without bonds", at_least=0)
+    A_2: float = parameter("1/s", "pre-exponential factor of autocatalysis", at_least=0)
+    E_1: float = parameter("J/mol", "activation energy without bonds", default=0.0)
+    E_2: float = parameter("J/mol", "activation energy of autocatalysis", default=0.0)
+    m: float = parameter("1", "order of autocatalysis", default=1.0, above=0)
+    n: float = parameter("1", "order in what has not reacted", default=1.0, above=0)
+
+    def rate(self, phi: Expression, n_c: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        thermal = GAS_CONSTANT * T_c
+        k_1, k_2 = self.A_1 * exp(-self.E_1 / thermal), self.A_2 * exp(-self.E_2 / thermal)
+        return n_c * (k_1 + k_2 * power(phi, self.m)) * power(1 - phi, self.n)

@@ -7,7 +7,8 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
-from surfacechem.mechanism.rates import SurfaceReaction, kinds
+from surfacechem.mechanism.kinds import kind_of, kinds
+from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source, chosen, sections, sides
 
 FILE = frozenset(
@@ -42,7 +43,8 @@ PHASE = frozenset(
         "description",
     )
 )
-SPECIES = frozenset(("name", "composition", "thermo", "sites", "units", "note", "description", "transport"))
+SPECIES = frozenset(("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"))
+BOND = frozenset(("stiffness", "rest-length"))
 CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
 POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
@@ -163,6 +165,8 @@ def _check_species(source: Source, entry: Any) -> None:
         values.check_kelvin(source, thermo, key, title)
     for key in ("h0", "s0", "cp0"):
         values.check_bare(source, thermo, key, title, entry)
+    if "bond" in entry:
+        _keys(source, entry["bond"], BOND, f"{title}: bond")
 
 
 def _check_composition(source: Source, phase: Any, entry: Any) -> None:
@@ -190,29 +194,33 @@ def _names(source: Source, phase: Any, entries: list[Any]) -> list[str]:
 
 def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) -> None:
     title = f"reaction {entry.get('equation')}"
-    _keys(source, entry, REACTION.union(*(law.keys for law in kinds().values())), title)
+    _keys(source, entry, REACTION.union(*map(_keys_of, kinds().values())), title)
     values.check_units(source, entry)
     if "equation" not in entry:
         raise InputError("a reaction has no `equation`.", source.place(entry))
     law = _law(source, entry, title)
     for key in entry:
-        if key not in REACTION | set(law.keys):
-            having = ", ".join(sorted(kind for kind, other in kinds().items() if key in other.keys))
+        if key not in REACTION | _keys_of(law):
+            having = ", ".join(sorted(kind for kind, other in kinds().items() if key in _keys_of(other)))
             message = f"{title}: '{key}' is no key of {law.kind}; it belongs to {having}."
             raise InputError(message, source.place(entry, key))
     left_out = _check_equation(source, phase, entry, names, title)
     _check_rate(source, entry, law, [] if left_out else names, title)
 
 
+def _keys_of(law: type[SurfaceReaction]) -> set[str]:
+    return {*law.keys, *law.own_keys()}
+
+
 def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
     """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
-    kind, known = str(entry.get("type", "Arrhenius")), kinds()
+    kind = str(entry.get("type", "Arrhenius"))
     if kind in ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev"):
         message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
         raise InputError(message, source.place(entry, "type"))
-    law = known.get(kind) or known.get(f"interface-{kind}")
+    law = kind_of(kind)
     if law is None:
-        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, known)}"
+        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, kinds())}"
         raise InputError(message, source.place(entry, "type"))
     return law
 

@@ -10,9 +10,11 @@ from typing import Any
 
 from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.mechanism.fields import rate_fields, spring
 from surfacechem.mechanism.keys import check
+from surfacechem.mechanism.kinds import kind_of, kinds
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
-from surfacechem.mechanism.rates import KILO, SurfaceReaction, kinds, plain
+from surfacechem.mechanism.rates import KILO, SurfaceReaction, plain
 from surfacechem.mechanism.source import Source, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.scene import BondingVariable, Sites
@@ -64,7 +66,7 @@ def load_mechanism(
     source = Source(str(path), path.read_text(encoding="utf-8"))
     entry = source.phase(phase, place)
     check(source, entry)
-    surface = _cantera(source, str(entry["name"]))
+    surface = _cantera(source, entry)
     species = _species(surface, source, entry)
     chosen = _bonds(species, bonds, place)
     density = surface.site_density * KILO * AVOGADRO
@@ -95,14 +97,27 @@ def _find(path: Path, place: Place | None) -> Path:
     raise InputError(f"no mechanism file {path}.{suggestion(path.name, known)}", place)
 
 
-def _cantera(source: Source, phase: str) -> Any:
+def _cantera(source: Source, phase: Any) -> Any:
     """The phase as Cantera reads it; its errors keep their line."""
     import cantera
 
     try:
-        return cantera.Interface(yaml=source.text, name=phase)
+        return cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
         raise _translated(str(error), source) from None
+
+
+def _plain_text(source: Source, phase: Any) -> str:
+    """The file with our own rate types called Arrhenius, so that Cantera needs no extension to read the rest."""
+    lines = source.text.splitlines(keepends=True)
+    for entry in source.reactions(phase):
+        kind = str(entry.get("type", ""))
+        law = kind_of(kind)
+        if "type" in entry and law is not None and not law.native:
+            line, column = entry.lc.value("type")
+            before, after = lines[line][:column], lines[line][column:]
+            lines[line] = before + re.sub(rf"""^(["']?){re.escape(kind)}\1""", "interface-Arrhenius", after)
+    return "".join(lines)
 
 
 def _translated(text: str, source: Source) -> InputError:
@@ -123,7 +138,7 @@ def _species(surface: Any, source: Source, phase: Any) -> tuple[Species, ...]:
         if gibbs is None:
             message = f"species {item.name}: thermo of type {type(item.thermo).__name__} is not lowered."
             raise InputError(message, source.place(entries.get(item.name)))
-        result.append(Species(item.name, names[item.name], float(item.size), gibbs))
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring(source, entries[item.name])))
     return tuple(result)
 
 
@@ -157,7 +172,7 @@ def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species,
     entries = _kept(source, phase, species)
     paired = zip(surface.reactions(), entries, strict=True)
     return tuple(
-        _reaction(reaction, f"R{number}", _law_place(source, entry, f"mechanism.R{number}"), species)
+        _reaction(reaction, source, entry, f"R{number}", species)
         for number, (reaction, entry) in enumerate(paired, start=1)
     )
 
@@ -173,26 +188,27 @@ def _species_of(entry: Any) -> set[str]:
     return {*reactants, *products}
 
 
-def _reaction(reaction: Any, number: str, place: Place, species: tuple[Species, ...]) -> SurfaceReaction:
-    known = kinds()
-    kind = reaction.rate.type
-    if kind not in known:
-        message = f"reaction {reaction.equation}: rate type '{kind}' is not lowered.{suggestion(kind, known)}"
-        raise InputError(message, place)
+def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> SurfaceReaction:
+    place = _law_place(source, entry, f"mechanism.{number}")
+    law = kind_of(str(entry.get("type") or reaction.rate.type))
+    if law is None:
+        message = f"reaction {reaction.equation}: rate type '{reaction.rate.type}' is not lowered."
+        raise InputError(f"{message}{suggestion(reaction.rate.type, kinds())}", place)
     variables = {item.name: item.variable for item in species}
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     _check_reaction(reaction, forward, place)
-    law = known[kind]
+    taking_part = tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders})
     return law(
         number=number,
         equation=reaction.equation,
         orders=forward,
         products={variables[name]: nu for name, nu in reaction.products.items()},
         change=_change(reaction, variables),
-        species=tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders}),
+        species=taking_part,
         reversible=bool(reaction.reversible),
         place=place,
         **law.parameters_of(reaction, variables, sum(forward.values())),
+        **rate_fields(law, source, entry),
     )
 
 

@@ -29,13 +29,30 @@ class Formula:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """Elasticity of a bond across the gap: stiffness [N/m] and the gap at which it is not stretched [m]."""
+
+    stiffness: float
+    rest_length: float = 0.0
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Elastic energy [J] of one bond.
+
+        >>> Spring(stiffness=1e-3).energy(2e-9)
+        2e-21
+        """
+        return self.stiffness * (g_n - self.rest_length) ** 2 / 2
+
+
+@dataclass(frozen=True)
 class Species:
-    """A surface species: its name in the mechanism, its coverage's name here, the sites it takes and its thermo."""
+    """A surface species: its name in the mechanism, its coverage's name here, its sites, thermo and elasticity."""
 
     name: str
     variable: str
     sites: float
     gibbs: StandardGibbs
+    spring: Spring | None = None
 
     @property
     def amount(self) -> str:
@@ -55,9 +72,10 @@ class Species:
 class IdealMixture(Potential):
     r"""Free energy of species that share the sites of a surface and mix ideally.
 
-    .. math:: \Psi = \sum_k N_k \theta_k \left[ g_k(T) + k_B T (\ln \theta_k - 1) \right], \quad
-              \frac{1}{N_k} \frac{\partial \Psi}{\partial \theta_k} = g_k(T) + k_B T \ln \theta_k
+    .. math:: \Psi = \sum_k N_k \theta_k \left[ g_k(T) + w_k(g_n) + k_B T (\ln \theta_k - 1) \right], \quad
+              \frac{1}{N_k} \frac{\partial \Psi}{\partial \theta_k} = g_k(T) + w_k(g_n) + k_B T \ln \theta_k
 
+    :math:`w_k = \tfrac12 k_b (g_n - l_0)^2` is the elastic energy of species that are springs across the gap,
     :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes.
     Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; the chemical potentials, enthalpies,
     entropies and heat capacities of Cantera's ideal-surface phase. 0 <= theta_k <= 1.
@@ -75,7 +93,8 @@ class IdealMixture(Potential):
     def energy(self) -> Formula:  # type: ignore[override]
         """Free energy [J/m^2] as a function of temperature, coverages and amounts at full coverage."""
         names = (name for species in self.species for name in (species.variable, species.amount))
-        return Formula(("T_c", *names), self._energy)
+        gap = ("g_n",) if any(species.spring for species in self.species) else ()
+        return Formula(("T_c", *gap, *names), self._energy)
 
     def _energy(self, values: Mapping[str, Expression]) -> Expression:
         T = values["T_c"]
@@ -83,5 +102,6 @@ class IdealMixture(Potential):
         for species in self.species:
             theta = values[species.variable]
             mixing = BOLTZMANN * T * (log_fraction(theta) - 1)
-            total += values[species.amount] * theta * (species.standard(T) + mixing)
+            elastic = species.spring.energy(values["g_n"]) if species.spring else 0
+            total += values[species.amount] * theta * (species.standard(T) + elastic + mixing)
         return total

@@ -1,7 +1,7 @@
 """Rates of surface reactions: mass action whose reverse follows from the thermo, and one class per rate type.
 
 To add a rate type, subclass :class:`SurfaceReaction`, give it Cantera's name of the type as ``kind`` and state its
-``coefficient``. Nothing else is edited.
+``coefficient``; for one that multiplies an Arrhenius coefficient see :mod:`surfacechem.mechanism.bonds`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from surfacechem.expressions import Expression, exp, log, log_fraction, power, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
-from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.terms import RateLaw, Spec, option, parameter
 
 KILO = 1000.0
@@ -61,6 +61,8 @@ class SurfaceReaction(RateLaw):
     """Cantera's name of the rate type."""
     keys: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """Keys of a reaction of this type beside those that every reaction may have, with the keys inside."""
+    native: ClassVar[bool] = False
+    """Whether Cantera knows the type without an extension."""
 
     number: str = option("short name of the reaction")
     equation: str = option("the reaction as the mechanism writes it")
@@ -74,6 +76,11 @@ class SurfaceReaction(RateLaw):
     @abstractmethod
     def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
         """Own fields of the class, in SI units per molecule, from a Cantera reaction of total order ``order``."""
+
+    @classmethod
+    def own_keys(cls) -> dict[str, str]:
+        """Keys of the reaction in a mechanism file that Cantera does not know, each with the field that it gives."""
+        return {}
 
     @abstractmethod
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
@@ -128,7 +135,12 @@ class SurfaceReaction(RateLaw):
 
     def _formula(self, evaluate: Any) -> Formula:
         names = (name for item in self.species for name in (item.variable, item.concentration))
-        return Formula(("T_c", *names, *self.own_reads()), evaluate)
+        gap = ("g_n",) if self.reversible and self._stretches() else ()
+        return Formula(("T_c", *gap, *names, *self.own_reads()), evaluate)
+
+    def _stretches(self) -> bool:
+        """Whether the reaction changes the number of elastic bonds."""
+        return any(item.spring and self.change.get(item.variable) for item in self.species)
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
         return self.coefficient(values, 0) * self._amounts(values, self.orders)
@@ -147,16 +159,18 @@ class SurfaceReaction(RateLaw):
         standard: Expression = 1
         for item in self.species:
             standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
-        affinity = self.standard_affinity(values["T_c"])
+        affinity = self.standard_affinity(values["T_c"], values.get("g_n"))
         return self.coefficient(values, affinity) * standard * self._amounts(values, self.products)
 
-    def standard_affinity(self, T: Expression) -> Expression:
-        """Standard Gibbs energy of the reaction over k_B T."""
+    def standard_affinity(self, T: Expression, g_n: Expression = None) -> Expression:
+        """Standard Gibbs energy of the reaction over k_B T, with the elastic energy of its bonds at the gap g_n."""
         total: Expression = 0
         for item in self.species:
             nu = self.change.get(item.variable, 0)
             if nu:
                 total += plain(nu) * item.gibbs(T)
+                if item.spring is not None:
+                    total += plain(nu) * item.spring.energy(g_n) / BOLTZMANN
         return total / T
 
     def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float]) -> Expression:
@@ -180,6 +194,7 @@ class InterfaceArrhenius(SurfaceReaction):
 
     kind = "interface-Arrhenius"
     keys: ClassVar = {"rate-constant": ("A", "b", "Ea"), "coverage-dependencies": ("a", "m", "E")}
+    native = True
 
     A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
     b: float = parameter("1", "temperature exponent", default=0.0)
@@ -226,17 +241,6 @@ class InterfaceArrhenius(SurfaceReaction):
 def _coverage_term(variable: str, terms: Mapping[str, Any]) -> CoverageTerm:
     energies = terms["E"] if isinstance(terms["E"], list | tuple) else [terms["E"]]
     return CoverageTerm(variable, float(terms["a"]), float(terms["m"]), tuple(float(e) / KILO for e in energies))
-
-
-def kinds() -> dict[str, type[SurfaceReaction]]:
-    """Every rate type that is lowered, by Cantera's name."""
-    found: dict[str, type[SurfaceReaction]] = {}
-    pending = list(SurfaceReaction.__subclasses__())
-    while pending:
-        law = pending.pop()
-        found[law.kind] = law
-        pending += law.__subclasses__()
-    return found
 
 
 def unit_of_rate(order: float) -> str:

@@ -1,0 +1,175 @@
+"""Bonds under load: Bell, Dembo spring, two pathways, Dudko-Hummer-Szabo, attachment across a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from surfacechem.expressions import Expression, exp, expm1, log_fraction, where
+from surfacechem.laws.forces import (
+    BellFactor,
+    DemboFactor,
+    DemboFormationFactor,
+    DudkoFactor,
+    GapFactor,
+    TwoPathwayFactor,
+)
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.terms import RateLaw, parameter
+
+
+class Bell(RateLaw):
+    r"""Slip bond: force speeds up rupture, and slows down or speeds up formation.
+
+    .. math:: R = n_c \left[ k_{on} e^{f x_{on} / k_B T_c} (1 - \phi) - k_{off} e^{f x_{off} / k_B T_c}\,\phi \right]
+
+    Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575. A negative x_off is a catch bond. While f x stays
+    below the barrier. The rates are independent of a potential: the audit says whether they agree with one.
+
+    >>> Bell(k_off=0.1, x_off=4e-10).rate(phi=1.0, n_c=1.0, f=30e-12, T_c=300.0)
+    -1.8123115...
+    """
+
+    k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
+    x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
+    k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
+    x_on: float = parameter("m", "distance to the transition state of formation", default=0.0)
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        on = self.k_on * exp(BellFactor(x_beta=self.x_on).log_factor(f, T_c))
+        off = self.k_off * exp(BellFactor(x_beta=self.x_off).log_factor(f, T_c))
+        return n_c * (on * (1 - phi) - off * phi)
+
+
+class ReversibleBell(RateLaw):
+    r"""Slip bond whose formation follows from the potential, so that detailed balance holds under force.
+
+    .. math:: R = -n_c k_{off} e^{f x_{off} / k_B T_c}\,\phi \left( 1 - e^{-\mu / k_B T_c} \right)
+
+    With a lattice gas and bond springs, bonds form at the rate
+    :math:`k_{off} e^{(\varepsilon + f x_{off} - w_b) / k_B T_c}`. Source: Bell (1978), doi 10.1126/science.347575, with
+    the reverse of Sauer, Duong & Mandadapu (2021), section 4. Always admissible; the potential should contain mixing.
+
+    >>> ReversibleBell(k_off=0.1, x_off=4e-10).rate(phi=0.5, n_c=1.0, f=0.0, T_c=300.0, mu=1e-20)
+    -0.045528...
+    """
+
+    k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
+    x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        breaking = BellFactor(x_beta=self.x_off).log_factor(f, T_c) + log_fraction(phi)
+        affinity = -mu / (BOLTZMANN * T_c)
+        forming = -exp(breaking + affinity) * expm1(-affinity)
+        return n_c * self.k_off * where(affinity > 0, forming, exp(breaking) * expm1(affinity))
+
+
+class DemboSpring(RateLaw):
+    r"""Bond spring: slip, ideal or catch bond by how stiff it is in the transition state.
+
+    .. math:: R = n_c \left[ k_{on} e^{-\kappa_{ts} f^2 / 2 \kappa^2 k_B T_c} (1 - \phi)
+              - k_{off} e^{(\kappa - \kappa_{ts}) f^2 / 2 \kappa^2 k_B T_c}\,\phi \right]
+
+    Source: Dembo, Torney, Saxman & Hammer (1988), Proc. R. Soc. Lond. B 234, 55, doi 10.1098/rspb.1988.0038, with the
+    force of the spring. Keeps detailed balance with bond springs of the same stiffness and a lattice gas of
+    :math:`\varepsilon = k_B T \ln(k_{on} / k_{off})`.
+
+    >>> DemboSpring(k_off=0.1, stiffness=2e-3, transition_stiffness=1e-3).rate(phi=1.0, n_c=1.0, f=4e-12, T_c=300.0)
+    -0.162071...
+    """
+
+    k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
+    stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
+    transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
+    k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        bond, transition = self.stiffness, self.transition_stiffness
+        formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
+        rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
+        on = self.k_on * exp(formation.log_factor(f, T_c))
+        off = self.k_off * exp(rupture.log_factor(f, T_c))
+        return n_c * (on * (1 - phi) - off * phi)
+
+
+class TwoPathway(RateLaw):
+    r"""Catch-slip bond: force closes one way out of the bound state and opens another.
+
+    .. math:: R = n_c \left[ k_{on} (1 - \phi)
+              - \left( k_{slip} e^{f x_{slip} / k_B T_c} + k_{catch} e^{-f x_{catch} / k_B T_c} \right) \phi \right]
+
+    Source: Pereverzev, Prezhdo, Forero, Sokurenko & Thomas (2005), Biophys. J. 89, 1446, doi
+    10.1529/biophysj.105.062158.
+
+    >>> TwoPathway(k_slip=0.1, x_slip=2e-10, k_catch=10.0, x_catch=2e-9).rate(phi=1.0, n_c=1.0, f=0.0, T_c=300.0)
+    -10.1...
+    """
+
+    k_slip: float = parameter("1/s", "rate of the slip pathway at no force", above=0)
+    x_slip: float = parameter("m", "distance to the barrier of the slip pathway", at_least=0)
+    k_catch: float = parameter("1/s", "rate of the catch pathway at no force", above=0)
+    x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
+    k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        ratio = self.k_catch / self.k_slip
+        factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
+        off = self.k_slip * exp(factor.log_factor(f, T_c))
+        return n_c * (self.k_on * (1 - phi) - off * phi)
+
+
+class DudkoHummerSzabo(RateLaw):
+    r"""Slip bond with a barrier of a given height and shape.
+
+    .. math:: R = n_c \left[ k_{on} (1 - \phi) - k_{off}\,s^{1/\nu - 1}
+              e^{\Delta G (1 - s^{1/\nu}) / k_B T_c}\,\phi \right], \quad s = 1 - \frac{\nu f x_{off}}{\Delta G}
+
+    :math:`\nu = 1/2` is a cusp, 2/3 a cubic well, 1 the law of Bell. Source: Dudko, Hummer & Szabo (2006), Phys. Rev.
+    Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. While a barrier above k_B T is left; beyond, the rate stays at
+    its largest value.
+
+    >>> DudkoHummerSzabo(k_off=0.1, x_off=4e-10, barrier=6e-20).rate(phi=1.0, n_c=1.0, f=50e-12, T_c=300.0)
+    -8.3417844...
+    """
+
+    k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
+    x_off: float = parameter("m", "distance to the transition state at no force", above=0)
+    barrier: float = parameter("J", "free energy of activation at no force", above=0)
+    nu: float = parameter("1", "shape of the barrier: 1/2 cusp, 2/3 cubic, 1 linear", default=2 / 3, above=0, at_most=1)
+    k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
+
+    @property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Forces below that at which the barrier vanishes."""
+        return DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu).ranges
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
+        off = self.k_off * exp(factor.log_factor(f, T_c))
+        return n_c * (self.k_on * (1 - phi) - off * phi)
+
+
+class GapAttachment(RateLaw):
+    r"""Bonds form the less the wider the gap that their tethers have to reach across.
+
+    .. math:: R = n_c k_{on} e^{-k_b (g_n - l_0)^2 / 2 k_B T_c} (1 - \phi)
+
+    Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038. Any g_n. It has no reverse; a law of
+    rupture stands beside it.
+
+    >>> GapAttachment(k_on=10.0, stiffness=1e-3, rest_length=2e-8).rate(phi=0.5, n_c=1.0, g_n=2e-8, T_c=300.0)
+    5.0
+    """
+
+    k_on: float = parameter("1/s", "rate of formation at the rest length", at_least=0)
+    stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
+    rest_length: float = parameter("m", "gap at which the tether is not stretched", default=0.0)
+
+    def rate(self, phi: Expression, n_c: Expression, g_n: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        factor = GapFactor(stiffness=self.stiffness, rest_length=self.rest_length)
+        return n_c * self.k_on * exp(factor.log_factor(g_n, T_c)) * (1 - phi)
