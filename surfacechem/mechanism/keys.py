@@ -7,7 +7,7 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
-from surfacechem.mechanism.kinds import kind_of, kinds
+from surfacechem.mechanism.kinds import kind_of, kinds, names
 from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source, chosen, sections, sides
 
@@ -220,7 +220,7 @@ def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
         raise InputError(message, source.place(entry, "type"))
     law = kind_of(kind)
     if law is None:
-        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, kinds())}"
+        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())}"
         raise InputError(message, source.place(entry, "type"))
     return law
 
