@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from surfacechem.data import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.kinds import kinds
 
 FREE = ("description", "note")
@@ -59,7 +60,7 @@ reactions:
   rate-constant: {A: 1e5 m^2/mol/s, b: 0.5, Ea: 3}
 """
 
-UNITS = {"m": "0.4 nm", "N/m": "2 pN/nm", "J": "60 kJ/mol", "J/mol": "60 kJ/mol", "1": 0.5}
+UNITS = {"m": "0.4 nm", "N/m": "2 pN/nm", "J": "60 kJ/mol", "J/mol": "60 kJ/mol", "1/s": "2 1/s", "1": 0.5}
 
 
 def of_every_type():
@@ -69,7 +70,8 @@ def of_every_type():
         own = {key: UNITS[specs[name].unit] for key, name in law.own_keys().items()}
         fields = {"rate-constant": "{A: 1e5, b: 0.5, Ea: 3}", **own, "duplicate": "true"}
         lines = "".join(f"  {key}: {value}\n" for key, value in fields.items())
-        yield f"- equation: C(s) => A(s)\n  type: {kind.removeprefix('interface-')}\n{lines}"
+        arrow = "<=>" if issubclass(law, AffinityReaction) else "=>"
+        yield f"- equation: C(s) {arrow} A(s)\n  type: {kind.removeprefix('interface-')}\n{lines}"
 
 
 def keys(node, path=()):
