@@ -39,6 +39,11 @@ class Span:
         """Evenly spaced values; one where the ends are the same."""
         return np.linspace(self.low, self.high, number if self.high > self.low else 1)
 
+    def words(self, unit: str, scale: float = 1.0) -> str:
+        """The range in a unit of which ``scale`` make one in SI."""
+        ends = dict.fromkeys(f"{end * scale:g}" for end in (self.low, self.high))
+        return f"{' to '.join(ends)} {unit}"
+
     @property
     def middle(self) -> float:
         """The mean of the ends."""
@@ -125,8 +130,7 @@ def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str
     grid = np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
     values = curves.departure(pair, *grid)
     others = " and ".join(other for other in pair.labels if other != label)
-    where = f"{temperatures.low:g} to {temperatures.high:g} K"
-    where += f", {forces.low * 1e12:g} to {forces.high * 1e12:g} pN" if curves.loaded else ""
+    where = temperatures.words("K") + (f", {forces.words('pN', 1e12)}" if curves.loaded else "")
     return f"pair with {others}: {said(float(values.min()), float(values.max()))} ({where})"
 
 
