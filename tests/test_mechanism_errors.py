@@ -164,12 +164,12 @@ LOADED = """\
         (
             "x-beta: 0.4 nm",
             "x-slip: 0.4 nm",
-            "'x-slip' is no key of the rate type interface-Bell; it belongs to interface-tw",
+            "'x-slip' is no key of interface-Bell; it belongs to interface-tw",
         ),
         (
             "  type: Bell\n",
             "",
-            "'x-beta' is no key of the rate type interface-Arrhenius; it belongs to interface-Bell, ",
+            "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, ",
         ),
         ("0.4 nm", "0.4", "x-beta: 0.4 has no unit, and `units` says nothing about it; write it in m, such as"),
         ("0.4 nm", "0.4 pN", "x-beta = 0.4 pN is not a quantity in m"),

@@ -205,7 +205,7 @@ def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) ->
     for key in entry:
         if key not in REACTION | _own(law):
             having = ", ".join(sorted(kind for kind, other in kinds().items() if key in _own(other)))
-            message = f"{title}: '{key}' is no key of the rate type {law.kind}; it belongs to {having}."
+            message = f"{title}: '{key}' is no key of {law.kind}; it belongs to {having}."
             raise InputError(message, source.place(entry, key))
     left_out = _check_equation(source, phase, entry, names, title)
     _check_rate(source, entry, law, [] if left_out else names, title)
