@@ -27,7 +27,7 @@ class BellFactor(RateFactor):
     2.897188
     """
 
-    x_beta: float = parameter("m", "distance to the transition state", default=0.0)
+    x_beta: float = parameter("m", "distance to the transition state")
 
     def log_factor(self, f: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor."""

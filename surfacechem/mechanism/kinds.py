@@ -25,3 +25,8 @@ def kind_of(name: str) -> type[SurfaceReaction] | None:
     known = kinds()
     plain = "Arrhenius" if name == "elementary" else name
     return known.get(plain) or known.get(PREFIX + plain)
+
+
+def names() -> list[str]:
+    """The rate types as a mechanism writes them."""
+    return [kind.removeprefix(PREFIX) for kind in kinds()]

@@ -12,7 +12,7 @@ from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.fields import rate_fields, spring
 from surfacechem.mechanism.keys import check
-from surfacechem.mechanism.kinds import kind_of, kinds
+from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
 from surfacechem.mechanism.rates import KILO, SurfaceReaction, plain
 from surfacechem.mechanism.source import Source, sides
@@ -110,13 +110,12 @@ def _cantera(source: Source, phase: Any) -> Any:
 def _plain_text(source: Source, phase: Any) -> str:
     """The file with our own rate types called Arrhenius, so that Cantera needs no extension to read the rest."""
     lines = source.text.splitlines(keepends=True)
-    for entry in source.reactions(phase):
-        kind = str(entry.get("type", ""))
+    entries = {entry.lc.value("type"): str(entry["type"]) for entry in source.reactions(phase) if "type" in entry}
+    for (line, column), kind in sorted(entries.items(), reverse=True):  # from the end, so that columns stay
         law = kind_of(kind)
-        if "type" in entry and law is not None and not law.native:
-            line, column = entry.lc.value("type")
+        if law is not None and not law.native:
             before, after = lines[line][:column], lines[line][column:]
-            lines[line] = before + re.sub(rf"""^(["']?){re.escape(kind)}\1""", "interface-Arrhenius", after)
+            lines[line] = before + re.sub(rf"""^(["']?){re.escape(kind)}""", r"\1interface-Arrhenius", after)
     return "".join(lines)
 
 
@@ -193,7 +192,7 @@ def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: t
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:
         message = f"reaction {reaction.equation}: rate type '{reaction.rate.type}' is not lowered."
-        raise InputError(f"{message}{suggestion(reaction.rate.type, kinds())}", place)
+        raise InputError(f"{message}{suggestion(reaction.rate.type, names())}", place)
     variables = {item.name: item.variable for item in species}
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     _check_reaction(reaction, forward, place)

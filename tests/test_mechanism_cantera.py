@@ -1,0 +1,90 @@
+"""The surface mechanisms that come with Cantera: those between surface species agree, others are refused."""
+
+import json
+from pathlib import Path
+
+import cantera as ct
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+from test_mechanism import _quiet, compare  # noqa: F401 - a fixture
+
+from mechanisms import states
+from surfacechem.errors import InputError
+from surfacechem.mechanism import load_mechanism
+
+FOLDER = next(Path(folder) for folder in ct.get_data_directories() if Path(folder, "ptcombust.yaml").exists())
+UNITS = {"length": "cm", "quantity": "mol", "activation-energy": "J/mol"}
+SURFACES = {
+    ("ptcombust.yaml", "Pt_surf"): 9,
+    ("methane_pox_on_pt.yaml", "Pt_surf"): 18,
+    ("sofc.yaml", "metal_surface"): 3,
+    ("sofc.yaml", "oxide_surface"): 1,
+    ("diamond.yaml", "diamond_100"): 2,
+    ("SiF4_NH3_mec.yaml", "SI3N4"): 0,
+    ("example_data/ammonia-Ru-Ba-YSZ-CSM-2019.yaml", "Ru_surface"): 6,
+    ("lithium_ion_battery.yaml", "edge_anode_electrolyte"): 0,
+    ("lithium_ion_battery.yaml", "edge_cathode_electrolyte"): 0,
+}
+"""Cantera's surface phases, and how many of their reactions are between surface species alone."""
+
+REFUSED = {
+    ("sofc.yaml", "tpb"): "adjacent-phases",
+    ("example_data/covdepsurf.yaml", "covdep_lin"): "coverage-dependent",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("cantera")
+
+
+def surface_alone(file: str, phase: str, folder: Path) -> tuple[Path, int]:
+    """The phase without its neighbours, and the reactions that it still has."""
+    whole = ct.Interface(str(FOLDER / file), phase)
+    names = set(whole.species_names)
+    kept = [r for r in whole.reactions() if {*r.reactants, *r.products, *r.orders} <= names]
+    for reaction in kept:  # twice each, so that none is an undeclared duplicate
+        reaction.duplicate = True
+    alone = ct.Interface(
+        thermo="ideal-surface", kinetics="surface", species=whole.species(), reactions=[*kept, *kept], name="alone"
+    )
+    alone.site_density = whole.site_density
+    path = folder / f"{Path(file).stem}-{phase}.yaml"
+    alone.write_yaml(path, units=UNITS)
+    written = YAML(typ="safe").load(path)
+    del written["phases"][0]["state"]  # in mass fractions, which mean nothing on a surface
+    for entry in written["species"]:
+        entry.pop("charge", None)  # which the composition says
+    path.write_text(json.dumps(written, default=str), encoding="utf-8")
+    return path, len(kept)
+
+
+@pytest.mark.parametrize(("file", "phase"), [surface for surface, count in SURFACES.items() if count])
+@given(data=st.data())
+@settings(max_examples=10, deadline=None)
+def test_reactions_between_surface_species_agree(folder, file, phase, data):
+    path, count = surface_alone(file, phase, folder)
+    assert count == SURFACES[file, phase]
+    mechanism = load_mechanism(path)
+    assert len(mechanism.reactions) == 2 * count
+    compare(mechanism, *data.draw(states(len(mechanism.variables))))
+
+
+@pytest.mark.parametrize(("file", "phase"), SURFACES)
+def test_neighbours_are_refused_by_name(file, phase):
+    with pytest.raises(InputError, match="'adjacent-phases' cannot be used here: bulk and gas neighbours"):
+        load_mechanism(FOLDER / file, phase)
+
+
+@pytest.mark.parametrize(("file", "phase"), REFUSED)
+def test_other_phases_are_refused_by_name(file, phase):
+    with pytest.raises(InputError, match=f"{Path(file).name}:[0-9]+: .*{REFUSED[file, phase]}"):
+        load_mechanism(FOLDER / file, phase)
+
+
+def test_every_surface_of_cantera_is_in_the_list():
+    marks = ("thermo: ideal-surface", "thermo: edge", "thermo: coverage-dependent-surface")
+    files = {path for path in FOLDER.rglob("*.yaml") if any(mark in path.read_text("utf-8") for mark in marks)}
+    assert {str(path.relative_to(FOLDER)) for path in files} == {file for file, _ in (*SURFACES, *REFUSED)}
