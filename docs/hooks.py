@@ -168,6 +168,8 @@ def _default(kind: Any, name: str) -> str:
     default = next(item.default for item in dataclasses.fields(kind) if item.name == name)
     if default is dataclasses.MISSING:
         return "required"
+    if default is None:
+        return ""
     return f"{default:g}" if isinstance(default, float) else f"`{default}`"
 
 

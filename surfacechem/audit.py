@@ -145,7 +145,7 @@ class _Books:
         """Least and largest entropy production of each law over outputs and steps."""
         values = self.trajectory.everywhere
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
-        columns = {law: values[f"sigma_{law}"] for law in laws if len(values[f"sigma_{law}"])}
+        columns = {law: values[f"sigma_{law}"] for law in laws if len(values.get(f"sigma_{law}", ()))}
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},

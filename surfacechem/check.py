@@ -182,7 +182,9 @@ def warnings(system: System) -> list[str]:
     read = {
         symbol for row in [*system.residual(), *map(system.expand, _audited(system))] for symbol in row.free_symbols
     }
-    idle = [p for p in system.parameters if p.symbol not in read and not p.path.startswith(("run.", "initial."))]
+    idle = [
+        p for p in system.parameters if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
+    ]
     return [*system.warnings, *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle)]
 
 
@@ -191,6 +193,7 @@ def _audited(system: System) -> list[object]:
         [a.rate for a in system.ledger]
         + [m.expression for m in system.margins]
         + [i.expression for i in system.outputs]
+        + [x for item in system.transitions for x in (item.margin, *item.modes.values(), *item.jump.values())]
     )
 
 

@@ -93,6 +93,15 @@ def expm1(x: Expression) -> Expression:
     return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
 
 
+def decay(x: Expression) -> Expression:
+    """exp(-x) where x is not negative; its derivatives combine with their like, which those of a guarded exp do not."""
+    if not is_symbolic(x):
+        return exp(-x)
+    import symengine
+
+    return symengine.exp(-x)
+
+
 def log(x: Expression) -> Expression:
     """Natural logarithm of a positive number."""
     return _engine(x).log(x)

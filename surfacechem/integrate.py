@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function, compile_program
 from surfacechem.errors import InputError, suggestion
+from surfacechem.events import Hybrid
+from surfacechem.jumps import Jump, Jumper, Point
 from surfacechem.solvers import solver
-from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Status
+from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.system import System
 from surfacechem.terms import Spec
@@ -66,6 +68,7 @@ class Trajectory:
     status: str
     reason: str
     seconds: float
+    jumps: tuple[Jump, ...] = ()
 
     @cached_property
     def rates(self) -> Array:
@@ -117,10 +120,11 @@ class Model:
             inputs[1 : n + 1],
             inputs[n + 1 : 2 * n + 1],
             inputs[2 * n + 1 :],
-            system.residual(),
-            [system.expand(account.rate) for account in system.ledger],
-            [system.expand(margin.expression) for margin in self.margins],
+            system.local(list(system.rows.values())),
+            system.local([account.rate for account in system.ledger]),
+            system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
         )
+        self.jumper = Jumper(system) if system.transitions else None
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs)
         self.compile_seconds = time.perf_counter() - start
@@ -146,19 +150,39 @@ class Model:
         end = run.times[-1]
         segments = np.array([0.0, *(t for t in system.breakpoints if 0 < t < end), end])
         scales = np.array([state.scale for state in system.states])
+        parameters = self._segment_parameters(segments[:-1], run, values)
+        self._start_modes(parameters, values)
         return Problem(
             program=self.program,
-            y0=np.array(list(initial.values())),
+            y0=self._start(np.array(list(initial.values())), parameters[0]),
             times=np.asarray(run.times, dtype=float),
             segments=segments,
-            parameters=self._segment_parameters(segments[:-1], run, values),
+            parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
-            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in self.margins),
+            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in self.margins)
+            + (Margin.stop(),) * len(system.transitions),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
         )
+
+    def _start_modes(self, parameters: Array, values: Mapping[str, float]) -> None:
+        """Modes that follow from the initial state."""
+        symbols = [p.symbol for p in self.system.parameters]
+        initial = {state.symbol: values[f"initial.{state.name}"] for state in self.system.states}
+        for mode in self.system.modes:
+            if mode.start is not None:
+                parameters[:, symbols.index(mode.symbol)] = float(mode.start.subs(initial))
+
+    def _start(self, y: Array, parameters: Array) -> Array:
+        """The initial state with its quasi-static gaps in equilibrium."""
+        if self.jumper is None or not self.system.equilibria:
+            return y
+        settled = self.jumper.settle(Point(0.0, y, np.zeros_like(y), parameters))
+        if settled is None:
+            raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
+        return settled.y
 
     def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
         rows = np.empty((len(starts), len(self.system.parameters)))
@@ -186,10 +210,20 @@ class Model:
         problem = self.problem(run, values)
         method.prepare()
         start = time.perf_counter()
-        result = method.solve(problem)
+        result, jumps, ended = self._integrate(method, problem)
         seconds = time.perf_counter() - start
-        status, reason = self._verdict(result)
-        return Trajectory(self, run, result, values, status, reason, seconds)
+        status, reason = ended or self._verdict(result)
+        return Trajectory(self, run, result, values, status, reason, seconds, jumps)
+
+    def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
+        """The result, its jumps, and how the run ended where a jump ended it."""
+        if self.jumper is None:
+            return method.solve(problem), (), None
+        hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
+        result = hybrid.run()
+        word = "failed" if hybrid.status is Status.FAILED else "stopped"
+        ended = (word, f"{hybrid.reason} at t = {result.t:.9g} s") if hybrid.reason else None
+        return result, tuple(hybrid.jumps), ended
 
     def _verdict(self, result: Result) -> tuple[str, str]:
         where = f"t = {result.t:.9g} s"
@@ -213,7 +247,7 @@ class Model:
         first = self._margins(result, 0)
         last = self._margins(result, -1)
         shrink = [abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
-        order = [i for i in np.argsort(shrink) if self.margins[i].terminal]
+        order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
         return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 
     def _margins(self, result: Result, step: int) -> Array:

@@ -11,7 +11,7 @@ import shutil
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -64,13 +64,11 @@ def _writable(folder: Path) -> None:
 def _settings(folder: Path | None) -> Iterator[None]:
     """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
 
-    Loops here run over a handful of states: vectorising and unrolling them doubles the compile time and slows them
-    down.
+    Loops here run over a handful of states: vectorising them slows them down.
     """
     import numba
 
-    level = type(getattr(numba.config, "OPT"))  # noqa: B009 - Numba sets it dynamically
-    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0, "OPT": level(1)}
+    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0}
     usual = {name: getattr(numba.config, name) for name in chosen}
     try:
         for name, value in chosen.items():
@@ -81,19 +79,61 @@ def _settings(folder: Path | None) -> Iterator[None]:
             setattr(numba.config, name, value)
 
 
-def _compile(function: Callable[..., None], signature: Any, folder: Path | None) -> Any:
+@contextmanager
+def _unfinished(parts: Collection[str]) -> Iterator[None]:
+    """Numba optimises and translates every function together with all it calls, level by level, as if each were called
+    from Python. Of the parts of a kernel only the code between is kept; the whole is optimised and translated once,
+    in half the time.
+    """
+    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+
+    library: Any = JITCodeLibrary
+    codegen: Any = JITCPUCodegen
+    optimise, finalise, set_environment = (
+        library._optimize_final_module,
+        library._finalize_final_module,
+        codegen.set_env,
+    )
+
+    def optimise_whole(self: Any) -> None:
+        if self.name not in parts:
+            optimise(self)
+
+    def finalise_whole(self: Any) -> None:
+        if self.name in parts:
+            self._finalized = True
+        else:
+            finalise(self)
+
+    def set_environment_of_whole(self: Any, name: str, environment: Any) -> None:
+        if self._engine.is_symbol_defined(name):
+            set_environment(self, name, environment)
+
+    library._optimize_final_module, library._finalize_final_module = optimise_whole, finalise_whole
+    codegen.set_env = set_environment_of_whole
+    try:
+        yield
+    finally:
+        library._optimize_final_module, library._finalize_final_module = optimise, finalise
+        codegen.set_env = set_environment
+
+
+def _compile(function: Callable[..., None], signature: Any, folder: Path | None, parts: Collection[str]) -> Any:
     import numba
+    from numba.core.compiler_lock import global_compiler_lock
 
     if folder is not None:
         _writable(folder)
-    with _settings(folder):
+    with global_compiler_lock, _settings(folder), _unfinished(parts):
         return numba.njit(signature, cache=folder is not None, nogil=True, error_model="numpy")(function)
 
 
-def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) -> Any:
-    """The compiled function, from the cache if it is sound, else compiled anew, else compiled without a cache."""
+def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
+    """The compiled function, from the cache if it is sound, else compiled anew, else compiled without a cache; parts
+    are the names of the compiled functions that it alone calls.
+    """
     try:
-        return _compile(function, signature, folder)
+        return _compile(function, signature, folder, parts)
     except OSError as error:
         problem = error
     except Exception:
@@ -101,10 +141,10 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path) 
             raise
         shutil.rmtree(folder, ignore_errors=True)
         try:
-            return _compile(function, signature, folder)
+            return _compile(function, signature, folder, parts)
         except OSError as error:
             problem = error
     warnings.warn(
         f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process.", stacklevel=2
     )
-    return _compile(function, signature, None)
+    return _compile(function, signature, None, parts)

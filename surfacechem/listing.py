@@ -139,7 +139,7 @@ def parameters(law: type[Law]) -> Iterator[str]:
     for name, spec in law.specs():
         allowed = "" if spec.range == "any" else f", {spec.range}"
         default = next(item.default for item in fields(law) if item.name == name)
-        usual = "" if default is MISSING else f", {default:g} if not given"
+        usual = "" if default in (MISSING, None) else f", {default:g} if not given"
         yield f"{name} [{spec.unit.replace('[x]', 'x')}]: {spec.text}{allowed}{usual}"
     for name, text in law.options():
         yield f"{name}: {text}"

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from surfacechem.event_table import event_summary
+
 if TYPE_CHECKING:
     from surfacechem.audit import Audit
     from surfacechem.check import Group
@@ -65,6 +67,7 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         labelled(solution.status, solution.reason),
         *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
         labelled("time", f"{_time(solution)}; {work}"),
+        *([labelled("events", event_summary(trajectory.jumps))] if trajectory.jumps else []),
         labelled("balances", _balances(solution.audit)),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
@@ -112,6 +115,8 @@ def check_summary(
         labelled("run", _plan(system, run)),
         _section("States", _state_rows(system)),
         _section("Roles", [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]),
+        _section("Modes", _mode_rows(system)),
+        _section("Transitions", [(item.name, item.reason) for item in system.transitions]),
         _section("Laws", _law_rows(scene)),
         _section("Numbers", [(g.name, _value(g), g.text) for g in groups]),
         _section("Warnings", [(warning,) for warning in warnings]),
@@ -144,6 +149,14 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
             s.quantity.long_name,
         )
         for s in system.states
+    ]
+
+
+def _mode_rows(system: System) -> list[tuple[str, str]]:
+    return [
+        (mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
+        for mode in system.modes
+        if len(mode.words) > 1
     ]
 
 

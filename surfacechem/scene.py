@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from surfacechem.errors import InputError
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw
+from surfacechem.errors import InputError, Place
+from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, parameter
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,49 @@ class Body:
     name: str
     temperature: str | Load
     energy: BodyEnergy | None = None
+
+
+class Mounting(Law):
+    r"""How the far field holds the bodies in one direction of the gap. What is left out is not there.
+
+    .. math:: m \ddot g = k (w - g) + c_b (\dot w - \dot g) + F - t - c_g \dot g
+
+    With a mass the gap is inertial, with a damper alone overdamped, with a stiffness alone quasi-static; with a
+    far-field traction and nothing else it is under dead load. Source: lumped form of the momentum balance of Sauer,
+    Duong & Mandadapu (2021), eq. e:sf_moc.
+    """
+
+    contract = "mechanics"
+
+    k: float = parameter("Pa/m", "stiffness of both bodies in series", default=0.0, at_least=0, varies=False)
+    m: float = parameter("kg/m^2", "effective mass", default=0.0, at_least=0, varies=False)
+    c_b: float = parameter(
+        "Pa s/m", "damper beside the stiffness; heats the bodies", default=0.0, at_least=0, varies=False
+    )
+    c_g: float = parameter("Pa s/m", "damper beside the interface; heats it", default=0.0, at_least=0, varies=False)
+    beta_1: float = parameter(
+        "1", "fraction of the heat of c_b that goes into body 1", default=0.5, at_least=0, at_most=1, varies=False
+    )
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the loading: rates of what it moves, and one thing that ends it; the last one may be without end.
+
+    ``event`` is the name of a transition, or how it begins; ``variable`` ends the stage at ``value``.
+    """
+
+    name: str
+    rates: Mapping[str, float] = field(default_factory=dict)
+    """Rates by variable, in its unit per second."""
+    duration: float | None = None
+    """Length [s]."""
+    variable: str = ""
+    value: float = 0.0
+    rising: bool = True
+    """Whether the variable reaches the value from below."""
+    event: str = ""
+    place: Place | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +120,7 @@ class Interface:
     variables: Sequence[BondingVariable] = ()
     bonds: Sequence[str] = ()
     """Names of those variables that count as bonds where phi is not itself a state."""
+    limits: Sequence[Limit] = ()
 
 
 @dataclass(frozen=True)
@@ -90,3 +134,9 @@ class Scene:
     surroundings: Load | None = None
     T_0: float | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
+    normal: Mounting | None = None
+    """How the normal gap is held, where it moves by a balance."""
+    tangential: Mounting | None = None
+    """How the tangential displacement is held, where it moves by a balance."""
+    programme: Sequence[Stage] = ()
+    """Stages of the loading, one after the other."""

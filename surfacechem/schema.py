@@ -12,17 +12,19 @@ from typing import Any
 from surfacechem import laws, references, solvers
 from surfacechem.assembly import LOADABLE
 from surfacechem.case import TOP_KEYS
+from surfacechem.case.mechanics import MOVING, WAYS
 from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.quantities import VARIABLES
-from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Load, Potential, RateLaw, Spec
+from surfacechem.scene import Mounting
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
 
 Schema = dict[str, Any]
 
 QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
 """A number, with or without a unit."""
 
-CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Load, Factor)
+CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Load, Factor)
 
 _TEXTS = {
     "until": "end of the run [s]",
@@ -76,6 +78,8 @@ def _top() -> dict[str, Schema]:
         "interface": _interface(),
         "heat": _list(HeatTransfer, "heat paths"),
         "surroundings": _object({"temperature": _ref("history")}, required=("temperature",)),
+        "mechanics": _mechanics(),
+        "programme": _programme(),
         "loading": _object(variables, patterns={NODE.pattern: _ref("history")}),
         "initial": _initial(),
         "run": _run(),
@@ -87,7 +91,13 @@ def _bodies() -> Schema:
     kinds = laws.laws(BodyEnergy)
     parameters = {name: _parameter(spec) for kind in kinds.values() for name, spec in kind.specs()}
     capacity = {"description": "energy as a function of temperature", "enum": sorted(kinds), "default": "quadratic"}
-    body = _object({"temperature": _ref("temperature"), "capacity": capacity, **parameters}, required=("temperature",))
+    stiffness = {
+        "stiffness": _quantity("normal stiffness of the body [Pa/m]; both are in series"),
+        "E": _quantity("Young's modulus [Pa], with H instead of `stiffness`"),
+        "H": _quantity("height [m], with E instead of `stiffness`"),
+    }
+    properties = {"temperature": _ref("temperature"), "capacity": capacity, **stiffness, **parameters}
+    body = _object(properties, required=("temperature",))
     bodies = _object({}, patterns={BODY_NAME.pattern: body})
     return {**bodies, "minProperties": 2, "maxProperties": 2, "description": "the two bodies; the first is body 1"}
 
@@ -105,15 +115,32 @@ def _interface() -> Schema:
         "potential": _list(Potential, "terms of the free energy"),
         "friction": _list(Friction, "friction laws, whose tractions add up"),
         "bonding": _list(RateLaw, "reactions, whose rates add up"),
+        "limits": _list(Limit, "tractions at which the interface gives way"),
         "mechanism": {"description": "Cantera surface mechanism", "anyOf": [{"type": "string"}, mechanism]},
     }
     assert set(properties) == set(INTERFACE_KEYS)
     return _object(properties)
 
 
+def _mechanics() -> Schema:
+    mounting = _object({name: _parameter(spec) for name, spec in Mounting.specs()})
+    texts = {"normal": "how the normal gap is held", "tangential": "how the tangential displacement is held"}
+    return _object({name: {**mounting, "description": text} for name, text in texts.items()})
+
+
+def _programme() -> Schema:
+    value = {"anyOf": [_ref("quantity"), _object({way: _ref("quantity") for way in WAYS})]}
+    until = {"anyOf": [{"type": "string"}, {"type": "object", "additionalProperties": value}]}
+    rates = {name: _quantity(f"rate of the {_variable(name)}") for name in LOADABLE}
+    stage = _object({**rates, "for": _quantity("length of the stage [s]"), "until": until})
+    items = {"type": "object", "additionalProperties": stage, "minProperties": 1, "maxProperties": 1}
+    return {"type": "array", "description": "stages of the loading, one after the other", "items": items}
+
+
 def _initial() -> Schema:
     coverages = {"type": "object", "additionalProperties": _ref("quantity"), "description": "by species"}
     properties = {"phi": _quantity("bonding state"), "coverages": coverages}
+    properties |= {name: _quantity(f"{VARIABLES[name].long_name} [{VARIABLES[name].unit}]") for name in MOVING}
     return _object(properties, patterns={NODE.pattern: _quantity("temperature [K]")})
 
 
@@ -168,7 +195,7 @@ def _default(law: type[Law], name: str) -> Any:
 
 def _with_default(law: type[Law], name: str, entry: Schema) -> Schema:
     default = _default(law, name)
-    return entry if default is dataclasses.MISSING else {**entry, "default": default}
+    return entry if default in (dataclasses.MISSING, None) else {**entry, "default": default}
 
 
 def _parameter(spec: Spec) -> Schema:

@@ -20,6 +20,7 @@ import numpy as np
 from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.errors import InputError, Place
+from surfacechem.event_table import event_columns, event_findings
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.solvers.contract import Status
 
@@ -126,8 +127,16 @@ class Solution:
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the results has to know, in words."""
         system = self.trajectory.model.system
+        jumps = event_findings(self.trajectory.jumps)
         unbalanced = (str(verdict) for verdict in self.verdicts if not verdict.consistent)
-        return (*self.audit.findings, *unbalanced, *self._extrapolations(), *self._lost_fluxes(), *system.warnings)
+        return (
+            *self.audit.findings,
+            *unbalanced,
+            *jumps,
+            *self._extrapolations(),
+            *self._lost_fluxes(),
+            *system.warnings,
+        )
 
     def _lost_fluxes(self) -> list[str]:
         """Fluxes through conductances so large that the temperature difference is rounding."""
@@ -211,15 +220,7 @@ class Solution:
         ]
 
     def _events(self) -> list[Column]:
-        events = self.trajectory.result.events
-        if len(events.t) == 0:
-            return []
-        margins = self.trajectory.model.margins
-        names = np.array([margins[i].reason for i in events.index], dtype=object)
-        return [
-            Column("event_time", ("event",), events.t, "s", "time of the event"),
-            Column("event_reason", ("event",), names, "1", "what happened"),
-        ]
+        return [Column(c.name, ("event",), c.values, c.unit, c.long_name) for c in event_columns(self.trajectory)]
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:

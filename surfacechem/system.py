@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,9 @@ import symengine
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
 from surfacechem.terms import Load, Spec
+
+START = "run.t_start"
+"""Path of the time at which a stretch between events starts; within it time counts from there."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,79 @@ class Margin:
 
 
 @dataclass(frozen=True)
+class Mode:
+    """A discrete variable, such as sticking or sliding; it changes at transitions only."""
+
+    name: str
+    symbol: Any
+    initial: float
+    words: Mapping[float, str]
+    """What each value means."""
+    start: Expression | None = None
+    """The value at the start as it follows from the initial state, where it does."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """The loss of a quasi-static equilibrium."""
+
+    state: str
+    tangent: Expression
+    """Zero at the fold, positive before it."""
+    curvature: Expression
+    """Its sign says which way the gap runs."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """Something that must stay positive in the present modes; where it reaches zero, modes and state jump.
+
+    ``modes`` and ``jump`` give new values as expressions of the old state. Then the gaps in ``settles`` find the next
+    equilibrium, and the energy that this releases goes into the nodes of ``sinks``, in their shares.
+    """
+
+    name: str
+    margin: Expression
+    reason: str
+    modes: Mapping[Any, Expression] = field(default_factory=dict)
+    jump: Mapping[Any, Expression] = field(default_factory=dict)
+    settles: bool = False
+    sinks: str = "joint"
+    """'joint': the bodies take the released energy; 'local': the interface does."""
+    fold: Fold | None = None
+    """What makes it a fold, where it is one."""
+    passes: bool = False
+    """Whether nothing happens to the interface: a stage of the loading ends."""
+    violation: str = "warn"
+    """What to do where the jump would destroy entropy: refuse, warn or accept."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A gap without inertia or damping: its balance of tractions, which holds at every time."""
+
+    state: str
+    residual: Expression
+    """Traction that drives the gap open, less what resists [Pa]."""
+    size: Expression
+    """Size of the tractions that balance [Pa]."""
+
+
+@dataclass(frozen=True)
+class Sink:
+    """A temperature node that takes part of the energy released in a jump; a prescribed one passes it on."""
+
+    node: str
+    T: Expression
+    energy: Expression
+    """Internal energy of the node [J/m^2]."""
+    share: Expression
+    prescribed: bool
+    account: str = ""
+    """Account of the heat that a prescribed node exchanges with the outside."""
+
+
+@dataclass(frozen=True)
 class Range:
     """Where a law is not an extrapolation: a variable between two values."""
 
@@ -145,6 +221,11 @@ class System:
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()
+    modes: tuple[Mode, ...] = ()
+    transitions: tuple[Transition, ...] = ()
+    equilibria: tuple[Equilibrium, ...] = ()
+    sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
+    """Who takes the energy that a jump releases, by the kind of the jump."""
     pairs: tuple[Pair, ...] = ()
 
     @cached_property
@@ -173,6 +254,12 @@ class System:
     def residual(self) -> list[Expression]:
         """The equations, expanded, in the order of the rows."""
         return [self.expand(row) for row in self.rows.values()]
+
+    def local(self, expressions: Sequence[Expression]) -> list[Expression]:
+        """Expanded expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
+        start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
+        shift = {self.t: self.t + start}
+        return [symengine.sympify(self.expand(item)).subs(shift) for item in expressions]
 
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run."""

@@ -14,6 +14,7 @@ contract           states                                              audited f
 :class:`RateFactor`    logarithm of what load does to a rate coefficient   --
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
 :class:`Load`          prescribed history of a variable                    --
+:class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
 :class:`Factor`        how a parameter varies with one variable            --
 =================  ==================================================  ===========================
 """
@@ -28,7 +29,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self, dataclass_transform
+from typing import Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
@@ -82,7 +83,10 @@ def parameter(
     at_most: float = math.inf,
     varies: bool = True,
 ) -> Any:
-    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors."""
+    """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors.
+
+    With the default None the formula says what stands for what is not given.
+    """
     spec = Spec(unit, text, above, at_least, at_most, varies)
     return field(default=default, metadata={"spec": spec})
 
@@ -228,12 +232,24 @@ class BodyEnergy(Law):
 
 
 class Friction(Law):
-    """Tangential traction [Pa] in the direction of sliding; dissipates traction * v >= 0."""
+    """Tangential traction [Pa] while sliding, with the sign of sliding; dissipates traction * v >= 0.
+
+    A law that jumps at v = 0 reads ``direction``, the sign of v, and states as ``limit`` what it can bear at rest.
+    """
 
     contract = "friction"
     formula = "traction"
+    breaks_bonds: ClassVar[bool] = False
+    """Whether bonds break as sliding starts."""
 
     traction: ClassVar[Callable[..., Expression]]
+    limit: ClassVar[Callable[..., Expression]]
+    """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
+
+    @property
+    def has_limit(self) -> bool:
+        """Whether the interface can stick by this law."""
+        return hasattr(self, "limit")
 
 
 class RateLaw(Law):
@@ -274,6 +290,21 @@ class HeatTransfer(Law):
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
     conductance: ClassVar[Callable[..., Expression]]
+
+
+class Limit(Law):
+    """Traction [Pa] at which the interface gives way at once.
+
+    The jump conserves energy. Where it would destroy entropy the run follows ``violation``: refuse, warn or accept.
+    ``release`` says what takes part: 'joint' lets the bodies relax within the jump, 'local' leaves the gap as it is.
+    """
+
+    contract = "limit"
+    formula = "strength"
+
+    release: Literal["joint", "local"] = option("what takes part in the jump: joint or local", default="joint")
+    violation: Literal["refuse", "warn", "accept"] = option("what to do where entropy would fall", default="warn")
+    strength: ClassVar[Callable[..., Expression]]
 
 
 class Load(Law):

@@ -19,7 +19,8 @@ L = TypeVar("L", bound=Law)
 REMEDIES = {
     "g_n": "Prescribe `g_n` under `loading`.",
     "g_t": "Prescribe `g_t` under `loading`.",
-    "v": "Prescribe `v` under `loading`.",
+    "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
+    "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
     "t_n": "Prescribe `t_n` under `loading`, or give the interface a potential that reads the normal gap.",
     "f": "Prescribe `f` under `loading`, or a load on the bonds: `t_n`, or a potential that reads the normal gap.",
@@ -148,6 +149,8 @@ class Variables:
             for factor in value.factors:
                 symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}", unit=unit_of(factor.of)))
             return symbol
+        if value is None:
+            return None
         if law.is_default(name):
             return int(value) if float(value).is_integer() else value
         return self.parameters.add(name + suffix, path, spec, value)

@@ -31,7 +31,7 @@ run: {until: 5 s}
 reference: bonding
 """
 
-BODY_KEYS = "Known: C, capacity, temperature."
+BODY_KEYS = "Known: C, E, H, capacity, stiffness, temperature."
 RUN_KEYS = "Known: accuracy, atol, first, max-seconds, max-steps, outputs, rtol, solver, spacing, times, until."
 
 MISTAKES = [
@@ -90,7 +90,8 @@ MISTAKES = [
     (
         "loading: {v:",
         "loading: {w:",
-        "17: loading: unknown key 'w'. Known: J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, v.",
+        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, w_n, "
+        "w_t.",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
@@ -157,7 +158,7 @@ def test_the_good_case_is_good():
     [
         (
             "bodies.lower.Cc=2",
-            "override: bodies.lower: unknown key 'Cc'. Did you mean 'C'? Known: C, capacity, temperature.",
+            f"override: bodies.lower: unknown key 'Cc'. Did you mean 'C'? {BODY_KEYS}",
         ),
         ("bodys.lower.C=2", "override: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
         (

@@ -15,8 +15,8 @@ FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
     "contracts": ["terms", "scene"],
     "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
-    "time": ["solvers.*", "events", "integrate"],
-    "results": ["solution", "audit", "detailedbalance"],
+    "time": ["solvers.*", "jumps", "events", "integrate"],
+    "results": ["solution", "audit", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
         "sweep",

@@ -10,26 +10,39 @@ from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.force import force, rupture
+from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
+from surfacechem.assembly.limits import bonded_mode, limits
+from surfacechem.assembly.programme import programme, stage_ends
+from surfacechem.assembly.slip import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
-from surfacechem.assembly.totals import regime, totals
+from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
-from surfacechem.system import System
+from surfacechem.system import START, System
+from surfacechem.terms import Spec
 
 __all__ = ["LOADABLE", "assemble"]
 
 STAGES = (
     temperatures,
     prescribed_variables,
+    programme,
     bonding_variables,
+    normal_gap,
+    tangential_gap,
+    bonded_mode,
     free_energy,
     force,
+    limits,
     reactions,
     rupture,
     friction,
+    normal_motion,
+    tangential_motion,
     heat_paths,
     equations,
+    stage_ends,
     totals,
 )
 
@@ -40,6 +53,9 @@ def assemble(scene: Scene) -> System:
     for stage in STAGES:
         stage(build)
     _refuse_idle_initial_values(build)
+    taking = sinks(build)
+    if build.transitions:
+        build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,
@@ -54,6 +70,10 @@ def assemble(scene: Scene) -> System:
         pairs=tuple(build.pairs),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
+        modes=tuple(build.modes),
+        transitions=tuple(build.transitions),
+        equilibria=tuple(build.equilibria),
+        sinks=taking,
         warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),
     )
 

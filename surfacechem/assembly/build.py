@@ -13,7 +13,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Margin, Named, Pair, Range, State
+from surfacechem.system import Account, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
 from surfacechem.terms import Law, Load, Spec
 from surfacechem.variables import Parameters, Variables, unit_of
 
@@ -62,6 +62,8 @@ class Build:
         """Heat that reaches each body other than through the interface [W/m^2]."""
         self.from_interface: dict[str, Expression] = {}
         """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
+        for body in scene.bodies:
+            self.into_body[body.name] = self.from_interface[body.name] = symengine.Integer(0)
         self.loads: dict[str, Load] = {}
         """Histories that are in use, by variable."""
         self.rates: dict[Any, Expression] = {}
@@ -70,6 +72,22 @@ class Build:
         """Power and heat that flow into the interface [W/m^2]."""
         self.breakpoints: set[float] = set()
         self.ranges: list[Range] = []
+        self.modes: list[Mode] = []
+        self.transitions: list[Transition] = []
+        self.equilibria: list[Equilibrium] = []
+        self.mechanical: list[Expression] = []
+        """Elastic and kinetic energies of the bodies [J/m^2]."""
+        self.far_fields: dict[str, Any] = {}
+        """Mountings with their symbols, by direction."""
+        self.drives: dict[str, Expression] = {}
+        """Rates of the variables that a programme moves."""
+        self.slip: Any = None
+        """What determines the tangential motion, where it moves by a balance."""
+        self.sliding_tractions: list[Expression] = []
+        self.stick_limit: Expression | None = None
+        """Tangential traction that sticking can bear."""
+        self.gap_rates: dict[str, Expression] = {}
+        """Rates of the gaps that move by a balance."""
         self.pairs: list[Pair] = []
         self.used_names: set[str] = set()
 
@@ -104,11 +122,15 @@ class Build:
 
     def slope_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable between its jumps."""
+        if name in self.drives:
+            return self.drives[name]
         expression = next(item.expression for item in self.named if item.name == name)
         return derivative(expression, self.t)
 
     def rate_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable that stores energy, which must not jump."""
+        if name in self.drives:
+            return self.drives[name]
         load = self.loads[name]
         if load.jumps():
             raise InputError(
@@ -131,6 +153,20 @@ class Build:
                 f"know. It may vary with {allowed}.",
                 law.place,
             )
+
+    def mode(self, name: str, initial: float, words: Mapping[float, str], start: Expression | None = None) -> Any:
+        """A discrete variable; its symbol is a parameter that only transitions change."""
+        spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in words.items()))
+        symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
+        self.modes.append(Mode(name, symbol, initial, words, start))
+        return symbol
+
+    def total_derivative(self, expression: Expression) -> Expression:
+        """Time derivative of an expression of the states and of prescribed variables."""
+        expanded = self.expanded(expression)
+        rates = {state.symbol: state.dot for state in self.states}
+        rates |= {node.T: node.T_dot for node in self.nodes.values() if not node.prescribed}
+        return sum((derivative(expanded, x) * x_dot for x, x_dot in rates.items()), derivative(expanded, self.t))
 
     @property
     def stretch(self) -> Expression:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import symengine
 
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.slip import stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression
@@ -25,8 +26,12 @@ def friction(build: Build) -> None:
         power = build.stretch * traction * v
         build.frictions.add(label)
         build.dissipation[label] = power
-        build.supply(f"W_{label}", f"work done against {law.title}", power, None)
-        _reversal(build)
+        if build.slip is None:
+            build.supply(f"W_{label}", f"work done against {law.title}", power, None)
+            _reversal(build)
+        else:
+            build.sliding_tractions.append(build.stretch * traction)
+            stick_limit(build, law, bound)
 
 
 def _reversal(build: Build) -> None:
@@ -36,8 +41,6 @@ def _reversal(build: Build) -> None:
 
 def heat_paths(build: Build) -> None:
     """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
-    for body in build.scene.bodies:
-        build.into_body[body.name] = build.from_interface[body.name] = symengine.Integer(0)
     for law in build.scene.heat:
         _heat_path(build, law)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):

@@ -14,7 +14,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
 from surfacechem.terms import Load, Spec
 
-LOADABLE = ("phi", "g_n", "g_t", "v", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c")
+LOADABLE = ("phi", "g_n", "g_t", "v", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c", "w_n", "w_t", "F_n", "F_t", "u_t")
 """Variables that a case may prescribe, beside the temperatures."""
 
 TRACTIONS = (
@@ -54,9 +54,10 @@ def bonding_variables(build: Build) -> None:
         build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
         for k, side in enumerate((sites.density_1, sites.density_2), start=1):
             build.variables.define(f"n_{k}", partial(_side_density, build, k, side), "derived", "interface.sites")
-    if any("phi" in law.stoichiometry() for law in build.interface.reactions):
+    breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
+    if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
-        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding reaction"), limit)
+        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding state"), limit)
     for variable in build.interface.variables:
         spec = Spec("1/m^2", "site density", above=0)
         amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)

@@ -12,7 +12,7 @@ from surfacechem.balances import Node
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
-from surfacechem.system import Account
+from surfacechem.system import Account, Sink
 
 
 def totals(build: Build) -> None:
@@ -25,9 +25,14 @@ def totals(build: Build) -> None:
         if node and derivative(F, node.T) != 0:
             quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, balances.entropy(F, node.T)))
+    energies += build.mechanical
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
+    for mode in build.modes:
+        if len(mode.words) > 1:
+            words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
+            build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
     if build.interface.bonds:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
 
@@ -88,6 +93,53 @@ def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
     if flux != 0:
         account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
         build.ledger.append(Account(account, flux, "heat"))
+
+
+def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
+    """Who takes the energy that a jump releases: the bodies in a joint one, the interface in a local one."""
+    if not build.transitions:
+        return {}
+    _jump_accounts(build)
+    mounts = list(build.far_fields.values())
+    first = mounts[0].beta_1 if mounts else symengine.Rational(1, 2)
+    bodies = _merged([(build.node_of[b.name], s) for b, s in zip(build.scene.bodies, (first, 1 - first), strict=True)])
+    centre = build.node_of.get("interface")
+    stores = centre is not None and (centre.prescribed or balances.second(centre.free_energy, centre.T) != 0)
+    return {"joint": bodies, "local": _merged([(centre, symengine.Integer(1))]) if centre and stores else bodies}
+
+
+def _jump_accounts(build: Build) -> None:
+    """Accounts that only jumps change."""
+    nothing = symengine.Integer(0)
+    rows = [
+        ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
+        ("entropy_events", "J/(m^2 K)", "entropy produced by jumps", "entropy production"),
+    ]
+    if any(node.prescribed for node in build.nodes.values()):
+        rows += [
+            ("H_events", "J/m^2", "heat of jumps supplied to prescribed temperatures", "energy supply"),
+            ("H_events_entropy", "J/(m^2 K)", "entropy of that heat", "entropy supply"),
+        ]
+    for name, unit, text, kind in rows:
+        build.ledger.append(Account(Quantity(name, unit, text), nothing, kind, "events"))
+
+
+def _merged(shares: list[tuple[Node, Expression]]) -> tuple[Sink, ...]:
+    """One sink a node; shares of the same node add up."""
+    total: dict[str, Expression] = {}
+    nodes = {node.name: node for node, _ in shares}
+    for node, share in shares:
+        total[node.name] = total.get(node.name, 0) + share
+    return tuple(
+        Sink(
+            name,
+            nodes[name].T,
+            balances.internal_energy(nodes[name].free_energy, nodes[name].T),
+            share,
+            nodes[name].prescribed,
+        )
+        for name, share in total.items()
+    )
 
 
 def regime(build: Build) -> str:

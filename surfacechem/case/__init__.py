@@ -27,7 +27,7 @@ __all__ = ["TOP_KEYS", "Case", "Reference", "Run", "load", "load_text", "names"]
 
 TOP_KEYS = (
     *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
-    *("loading", "initial", "run", "reference"),
+    *("mechanics", "loading", "programme", "initial", "run", "reference"),
 )
 
 SECTIONS = (

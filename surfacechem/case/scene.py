@@ -11,14 +11,15 @@ from surfacechem import laws
 from surfacechem.assembly import LOADABLE
 from surfacechem.case.fields import choice, items, mapping, number
 from surfacechem.case.laws import build, history, law, law_list
+from surfacechem.case.mechanics import MOVING, STIFFNESS_KEYS, read_mountings, read_programme
 from surfacechem.case.mechanism import read_mechanism
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Body, Interface, Scene, Sites
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw, Spec
+from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
 
-INTERFACE_KEYS = ("temperature", "sites", "partition", "potential", "friction", "bonding", "mechanism")
+INTERFACE_KEYS = ("temperature", "sites", "partition", "potential", "friction", "bonding", "limits", "mechanism")
 
 NODE = re.compile(r"T[A-Za-z0-9_]*")
 """Names of temperatures start with T, so that they never clash with another quantity."""
@@ -63,6 +64,8 @@ class SceneReader:
         first, second = (self._body(k, name) for k, name in enumerate(self.bodies))
         interface, loading = self._interface(), self._loading()
         surroundings = self._surroundings()
+        bodies = {name: self._body_fields(tree) for name, tree in self.bodies.items()}
+        normal, tangential = read_mountings(self.top.get("mechanics"), bodies, self.units)
         return Scene(
             bodies=(first, second),
             interface=interface,
@@ -71,6 +74,9 @@ class SceneReader:
             surroundings=surroundings,
             T_0=self._reference_temperature(),
             initial=self._initial(interface, loading),
+            normal=normal,
+            tangential=tangential,
+            programme=read_programme(self.top.get("programme"), self.units),
         )
 
     # -- bodies and temperatures ----------------------------------------------------------------------------------
@@ -126,13 +132,13 @@ class SceneReader:
 
     def _body_fields(self, tree: Tree) -> dict[str, Tree]:
         parameters = [name for name, _ in self._body_kind(tree).specs()]
-        return mapping(tree, ["temperature", "capacity", *parameters])
+        return mapping(tree, ["temperature", "capacity", *STIFFNESS_KEYS, *parameters])
 
     def _body(self, k: int, name: str) -> Body:
         tree, temperature = self.bodies[name], self.temperatures[k]
         assert temperature is not None
         fields = self._body_fields(tree)
-        given = {key: child for key, child in fields.items() if key not in ("temperature", "capacity")}
+        given = {key: child for key, child in fields.items() if key not in ("temperature", "capacity", *STIFFNESS_KEYS)}
         if not given and "capacity" not in fields:
             return Body(name, temperature)
         return Body(name, temperature, build(self._body_kind(tree), tree, self.units, fields=given))
@@ -144,10 +150,11 @@ class SceneReader:
         potentials = law_list(Potential, given.get("potential"), self.units)
         reactions = law_list(RateLaw, given.get("bonding"), self.units)
         frictions = law_list(Friction, given.get("friction"), self.units)
+        limits = law_list(Limit, given.get("limits"), self.units)
         sites = self._sites()
         partition = self._partition()
         if mechanism is None:
-            return Interface(self.temperatures[2], potentials, frictions, reactions, sites, partition)
+            return Interface(self.temperatures[2], potentials, frictions, reactions, sites, partition, limits=limits)
         return Interface(
             self.temperatures[2],
             (*potentials, *mechanism.potentials),
@@ -157,6 +164,7 @@ class SceneReader:
             partition,
             mechanism.variables,
             mechanism.bonds,
+            limits,
         )
 
     def _partition(self) -> float:
@@ -227,8 +235,10 @@ class SceneReader:
 
     def _initial(self, interface: Interface, loading: Mapping[str, Load]) -> dict[str, float]:
         evolving = [name for name in self.nodes if name not in loading]
-        if any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
+        if interface.limits or any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
             evolving.append("phi")
+        if any(key in self.top for key in ("mechanics", "programme")) or {"F_n", "F_t", "u_t"} & set(loading):
+            evolving += [name for name in MOVING if name not in loading]
         tree = self.top.get("initial")
         fields = mapping(tree)
         for name, child in fields.items():
@@ -251,6 +261,8 @@ class SceneReader:
         return f"nothing that evolves is called '{name}'.{suggestion(name, evolving)}"
 
     def _initial_value(self, name: str, tree: Tree, interface: Interface) -> float:
+        if name in MOVING:
+            return number(tree, self.units[name], name)
         if name != "phi":
             return number(tree, "K", name, TEMPERATURE)
         limit = interface.sites.phi_max if interface.sites else 1.0

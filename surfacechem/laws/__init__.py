@@ -13,6 +13,7 @@ from surfacechem.terms import (
     Friction,
     HeatTransfer,
     Law,
+    Limit,
     Load,
     Potential,
     RateLaw,
@@ -20,10 +21,11 @@ from surfacechem.terms import (
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact"),
-    RateLaw: ("kinetics", "bonds"),
+    Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange"),
+    RateLaw: ("kinetics", "bonds", "adhesion"),
     Friction: ("friction",),
     HeatTransfer: ("heat",),
+    Limit: ("limits",),
     Load: ("loading",),
     Factor: ("factors",),
 }

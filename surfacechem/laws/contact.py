@@ -1,8 +1,8 @@
-"""Mechanical and thermal part of the interface's free energy: elastic contact, interface capacity."""
+"""Mechanical and thermal part of the interface's free energy: elastic contact, bond springs, capacity."""
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, log
+from surfacechem.expressions import Expression, log, positive, where
 from surfacechem.terms import Potential, parameter
 
 
@@ -25,6 +25,24 @@ class NormalStiffness(Potential):
         return self.E_n * g_n**2 / 2
 
 
+class BondedContact(Potential):
+    r"""Linear elastic contact that carries tension only while it is bonded.
+
+    .. math:: \Psi = \tfrac12 E_n g_n^2 \quad \text{if bonded or } g_n < 0, \quad \text{else } 0
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c with its remark 5.6. Any g_n.
+
+    >>> BondedContact(E_n=1e12).energy(g_n=1e-6, bonded=1.0), BondedContact(E_n=1e12).energy(g_n=1e-6, bonded=0.0)
+    (0.5, 0.0)
+    """
+
+    E_n: float = parameter("Pa/m", "normal contact stiffness", at_least=0)
+
+    def energy(self, g_n: Expression, bonded: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.E_n * (bonded * positive(g_n) ** 2 + positive(-g_n) ** 2) / 2
+
+
 class TangentialStiffness(Potential):
     r"""Linear elastic contact along the interface.
 
@@ -42,6 +60,50 @@ class TangentialStiffness(Potential):
     def energy(self, g_t: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return self.E_t * g_t**2 / 2
+
+
+class Penalty(Potential):
+    r"""Unilateral elastic contact: pressure where the bodies overlap, nothing where they are apart.
+
+    .. math:: \Psi = \tfrac12 E_n \langle -g_n \rangle^2, \quad t_n = -E_n \langle -g_n \rangle
+
+    The energy and its slope are continuous at touch. :math:`E_n` may vary with temperature and bonding state. Rigid
+    contact is its limit: in series with a body of stiffness k the overlap is :math:`k w / (k + E_n)`.
+    Source: classical penalty method (Wriggers, Computational Contact Mechanics, 2006); Sauer, Duong & Mandadapu
+    (2021), eq. ex:psi_c, for g_n < 0. Any g_n.
+
+    >>> Penalty(E_n=1e12).energy(g_n=-1e-6), Penalty(E_n=1e12).energy(g_n=1e-6)
+    (0.5, 0)
+    """
+
+    E_n: float = parameter("Pa/m", "contact stiffness", at_least=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return where(g_n < 0, self.E_n * g_n**2 / 2, 0)
+
+
+class BondSprings(Potential):
+    r"""Springs that bonds are: they carry tension in proportion to the bonding state; contact carries compression.
+
+    .. math:: \Psi = \tfrac12 \phi E_b \langle g_n \rangle^2 + \tfrac12 E_n \langle -g_n \rangle^2
+
+    Loss of bonds is damage in tension only. Tension raises the chemical potential by :math:`\tfrac12 E_b g_n^2`, so
+    that with a bond energy :math:`\tfrac12 K (\phi - 1)^2` equilibrium is :math:`\phi = 1 - E_b g_n^2 / 2 K`: peak
+    traction at :math:`\sqrt{2K/3E_b}`, work of separation K/2.
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c with :math:`E_n = \phi E_b`. Any g_n.
+
+    >>> springs = BondSprings(E_b=1e12, E_n=4e12)
+    >>> springs.energy(g_n=1e-6, phi=0.5), springs.energy(g_n=-1e-6, phi=0.5)
+    (0.25, 2.0)
+    """
+
+    E_b: float = parameter("Pa/m", "stiffness in tension of complete bonding", at_least=0)
+    E_n: float = parameter("Pa/m", "contact stiffness in compression", at_least=0)
+
+    def energy(self, g_n: Expression, phi: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return where(g_n > 0, phi * self.E_b, self.E_n) * g_n**2 / 2
 
 
 class InterfaceCapacity(Potential):

@@ -1,4 +1,4 @@
-"""How a parameter varies with one variable: linear, polynomial, power, exponential, Arrhenius."""
+"""How a parameter varies with one variable: linear, proportional, polynomial, power, exponential, Arrhenius."""
 
 from __future__ import annotations
 
@@ -24,6 +24,24 @@ class Linear(Factor):
     def factor(self, x: Expression) -> Expression:
         """Dimensionless factor."""
         return 1 + self.slope * (x - self.about)
+
+
+class Proportional(Factor):
+    r"""In proportion to any variable: the strength of bonds to how many there are.
+
+    .. math:: f = x / x_0
+
+    Source: definition. Unlike `linear` with the slope 1/x_0 it keeps all digits where x vanishes.
+
+    >>> Proportional(of="phi").factor(x=1e-20)
+    1e-20
+    """
+
+    about: float = parameter("[x]", "x at which the factor is one", default=1.0, above=0, varies=False)
+
+    def factor(self, x: Expression) -> Expression:
+        """Dimensionless factor."""
+        return x / self.about
 
 
 class LinearInTemperature(Factor):

@@ -17,20 +17,75 @@ from surfacechem.solvers.native import (
     TRIAL_DOT,
     Q,
     Y,
-    clear,
     compiled,
     evaluate,
 )
-from surfacechem.solvers.radau_stages import lagrange, set_stage, stage_count
-from surfacechem.solvers.radau_tables import COLLOCATION, DEFECT, GAMMA, INVERSE, LAGRANGE, NODES, START_RATE
+from surfacechem.solvers.radau_stages import divide, nested, set_stage, stage_count
+from surfacechem.solvers.radau_tables import (
+    COLLOCATION,
+    DEFECT,
+    GAMMA,
+    NEWTON_NODES,
+    PROBE_SHAPE,
+    START_RATE,
+)
 
 
 @compiled
-def _defect_shape(k: int, x: float) -> float:
-    value = 0.0
-    for i in range(stage_count(k), -1, -1):
-        value = (value + DEFECT[k, i]) * x
-    return value
+def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
+    """Divided differences of the polynomial through 0 and these values at the stages, with its correction."""
+    s = stage_count(k)
+    for m in range(result.shape[0]):
+        row = result[m]
+        divide(k, values, m, row)
+        row[s] = row[s + 1] = 0.0
+        for i in range(s + 1):
+            row[i] += DEFECT[k, i] * correction[m]
+
+
+@compiled
+def keep_polynomial(w: Any) -> None:
+    """Newton's form of the polynomials of state and ledger over the step, for outputs and events inside."""
+    k = w.count[MEMBER]
+    _newton_form(k, w.z, w.vector[CORRECTION], w.polynomial)
+    _newton_form(k, w.q_stage, w.ledger[Q_CORRECTION], w.q_polynomial)
+
+
+@compiled
+def add_probe(w: Any, k: int, defect: Any) -> None:
+    """The next term of the ledger's polynomial, from a defect of its rate at the probe."""
+    for m in range(w.q_polynomial.shape[0]):
+        for i in range(stage_count(k) + 2):
+            w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * defect[m]
+
+
+@compiled
+def _evaluate(k: int, x: float, polynomial: Any, start: Any, result: Any) -> None:
+    for m in range(polynomial.shape[0]):
+        result[m] = start[m] + nested(k, stage_count(k) + 1, x, polynomial[m])
+
+
+@compiled
+def interpolate(w: Any, x: float) -> None:
+    """State and ledger at the fraction x of the step."""
+    k = w.count[MEMBER]
+    _evaluate(k, x, w.polynomial, w.vector[Y], w.vector[TRIAL])
+    _evaluate(k, x, w.q_polynomial, w.ledger[Q], w.ledger[Q_TRIAL])
+
+
+@compiled
+def interpolate_rate(w: Any, h: float, x: float) -> None:
+    """State at the fraction x of the step, and the derivative of its polynomial."""
+    k = w.count[MEMBER]
+    top = stage_count(k)
+    for m in range(w.polynomial.shape[0]):
+        row = w.polynomial[m]
+        value, slope = row[top], 0.0
+        for i in range(top - 1, -1, -1):
+            slope = slope * (x - NEWTON_NODES[k, i]) + value
+            value = value * (x - NEWTON_NODES[k, i]) + row[i]
+        w.vector[TRIAL, m] = w.vector[Y, m] + value * x
+        w.vector[TRIAL_DOT, m] = (slope * x + value) / h
 
 
 @compiled
@@ -38,47 +93,6 @@ def keep_correction(w: Any) -> None:
     """Leading error of the polynomial per unit shape, from the error estimate."""
     for m in range(w.algebraic.shape[0]):
         w.vector[CORRECTION, m] = GAMMA[w.count[MEMBER]] * w.vector[ERROR, m]
-
-
-@compiled
-def interpolate(w: Any, x: float) -> None:
-    """State and ledger at the fraction x of the step."""
-    k = w.count[MEMBER]
-    lagrange(w, k, x)
-    shape = _defect_shape(k, x)
-    for m in range(w.algebraic.shape[0]):
-        value = shape * w.vector[CORRECTION, m]
-        for j in range(stage_count(k)):
-            value += w.basis[j] * w.z[j, m]
-        w.vector[TRIAL, m] = w.vector[Y, m] + value
-    for m in range(w.ledger.shape[1]):
-        value = shape * w.ledger[Q_CORRECTION, m]
-        for j in range(stage_count(k)):
-            value += w.basis[j] * w.q_stage[j, m]
-        w.ledger[Q_TRIAL, m] = w.ledger[Q, m] + value
-
-
-@compiled
-def interpolate_rate(w: Any, h: float, x: float) -> None:
-    """Derivative of the corrected polynomial at the fraction x of the step."""
-    k = w.count[MEMBER]
-    s = stage_count(k)
-    shape = 1.0
-    for i in range(s):
-        shape *= 1.0 - x / NODES[k, i]
-    clear(w.basis)
-    for i in range(s):
-        weight = LAGRANGE[k, i] * NODES[k, i]
-        for j in range(s):
-            if j != i:
-                weight *= x - NODES[k, j]
-        for j in range(s):
-            w.basis[j] += weight * INVERSE[k, i, j]
-    for m in range(w.algebraic.shape[0]):
-        value = shape * w.vector[CORRECTION, m]
-        for j in range(s):
-            value += w.basis[j] * w.z[j, m]
-        w.vector[TRIAL_DOT, m] = value / h
 
 
 @compiled

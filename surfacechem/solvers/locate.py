@@ -6,7 +6,7 @@ bracketed on the corrected polynomial, then the step is repeated onto it with th
 
 from typing import Any
 
-from surfacechem.solvers.dense import interpolate, interpolate_rate
+from surfacechem.solvers.dense import interpolate_rate, keep_polynomial
 from surfacechem.solvers.native import (
     BASE,
     H_FACTORED,
@@ -14,6 +14,7 @@ from surfacechem.solvers.native import (
     M_LARGEST,
     M_NOW,
     M_SIDE,
+    M_SLOPE,
     MARGINS,
     MEMBER,
     TAU,
@@ -22,7 +23,6 @@ from surfacechem.solvers.native import (
     YDOT,
     Y,
     compiled,
-    compiled_once,
     evaluate,
     set_inputs,
 )
@@ -38,7 +38,6 @@ NOISE = 4e-15
 @compiled
 def margins_inside(w: Any, h: float, x: float) -> None:
     """Margins at the fraction x of the step, from the polynomial."""
-    interpolate(w, x)
     interpolate_rate(w, h, x)
     w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
     set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
@@ -46,7 +45,7 @@ def margins_inside(w: Any, h: float, x: float) -> None:
 
 
 @compiled
-def start_margins(w: Any, fired: Any) -> None:
+def start_margins(w: Any) -> None:
     """Sides of zero at a start or restart; a margin that has just fired, or is zero, has to leave zero first."""
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
     set_inputs(w, w.vector[Y], w.vector[YDOT])
@@ -54,7 +53,7 @@ def start_margins(w: Any, fired: Any) -> None:
     for m in range(w.margin.shape[1]):
         value = w.margin[M_NOW, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        if fired[m] or abs(value) <= NOISE * w.margin[M_LARGEST, m]:
+        if w.fired[m] != 0 or abs(value) <= NOISE * w.margin[M_LARGEST, m]:
             w.margin[M_SIDE, m] = 0.0
         else:
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
@@ -77,23 +76,24 @@ def _update_sides(w: Any) -> None:
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
 
 
-@compiled_once
-def _scan(w: Any, h: float, kinds: Any, fired: Any) -> float:
+@compiled
+def _scan(w: Any, h: float, kinds: Any) -> float:
     """End of the first interval in which margins cross, marking them; 0 if there is none."""
     any_crossing = False
     for i in range(1, POINTS + 1):
         x = i / POINTS
         margins_inside(w, h, x)
         for m in range(kinds.shape[0]):
-            fired[m] = _crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
-            any_crossing = any_crossing or fired[m]
+            crossing = _crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
+            w.fired[m] = crossing
+            any_crossing = any_crossing or crossing
         if any_crossing:
             return x
         _update_sides(w)
     return 0.0
 
 
-@compiled_once
+@compiled
 def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
     """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method)."""
     side = w.margin[M_SIDE, m]
@@ -124,7 +124,7 @@ def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
     return high
 
 
-@compiled_once
+@compiled
 def _slope(w: Any, h: float, m: int, x: float) -> float:
     """Change of a margin per step, from the polynomial around x."""
     width = 1e-4 * x
@@ -134,7 +134,7 @@ def _slope(w: Any, h: float, m: int, x: float) -> float:
     return float((ahead - w.margin[M_NOW, m]) / (2.0 * width))
 
 
-@compiled_once
+@compiled
 def step_onto(w: Any, size: float) -> bool:
     """Repeat the step with another size, with the full order of the method."""
     w.clock[H_FACTORED] = 0.0
@@ -155,7 +155,7 @@ def _margins_at_end(w: Any, size: float) -> None:
     evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
 
 
-@compiled_once
+@compiled
 def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
     step fails.
@@ -179,37 +179,38 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
     return size
 
 
-@compiled_once
-def _mark_coincident(w: Any, h: float, size: float, kinds: Any, fired: Any, slopes: Any) -> None:
+@compiled
+def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
     _margins_at_end(w, size)
     near = 1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size)
     for m in range(kinds.shape[0]):
-        value = w.margin[M_NOW, m]
+        value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
         across = _crosses(w.margin[M_SIDE, m], value, kinds[m, 1])
-        close = slopes[m] != 0.0 and abs(value / slopes[m]) * h <= near
-        fired[m] = across or (fired[m] and close)
+        close = slope != 0.0 and abs(value / slope) * h <= near
+        w.fired[m] = across or (w.fired[m] != 0 and close)
 
 
 @compiled
-def find_event(w: Any, h: float, kinds: Any, fired: Any, slopes: Any) -> float:
+def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
     repeated.
     """
-    end = _scan(w, h, kinds, fired)
+    keep_polynomial(w)
+    end = _scan(w, h, kinds)
     if end == 0.0:
         return h
     first, earliest = -1, 2.0
     for m in range(kinds.shape[0]):
-        slopes[m] = 0.0
-        if fired[m]:
+        w.margin[M_SLOPE, m] = 0.0
+        if w.fired[m] != 0:
             x = _bisect(w, h, m, end - 1.0 / POINTS, end)
-            slopes[m] = _slope(w, h, m, max(x, 1e-12))
+            w.margin[M_SLOPE, m] = _slope(w, h, m, max(x, 1e-12))
             if x < earliest:
                 first, earliest = m, x
-    size = _refine(w, h, first, max(earliest, 1e-300), slopes[first])
+    size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first])
     if size == 0.0:
         return 0.0
-    _mark_coincident(w, h, size, kinds, fired, slopes)
-    fired[first] = True
+    _mark_coincident(w, h, size, kinds)
+    w.fired[first] = 1
     return size

@@ -3,6 +3,7 @@
 The address is data, not a function type: code compiled here never depends on the scene it calls and is cached for good.
 """
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numba
@@ -13,17 +14,24 @@ from numba.core import cgutils
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
+from numba.np.arrayobj import populate_array
 
 _njit: Any = numba.njit
 _intrinsic: Any = intrinsic
 _borrowed: Any = impl_ret_borrowed
 _Constant: Any = ir.Constant
 
-compiled: Any = _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""Nothing is allocated inside a step; without reference counts the code compiles and runs about twice as fast."""
+PARTS: set[str] = set()
+"""Names of the functions that only the kernel itself calls."""
 
-compiled_once: Any = _njit(error_model="numpy", _nrt=False, inline="always")
-"""For the stem of the call tree, functions of one caller. Numba would optimise all they contain once a level."""
+
+def compiled(function: Any, counted: bool = False) -> Any:
+    """A part of the kernel. Nothing is allocated inside a step; without reference counts the code compiles and runs
+    about twice as fast.
+    """
+    PARTS.add(function.__qualname__)
+    return _njit(error_model="numpy", _nrt=counted, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
 """Rows of the table of addresses (code, user data)."""
@@ -60,16 +68,18 @@ class Work(NamedTuple):
     real: Any
     complex: Any
     order: Any
-    basis: Any
+    z_polynomial: Any
     ledger: Any
     q_stage: Any
     rates: Any
+    polynomial: Any
+    q_polynomial: Any
     margin: Any
     fired: Any
 
 
 class WorkType(types.Type):
-    """Pointer to a Work. By value its twenty arrays would be 140 arguments of every call."""
+    """Pointer to a Work. By value its arrays would be 140 arguments of every call."""
 
     def __init__(self, content: Any) -> None:
         self.content = content
@@ -169,7 +179,7 @@ def any_true(flags: Any) -> bool:
     """Whether a flag is set."""
     found = False
     for flag in flags:
-        found = found or flag
+        found = found or flag != 0
     return found
 
 
@@ -182,35 +192,55 @@ def finite(values: Any) -> bool:
     return total == 0.0
 
 
-@_njit
-def allocate(code: Any, algebraic: Any, n_parameters: int, n_ledger: int, n_margins: int) -> Work:
-    """Workspace of a trajectory."""
+@_intrinsic
+def _take(_context: Any, cursor: Any, shape: Any, kind: Any) -> Any:
+    """An array on the memory the cursor, a vector of one address, points to; moves the cursor to its end."""
+    array = types.Array(kind.instance_type, len(shape), "C")
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = context.make_array(signature.args[0])(context, builder, args[0]).data
+        start = builder.load(place)
+        size = context.get_constant(types.intp, array.dtype.bitwidth // 8)
+        lengths = cgutils.unpack_tuple(builder, args[1])  # type: ignore[no-untyped-call]
+        strides = [size]
+        for length in reversed(lengths):
+            strides.insert(0, builder.mul(strides[0], length))
+        builder.store(builder.add(start, strides[0]), place)
+        made = context.make_array(array)(context, builder)
+        data = builder.inttoptr(start, made.data.type)
+        populate_array(made, data=data, shape=lengths, strides=strides[1:], itemsize=size, meminfo=None)  # type: ignore[no-untyped-call]
+        return made._getvalue()
+
+    return array(cursor, shape, kind), generate
+
+
+@partial(compiled, counted=True)
+def lay_out(code: Any, algebraic: Any, cursor: Any, n_parameters: int, n_ledger: int, n_margins: int) -> Work:
+    """Workspace of a trajectory on the zeros from the cursor's address on; leaves their end there. No memory is
+    touched.
+    """
     n = algebraic.shape[0]
     return Work(
         code,
         algebraic,
-        np.zeros(1 + 2 * n + n_parameters),
-        np.zeros(10),
-        np.zeros(11, np.int64),
-        np.zeros((13, n)),
-        np.zeros((7, n)),
-        np.zeros((7, n)),
-        np.zeros((7, n)),
-        np.zeros((3, n), np.complex128),
-        np.zeros((2, n, n)),
-        np.zeros((n, n)),
-        np.zeros((3, n, n), np.complex128),
-        np.zeros((4, n), np.int64),
-        np.zeros(8),
-        np.zeros((4, n_ledger)),
-        np.zeros((7, n_ledger)),
-        np.zeros((8, n_ledger)),
-        np.zeros((5, n_margins)),
-        np.zeros(n_margins, np.bool_),
+        _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
+        _take(cursor, (10,), np.float64),
+        _take(cursor, (11,), np.int64),
+        _take(cursor, (13, n), np.float64),
+        _take(cursor, (7, n), np.float64),
+        _take(cursor, (7, n), np.float64),
+        _take(cursor, (7, n), np.float64),
+        _take(cursor, (3, n), np.complex128),
+        _take(cursor, (2, n, n), np.float64),
+        _take(cursor, (n, n), np.float64),
+        _take(cursor, (3, n, n), np.complex128),
+        _take(cursor, (4, n), np.int64),
+        _take(cursor, (n, 9), np.float64),
+        _take(cursor, (4, n_ledger), np.float64),
+        _take(cursor, (7, n_ledger), np.float64),
+        _take(cursor, (8, n_ledger), np.float64),
+        _take(cursor, (n, 9), np.float64),
+        _take(cursor, (n_ledger, 9), np.float64),
+        _take(cursor, (5, n_margins), np.float64),
+        _take(cursor, (n_margins,), np.int64),
     )
-
-
-@_njit
-def keep_alive(work: Work) -> None:
-    """A last use: Numba releases an array after the last statement that names it."""
-    work.clock[0] = 0.0

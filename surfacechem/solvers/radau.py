@@ -28,6 +28,7 @@ STEP_ROWS = 512
 CHUNK = 256
 """Runs a thread takes at a time."""
 END, OUTPUTS, EVENTS, RECORDS = range(4)
+_STATUSES = tuple(Status)
 
 
 @lru_cache(maxsize=256)
@@ -53,41 +54,39 @@ class _Tables:
         event_rows: int,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
-        self.step_rows, self.event_rows = step_rows, event_rows
         self.stop = np.zeros(1, np.int64)
         self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
-        self.counts = np.zeros((runs, 4), np.int64)
-        self.counters = np.empty((runs, 6), np.int64)
+        self.counts = np.zeros((runs, 10), np.int64)
         self.outputs = np.empty((runs, len(times), n + q))
-        self.steps = np.empty((runs, step_rows, 1 + 2 * n + q))
-        self.events = np.empty((runs, event_rows, 2 + 2 * n + q))
-        kinds = _kinds(margins)
-        limits = np.array([max_steps, q], np.int64)
+        self.steps = np.empty((runs, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(runs)
+        self.events = np.empty((runs, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(runs)
         self.arguments = (
             program.addresses,
             program.algebraic_mask,
-            limits,
+            q,
+            max_steps,
             self.stop,
-            np.array([rtol, *atol]),
-            kinds,
+            rtol,
+            atol,
+            _kinds(margins),
             y0,
             parameters,
             segments,
             times,
             self.ends,
             self.counts,
-            self.counters,
             self.outputs,
             self.steps,
             self.events,
         )
 
-    def too_short(self, counts: list[int]) -> bool:
-        """Whether a run met more events or steps than there are rows; tables without rows record nothing."""
-        return 0 < self.event_rows < counts[EVENTS] or 0 < self.step_rows < counts[RECORDS]
-
     def run(self, first: int, last: int) -> None:
         stepper.run_batch()(first, last, *self.arguments)
+
+
+@lru_cache(maxsize=4)
+def _no_rows(runs: int) -> Array:
+    return np.empty((runs, 0, 0))
 
 
 def _contiguous(values: ArrayLike) -> Array:
@@ -104,7 +103,7 @@ def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
         _contiguous(problem.segments),
         _contiguous(problem.times),
         problem.rtol,
-        problem.atol,
+        _contiguous(problem.atol),
         problem.margins,
         problem.max_steps,
         step_rows,
@@ -163,24 +162,22 @@ def _result(problem: Problem, tables: _Tables, counts: list[int]) -> Result:
     values = tables.outputs[0, :outputs]
     return Result(
         problem=problem,
-        status=Status(counts[END]),
+        status=_STATUSES[counts[END]],
         t=float(end[0]),
         y=end[1 : 1 + n],
         ydot=end[1 + n : 1 + 2 * n],
         ledger=end[1 + 2 * n : m],
         margins=end[m:],
-        times=problem.times[:outputs],
+        times=problem.times if outputs == len(problem.times) else problem.times[:outputs],
         outputs=values[:, :n],
         ledger_outputs=values[:, n:],
-        events=_events(tables.events[0, : counts[EVENTS]], n, program.n_ledger),
-        counters=Counters(*tables.counters[0].tolist()),
+        events=_events(tables.events[0, : counts[EVENTS]], n) if counts[EVENTS] else _no_events(n, program.n_ledger),
+        counters=Counters(*counts[RECORDS + 1 :]),
         steps=Points(*_points(tables.steps[0, : counts[RECORDS]], n)) if problem.record_steps else None,
     )
 
 
-def _events(found: Array, n: int, q: int) -> Events:
-    if len(found) == 0:
-        return _no_events(n, q)
+def _events(found: Array, n: int) -> Events:
     return Events(*_points(found[:, 1:], n), index=found[:, 0].astype(np.int64))
 
 
@@ -230,7 +227,7 @@ def solve_many(
     if len(states):
         # All runs share shapes, so the checks of one problem are those of the batch.
         Problem(program, states[0], outputs, breaks, table[0], rtol, weights, tuple(margins), max_steps)
-    tables = _Tables(program, states, table, breaks, outputs, rtol, weights, tuple(margins), max_steps, 0, 0)
+    tables = _Tables(program, states, table, breaks, outputs, rtol, np.array(weights), tuple(margins), max_steps, 0, 0)
     starts = range(0, len(states), CHUNK)
     stepper.run_batch()
     with ThreadPoolExecutor(threads) as pool:
@@ -251,7 +248,7 @@ def _batch(program: Program, tables: _Tables) -> Batch:
         outputs=tables.outputs[:, :, :n],
         ledger_outputs=tables.outputs[:, :, n:],
         counts=tables.counts[:, OUTPUTS],
-        steps=tables.counters[:, 0],
+        steps=tables.counts[:, RECORDS + 1],
     )
 
 
@@ -270,14 +267,22 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     For one state or a row of states [..., n]; entries of ``ydot`` and of algebraic variables are first guesses;
     parameters are one vector or one for each state.
     """
-    values = np.array(y, dtype=float)
-    shape = values.shape
-    states = np.ascontiguousarray(values.reshape(-1, program.n))
-    rates = np.array(np.broadcast_to(np.asarray(ydot, dtype=float), shape)).reshape(-1, program.n)
-    times = np.array(np.broadcast_to(np.asarray(t, dtype=float), shape[:-1])).reshape(-1)
-    table = _contiguous(parameters).reshape(-1, program.n_parameters) if program.n_parameters else np.zeros((1, 0))
-    if len(table) not in (1, len(states)):
-        raise ValueError(f"{len(states)} states but {len(table)} parameter vectors; one is needed, or one a state.")
-    outcomes = np.zeros(len(states), np.int64)
-    stepper.make_consistent()(program.addresses, program.algebraic_mask, times, states, rates, table, outcomes)
-    return Consistent(states.reshape(shape), rates.reshape(shape), (outcomes == 0).reshape(shape[:-1]))
+    values = np.asarray(y, dtype=float)
+    n, shape = program.n, values.shape
+    ends = np.empty((values.size // n, 1 + 2 * n))
+    ends[:, 0] = np.broadcast_to(t, shape[:-1]).reshape(-1)
+    ends[:, 1 : 1 + n] = values.reshape(-1, n)
+    ends[:, 1 + n :] = np.broadcast_to(ydot, shape).reshape(-1, n)
+    table = (
+        _contiguous(parameters).reshape(-1, 1, program.n_parameters) if program.n_parameters else np.zeros((1, 1, 0))
+    )
+    if len(table) not in (1, len(ends)):
+        raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
+    counts = np.zeros((len(ends), 10), np.int64)
+    none, nothing, kinds = np.zeros(0), _no_rows(len(ends)), _kinds(())
+    stepper.run_batch()(
+        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(n), kinds, ends, table,
+        none, none, ends, counts, nothing, nothing, nothing,
+    )  # fmt: skip
+    valid = (counts[:, END] == 0).reshape(shape[:-1])
+    return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)

@@ -27,7 +27,7 @@ from surfacechem.solvers.native import (
     Q,
     Y,
     compiled,
-    compiled_once,
+    copy,
     evaluate,
     set_inputs,
 )
@@ -35,9 +35,10 @@ from surfacechem.solvers.radau_stages import (
     CONVERGED,
     NOT_FINITE,
     differentiate_system,
+    divide,
+    end_of_step,
     factor_newton,
     predict,
-    set_stage,
     solve_stages,
     stage_count,
 )
@@ -93,7 +94,7 @@ def restart(w: Any) -> int:
     return GOOD
 
 
-@compiled_once
+@compiled
 def _prepare(w: Any, h: float) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.clock[H_FACTORED] == h:
@@ -115,7 +116,7 @@ def too_small(w: Any, h: float) -> bool:
     return not (h > TINIEST and h > 4e-16 * w.clock[TAU])
 
 
-@compiled_once
+@compiled
 def advance(
     w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
 ) -> tuple[int, float, float, float]:
@@ -160,7 +161,7 @@ def advance(
         h = smaller
 
 
-@compiled_once
+@compiled
 def finish_step(w: Any, h: float) -> None:
     """What interpolation inside the step needs beyond the stages."""
     keep_correction(w)
@@ -171,10 +172,11 @@ def finish_step(w: Any, h: float) -> None:
 @compiled
 def store_polynomial(w: Any, h: float, offset: float) -> None:
     """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
-    s = stage_count(w.count[MEMBER])
-    for i in range(s):
-        for m in range(w.algebraic.shape[0]):
-            w.z_last[i, m] = w.z[i, m]
+    k = w.count[MEMBER]
+    for i in range(stage_count(k)):
+        copy(w.z[i], w.z_last[i])
+    for m in range(w.algebraic.shape[0]):
+        divide(k, w.z, m, w.z_polynomial[m])
     w.clock[H_LAST] = h
     w.clock[OFFSET] = offset
     w.count[LAST_MEMBER] = w.count[MEMBER]
@@ -183,15 +185,9 @@ def store_polynomial(w: Any, h: float, offset: float) -> None:
 @compiled
 def accept(w: Any, h: float) -> None:
     """Move to the end of the step."""
-    n = w.algebraic.shape[0]
     last = stage_count(w.count[MEMBER]) - 1
-    set_stage(w, last, h)
-    for m in range(n):
-        w.vector[Y, m] = w.inputs[1 + m]
-        w.vector[YDOT, m] = w.inputs[1 + n + m]
-    for m in range(w.ledger.shape[1]):
-        w.ledger[Q, m] += w.q_stage[last, m]
-        w.rates[7, m] = w.rates[last, m]
+    end_of_step(w, h, Y, YDOT, Q)
+    copy(w.rates[last], w.rates[7])
     w.clock[TAU] += h
     w.count[STEPS] += 1
     w.count[FRESH] = min(w.count[FRESH], OLD)

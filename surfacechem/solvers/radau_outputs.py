@@ -7,7 +7,7 @@ computed by a step of its own, from the start of the main step, which has the fu
 
 from typing import Any
 
-from surfacechem.solvers.dense import integrate_ledger, interpolate, interpolate_rate
+from surfacechem.solvers.dense import add_probe, integrate_ledger, interpolate, interpolate_rate, keep_polynomial
 from surfacechem.solvers.native import (
     BASE,
     CONTRACTION,
@@ -23,19 +23,23 @@ from surfacechem.solvers.native import (
     TRIAL_DOT,
     TRIES,
     WEIGHT,
-    Q,
-    clear,
     compiled,
-    compiled_once,
     copy,
     evaluate,
     set_inputs,
 )
 from surfacechem.solvers.noise import find_noise
 from surfacechem.solvers.radau_advance import store_polynomial
-from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
+from surfacechem.solvers.radau_stages import (
+    CONVERGED,
+    end_of_step,
+    factor_newton,
+    predict,
+    solve_stages,
+    stage_count,
+)
 from surfacechem.solvers.radau_step import MAGNIFIED, filter_residual
-from surfacechem.solvers.radau_tables import GAMMA, PROBE, PROBE_RATE, PROBE_SHAPE
+from surfacechem.solvers.radau_tables import GAMMA, PROBE, PROBE_RATE
 
 ALLOWED = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
@@ -53,11 +57,10 @@ def _largest(w: Any, floor: float) -> float:
     return norm
 
 
-@compiled_once
+@compiled
 def _polynomial_serves(w: Any, h: float) -> bool:
     """Whether the equations hold at the probe, midway between the stages, where the polynomial is worst."""
     x = PROBE[w.count[MEMBER]]
-    interpolate(w, x)
     interpolate_rate(w, h, x)
     w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
     set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
@@ -68,7 +71,7 @@ def _polynomial_serves(w: Any, h: float) -> bool:
     return bool(_largest(w, MAGNIFIED) <= ALLOWED)
 
 
-@compiled_once
+@compiled
 def _probe_ledger(w: Any, h: float) -> None:
     """Sample the rates of the ledger at the probe. The correction of the state there comes first: a fast rate would
     magnify its error.
@@ -84,9 +87,10 @@ def _probe_ledger(w: Any, h: float) -> None:
         for i in range(stage_count(k)):
             defect -= PROBE_RATE[k, i] * w.rates[i, m]
         w.ledger[Q_PROBE, m] = h * defect
+    add_probe(w, k, w.ledger[Q_PROBE])
 
 
-@compiled_once
+@compiled
 def _recall_step(w: Any, h: float) -> None:
     """Stages and quadratures of the main step, from its stored polynomial."""
     for i in range(stage_count(w.count[MEMBER])):
@@ -95,7 +99,7 @@ def _recall_step(w: Any, h: float) -> None:
         integrate_ledger(w, h)
 
 
-@compiled_once
+@compiled
 def _step_aside(w: Any, size: float) -> bool:
     """State and ledger at the end of a step of this size, as trial values; False where Newton's method fails."""
     if not factor_newton(w, size):
@@ -106,29 +110,8 @@ def _step_aside(w: Any, size: float) -> bool:
         return False
     if w.ledger.shape[1] > 0:
         integrate_ledger(w, size)
-    n = w.algebraic.shape[0]
-    last = stage_count(w.count[MEMBER]) - 1
-    set_stage(w, last, size)
-    for j in range(n):
-        w.vector[TRIAL, j] = w.inputs[1 + j]
-        w.vector[TRIAL_DOT, j] = w.inputs[1 + n + j]
-    for m in range(w.ledger.shape[1]):
-        w.ledger[Q_TRIAL, m] = w.ledger[Q, m] + w.q_stage[last, m]
+    end_of_step(w, size, TRIAL, TRIAL_DOT, Q_TRIAL)
     return True
-
-
-@compiled
-def _interpolate_finely(w: Any, x: float) -> None:
-    """State and ledger at the fraction x of the step, the ledger with its rates at the probe."""
-    interpolate(w, x)
-    if w.ledger.shape[1] == 0 or x >= 1.0:
-        return
-    k = w.count[MEMBER]
-    shape = 0.0
-    for i in range(stage_count(k), -1, -1):
-        shape = (shape + PROBE_SHAPE[k, i]) * x
-    for m in range(w.ledger.shape[1]):
-        w.ledger[Q_TRIAL, m] += x * shape * w.ledger[Q_PROBE, m]
 
 
 @compiled
@@ -139,40 +122,47 @@ def _write(w: Any, row: Any) -> None:
     copy(w.ledger[Q_TRIAL], row[n:])
 
 
-@compiled_once
+@compiled
 def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
     """Each output by a step of its own; leaves the main step as it was."""
     theta, contraction, tries = w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES]
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
         size = (times[i] - w.clock[BASE]) - w.clock[TAU]
-        inside = 0.0 < size < h
-        if not (inside and _step_aside(w, size)):
-            _recall_step(w, h)
-            _interpolate_finely(w, min(max(size / h, 0.0), 1.0))
+        if not (0.0 < size < h and _step_aside(w, size)):
+            interpolate(w, min(max(size / h, 0.0), 1.0))
         _write(w, outputs[i])
     _recall_step(w, h)
     factor_newton(w, h)
     w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES] = theta, contraction, tries
 
 
-@compiled_once
-def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
-    """Outputs up to the end of the step; returns how many the run has now."""
-    last, inside = first, False
-    while last < times.shape[0] and times[last] <= end:
-        inside = inside or times[last] < end
-        last += 1
-    clear(w.ledger[Q_PROBE])
-    if inside:
-        serves = _polynomial_serves(w, h)
-        if w.ledger.shape[1] > 0:
-            _probe_ledger(w, h)
-        if not serves:
-            _write_by_steps(w, times, outputs, first, last, h)
-            return last
+@compiled
+def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
+    """Outputs between the ends of the step."""
+    keep_polynomial(w)
+    serves = _polynomial_serves(w, h)
+    if w.ledger.shape[1] > 0:
+        _probe_ledger(w, h)
+    if not serves:
+        _write_by_steps(w, times, outputs, first, last, h)
+        return
     for i in range(first, last):
         x = ((times[i] - w.clock[BASE]) - w.clock[TAU]) / h
-        _interpolate_finely(w, min(max(x, 0.0), 1.0))
+        interpolate(w, min(max(x, 0.0), 1.0))
         _write(w, outputs[i])
+
+
+@compiled
+def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: float) -> int:
+    """Outputs up to the end of the step; returns how many the run has now."""
+    last = first
+    while last < times.shape[0] and times[last] < end:
+        last += 1
+    if last > first:
+        _write_inside(w, times, outputs, first, last, h)
+    if last < times.shape[0] and times[last] == end:
+        end_of_step(w, h, TRIAL, TRIAL_DOT, Q_TRIAL)
+        _write(w, outputs[last])
+        last += 1
     return last

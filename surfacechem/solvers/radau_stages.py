@@ -32,10 +32,10 @@ from surfacechem.solvers.native import (
     TRIES,
     WEIGHT,
     YDOT,
+    Q,
     Y,
     clear,
     compiled,
-    compiled_once,
     evaluate,
     finite,
     set_inputs,
@@ -44,7 +44,8 @@ from surfacechem.solvers.noise import correction_is_noise
 from surfacechem.solvers.radau_tables import (
     GAMMA,
     INVERSE,
-    LAGRANGE,
+    INVERSE_GAPS,
+    NEWTON_NODES,
     NODES,
     PAIR_COLUMNS,
     PAIR_ROWS,
@@ -76,6 +77,28 @@ def stage_count(k: int) -> int:
 
 
 @compiled
+def divide(k: int, values: Any, m: int, row: Any) -> None:
+    """Newton's form x (row[0] + (x - c_1) (row[1] + ...)) of the polynomial through 0 and column m of these values at
+    the stages.
+    """
+    s = stage_count(k)
+    for i in range(s):
+        row[i] = values[i, m] * INVERSE_GAPS[k, 0, i]
+    for level in range(1, s):
+        for i in range(s - 1, level - 1, -1):
+            row[i] = (row[i] - row[i - 1]) * INVERSE_GAPS[k, level, i]
+
+
+@compiled
+def nested(k: int, top: int, x: float, row: Any) -> float:
+    """Value at x of a polynomial in Newton's form whose last coefficient is row[top]."""
+    value = row[top]
+    for i in range(top - 1, -1, -1):
+        value = value * (x - NEWTON_NODES[k, i]) + row[i]
+    return float(value * x)
+
+
+@compiled
 def differentiate_system(w: Any) -> bool:
     """Evaluate G_y and G_ydot at the start of the step."""
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
@@ -96,66 +119,68 @@ def factor_newton(w: Any, h: float) -> bool:
     n = w.algebraic.shape[0]
     mass, stiffness = w.jacobian[1], w.jacobian[0]
     w.count[FACTORIZATIONS] += 1
+    real, pairs = w.real, w.complex
     for i in range(n):
         for j in range(n):
-            w.real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
-    if not factor(w.real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
+            real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
+    if not factor(real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
         return False
     for pair in range(k + 1):
         shift = PAIR_VALUES[k, pair] / h
         for i in range(n):
             for j in range(n):
-                w.complex[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
-        if not factor(w.complex[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
+                pairs[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
+        if not factor(pairs[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
             return False
     return True
 
 
 @compiled
-def lagrange(w: Any, k: int, x: float) -> None:
-    """Values at x of the Lagrange polynomials on 0, c_1, ..., c_s, without that of the node 0, into w.basis."""
-    s = stage_count(k)
-    for j in range(s):
-        product = x * LAGRANGE[k, j]
-        for i in range(s):
-            if i != j:
-                product *= x - NODES[k, i]
-        w.basis[j] = product
-
-
-@compiled
 def predict(w: Any, h: float) -> None:
     """First guess of the stages from the stored polynomial, or no change where there is none."""
-    s, last = stage_count(w.count[MEMBER]), w.count[LAST_MEMBER]
-    n = w.algebraic.shape[0]
+    k, last = w.count[MEMBER], w.count[LAST_MEMBER]
+    s, top, z = stage_count(k), stage_count(last), w.z
     if w.clock[H_LAST] == 0.0:
         for i in range(s):
-            clear(w.z[i])
+            clear(z[i])
         return
-    for i in range(s):
-        lagrange(w, last, w.clock[OFFSET] + NODES[w.count[MEMBER], i] * h / w.clock[H_LAST])
-        for m in range(n):
-            value = 0.0 if w.clock[OFFSET] == 0.0 else -w.z_last[stage_count(last) - 1, m]
-            for j in range(stage_count(last)):
-                value += w.basis[j] * w.z_last[j, m]
-            w.z[i, m] = value
+    for m in range(w.algebraic.shape[0]):
+        row = w.z_polynomial[m]
+        start = 0.0 if w.clock[OFFSET] == 0.0 else w.z_last[top - 1, m]
+        for i in range(s):
+            x = w.clock[OFFSET] + NODES[k, i] * h / w.clock[H_LAST]
+            z[i, m] = nested(last, top - 1, x, row) - start
 
 
 @compiled
 def set_stage(w: Any, i: int, h: float) -> None:
     """Inputs of stage i."""
-    k = w.count[MEMBER]
-    n = w.algebraic.shape[0]
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[k, i] * h)
+    k, n = w.count[MEMBER], w.algebraic.shape[0]
+    # Local names spare the loops a look at the workspace after each store.
+    inputs, z, y = w.inputs, w.z, w.vector[Y]
+    inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[k, i] * h)
     for m in range(n):
         slope = 0.0
         for j in range(stage_count(k)):
-            slope += INVERSE[k, i, j] * w.z[j, m]
-        w.inputs[1 + m] = w.vector[Y, m] + w.z[i, m]
-        w.inputs[1 + n + m] = slope / h
+            slope += INVERSE[k, i, j] * z[j, m]
+        inputs[1 + m] = y[m] + z[i, m]
+        inputs[1 + n + m] = slope / h
 
 
-@compiled_once
+@compiled
+def end_of_step(w: Any, h: float, y: int, ydot: int, q: int) -> None:
+    """State, derivative and ledger at the end of the step, into these rows."""
+    n = w.algebraic.shape[0]
+    last = stage_count(w.count[MEMBER]) - 1
+    set_stage(w, last, h)
+    for m in range(n):
+        w.vector[y, m] = w.inputs[1 + m]
+        w.vector[ydot, m] = w.inputs[1 + n + m]
+    for m in range(w.ledger.shape[1]):
+        w.ledger[q, m] = w.ledger[Q, m] + w.q_stage[last, m]
+
+
+@compiled
 def _stage_residuals(w: Any, h: float) -> bool:
     s = stage_count(w.count[MEMBER])
     w.count[RESIDUALS] += s
@@ -167,36 +192,36 @@ def _stage_residuals(w: Any, h: float) -> bool:
     return True
 
 
-@compiled_once
+@compiled
 def _correct(w: Any) -> float:
     """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
-    k = w.count[MEMBER]
+    k, n = w.count[MEMBER], w.algebraic.shape[0]
     s = stage_count(k)
-    n = w.algebraic.shape[0]
-    real = w.vector[DELTA]
+    # Local names spare the loops a look at the workspace after each store.
+    real, pairs, g, z, weight = w.vector[DELTA], w.pairs, w.g, w.z, w.vector[WEIGHT]
     for m in range(n):
         total = 0.0
         for i in range(s):
-            total -= REAL_ROW[k, i] * w.g[i, m]
+            total -= REAL_ROW[k, i] * g[i, m]
         real[m] = total
     solve(w.real, w.order[0], real)
     for pair in range(k + 1):
         for m in range(n):
             value = 0.0j
             for i in range(s):
-                value -= PAIR_ROWS[k, pair, i] * w.g[i, m]
-            w.pairs[pair, m] = value
-        solve(w.complex[pair], w.order[1 + pair], w.pairs[pair])
+                value -= PAIR_ROWS[k, pair, i] * g[i, m]
+            pairs[pair, m] = value
+        solve(w.complex[pair], w.order[1 + pair], pairs[pair])
     norm = 0.0
     for i in range(s):
         for m in range(n):
             change = REAL_COLUMN[k, i] * real[m]
             for pair in range(k + 1):
-                column, value = PAIR_COLUMNS[k, i, pair], w.pairs[pair, m]
+                column, value = PAIR_COLUMNS[k, i, pair], pairs[pair, m]
                 change += column.real * value.real - column.imag * value.imag
-            w.z[i, m] += change
-            w.g[i, m] = change
-            size = abs(change) / w.vector[WEIGHT, m]
+            z[i, m] += change
+            g[i, m] = change
+            size = abs(change) / weight[m]
             # Not max(): a NaN must reach the caller.
             if not size <= norm:
                 norm = size

@@ -226,24 +226,46 @@ def _probe_rate(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
     return np.concatenate([values[:-1], np.zeros(8 - len(points)), values[-1:]])
 
 
+def _newton(nodes: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The polynomial of these coefficients of x, x^2, ... in Newton's form x, x (x - c_1), x (x - c_1)(x - c_2), ...;
+    the last of ten factors is x again.
+    """
+    rest, result = np.poly1d(coefficients[::-1]), np.zeros(9)
+    for i, node in enumerate(np.append(nodes, 0.0)):
+        rest, remainder = np.polydiv(rest, np.poly1d([1.0, -node]))
+        result[i] = remainder[-1] if isinstance(remainder, np.ndarray) else remainder(0.0)
+    result[len(nodes) + 1] = np.poly1d(rest)(0.0)
+    return result
+
+
 def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
-    """Coefficients of x^2, x^3, ... in the integral from 0 of x prod_i (x - c_i), which is one at the probe."""
+    """Coefficients of x, x^2, ... in the integral from 0 of x prod_i (x - c_i), which is one at the probe."""
     product = np.poly1d(np.append(nodes, 0.0), r=True)
-    return np.asarray((product / product(x)).integ().coeffs[::-1][2:])
+    return np.asarray((product / product(x)).integ().coeffs[::-1][1:])
+
+
+def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """1 / (c_i - c_{i-level}) for divided differences of each level; level 0 divides by c_i."""
+    table = np.zeros((7, 7))
+    for level in range(len(nodes)):
+        for i in range(level, len(nodes)):
+            table[level, i] = 1.0 / (nodes[i] - (nodes[i - level] if level else 0.0))
+    return table
 
 
 _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
-LAGRANGE = np.array([np.pad(_lagrange(c), (0, 7 - len(c))) for c in _members])
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
 """Value at 0 of the Lagrange polynomials on c_1, ..., c_s: extrapolates stage rates to the start of the step."""
 START_SLOPE = np.array([np.pad(-_lagrange(c) * np.prod(-c) / c, (0, 7 - len(c))) for c in _members])
 """Derivative at 0 of the polynomial through (0, 0), (c_j, z_j): its difference to the true rate is the error
 estimate."""
-DEFECT = np.array([np.pad(_defect(c), (0, 7 - len(c))) for c in _members])
-"""Shape of the error of the collocation polynomial, per unit defect of its derivative at 0."""
+INVERSE_GAPS = np.array([_inverse_gaps(c) for c in _members])
+NEWTON_NODES = np.array([np.pad(c, (0, 9 - len(c))) for c in _members])
+DEFECT = np.array([_newton(c, _defect(c)) for c in _members])
+"""Shape of the error of the collocation polynomial, per unit defect of its derivative at 0, in Newton's form."""
 PROBE = np.array([_probe(c) for c in _members])
 """Fraction of the step at which a component that the stages only interpolate is worst."""
 PROBE_RATE = np.array([_probe_rate(c, x) for c, x in zip(_members, PROBE, strict=True)])
 """Extrapolates the rates of the stages and of the start (last) to the probe."""
-PROBE_SHAPE = np.array([np.pad(_probe_shape(c, x), (0, 7 - len(c))) for c, x in zip(_members, PROBE, strict=True)])
-"""Shape of a quadrature's error, per unit defect of its rate at the probe."""
+PROBE_SHAPE = np.array([_newton(c, _probe_shape(c, x)) for c, x in zip(_members, PROBE, strict=True)])
+"""Shape of a quadrature's error, per unit defect of its rate at the probe, in Newton's form."""

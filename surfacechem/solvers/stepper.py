@@ -28,20 +28,21 @@ _SOURCES = (
 _LOCK = threading.Lock()
 
 
-def _folder(part: str) -> Path:
+def _folder() -> Path:
     here = Path(__file__).parent
-    return kernel_folder([here / f"{name}.py" for name in _SOURCES]) / part
+    return kernel_folder([here / f"{name}.py" for name in _SOURCES])
 
 
 def is_compiled() -> bool:
     """Whether the stepper can be loaded instead of compiled (which takes some ten seconds, once)."""
-    return all(is_filled(_folder(part)) for part in ("run", "consistent"))
+    return is_filled(_folder())
 
 
 @cache
 def _run_batch() -> Any:
     from numba import boolean, float64, int64, void
 
+    from surfacechem.solvers.native import PARTS
     from surfacechem.solvers.trajectory import run_batch
 
     real, table, cube, count = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[:, ::1]
@@ -50,8 +51,10 @@ def _run_batch() -> Any:
         int64,
         count,
         boolean[::1],
+        int64,
+        int64,
         int64[::1],
-        int64[::1],
+        float64,
         real,
         count,
         table,
@@ -59,39 +62,20 @@ def _run_batch() -> Any:
         real,
         real,
         table,
-        count,
         count,
         cube,
         cube,
         cube,
     )
-    return compile_kernel(run_batch, signature, _folder("run"))
-
-
-@cache
-def _make_consistent() -> Any:
-    from numba import boolean, float64, int64, void
-
-    from surfacechem.solvers.trajectory import make_consistent
-
-    real, table, count = float64[::1], float64[:, ::1], int64[:, ::1]
-    signature = void(count, boolean[::1], real, table, table, table, int64[::1])
-    return compile_kernel(make_consistent, signature, _folder("consistent"))
+    return compile_kernel(run_batch, signature, _folder(), PARTS)
 
 
 def run_batch() -> Any:
-    """The compiled loop over a batch of runs."""
+    """The compiled loop over a batch of runs, or of states to be made consistent."""
     with _LOCK:
         return _run_batch()
-
-
-def make_consistent() -> Any:
-    """The compiled search for consistent states."""
-    with _LOCK:
-        return _make_consistent()
 
 
 def compile_stepper() -> None:
     """Compile the stepper now, as a set-up step, or load it if that has been done."""
     run_batch()
-    make_consistent()

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from surfacechem.solvers.consistency import find_consistent
 from surfacechem.solvers.contract import Status
 from surfacechem.solvers.locate import find_event, start_margins
@@ -12,7 +14,6 @@ from surfacechem.solvers.native import (
     LOOSE,
     M_LARGEST,
     M_NOW,
-    M_SLOPE,
     RTOL,
     TAU,
     TRIAL,
@@ -20,13 +21,11 @@ from surfacechem.solvers.native import (
     YDOT,
     Q,
     Y,
-    allocate,
     any_true,
     clear,
     compiled,
-    compiled_once,
     copy,
-    keep_alive,
+    lay_out,
     reference,
 )
 from surfacechem.solvers.radau_advance import (
@@ -45,8 +44,8 @@ FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
 
 END, OUTPUTS, EVENTS, RECORDS = range(4)
-"""Entries of the per-run table of counts after the counters: status, outputs written, events, recorded steps."""
-N_COUNTERS = 6
+"""Entries of the per-run table of counts: status, outputs written, events, recorded steps; then the counters."""
+FIRST_COUNTER, COUNTERS = 4, 6
 
 
 @compiled
@@ -61,12 +60,12 @@ def _write_state(w: Any, row: Any, t: float) -> None:
         row[1 + 2 * n + m] = w.ledger[Q, m]
 
 
-@compiled_once
-def _write_events(w: Any, events: Any, kinds: Any, fired: Any, counts: Any) -> bool:
+@compiled
+def _write_events(w: Any, events: Any, kinds: Any, counts: Any) -> bool:
     """A row for each margin that fired; True if one of them is terminal."""
     terminal = False
     for m in range(kinds.shape[0]):
-        if fired[m]:
+        if w.fired[m] != 0:
             if counts[EVENTS] < events.shape[0]:
                 row = events[counts[EVENTS]]
                 row[0] = m
@@ -92,13 +91,38 @@ def _next_try(h: float, remaining: float) -> float:
 
 
 @compiled
+def _start(w: Any, times: Any, outputs: Any, steps: Any, counts: Any) -> int:
+    """Begin anew at the current state, with the tables begun where it is the first one."""
+    outcome = restart(w)
+    if outcome != GOOD:
+        return outcome
+    if w.margin.shape[1] > 0:
+        start_margins(w)
+        clear(w.fired)
+    if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.clock[BASE]:
+        copy(w.vector[Y], outputs[0])
+        copy(w.ledger[Q], outputs[0, w.algebraic.shape[0] :])
+        counts[OUTPUTS] = 1
+    if counts[RECORDS] == 0:
+        _record(w, steps, counts)
+    return GOOD
+
+
+@compiled
+def _move(w: Any, size: float, reached: float, times: Any, outputs: Any, steps: Any, counts: Any) -> None:
+    """Accept a step of this size, with its outputs."""
+    counts[OUTPUTS] = write_outputs(w, times, outputs, counts[OUTPUTS], size, reached)
+    store_polynomial(w, size, 1.0)
+    accept(w, size)
+    _record(w, steps, counts)
+
+
+@compiled
 def _run_segment(
     w: Any,
     end: float,
     kinds: Any,
-    fired: Any,
-    slopes: Any,
-    limits: Any,
+    max_steps: int,
     stop: Any,
     times: Any,
     outputs: Any,
@@ -107,61 +131,39 @@ def _run_segment(
     counts: Any,
 ) -> int:
     """Integrate to the end of a segment; GOOD, or the status that ends the run."""
-    outcome = restart(w)
-    if outcome != GOOD:
-        return outcome
-    if kinds.shape[0] > 0:
-        start_margins(w, fired)
-        clear(fired)
-    if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.clock[BASE]:
-        copy(w.vector[Y], outputs[0])
-        copy(w.ledger[Q], outputs[0, w.algebraic.shape[0] :])
-        counts[OUTPUTS] = 1
-    if counts[RECORDS] == 0:
-        _record(w, steps, counts)
-    size_last, norm_last = 0.0, 1.0
-    h = first_size(w, end - w.clock[BASE])
-    while True:
+    h, size_last, norm_last = 0.0, 0.0, 1.0
+    while end - w.clock[BASE] - w.clock[TAU] > 0.0:
+        if h == 0.0:
+            outcome = _start(w, times, outputs, steps, counts)
+            if outcome != GOOD:
+                return outcome
+            h, size_last, norm_last = first_size(w, end - w.clock[BASE]), 0.0, 1.0
         remaining = (end - w.clock[BASE]) - w.clock[TAU]
-        if not remaining > 0.0:
-            return GOOD
-        h = _next_try(h, remaining)
-        outcome, h, norm, proposed = advance(w, h, limits[0], stop, size_last, norm_last)
+        outcome, h, norm, proposed = advance(w, _next_try(h, remaining), max_steps, stop, size_last, norm_last)
         if outcome != GOOD:
             return outcome
         finish_step(w, h)
         size = h
         if kinds.shape[0] > 0:
-            size = find_event(w, h, kinds, fired, slopes)
-            if size == 0.0:
-                h *= 0.25
-                w.clock[H_FACTORED] = 0.0
-                continue
-        reached = end if size == remaining else w.clock[BASE] + (w.clock[TAU] + size)
-        counts[OUTPUTS] = write_outputs(w, times, outputs, counts[OUTPUTS], size, reached)
-        store_polynomial(w, size, 1.0)
-        accept(w, size)
-        if size == remaining:
-            w.clock[TAU] = end - w.clock[BASE]
-        _record(w, steps, counts)
-        if kinds.shape[0] > 0 and any_true(fired):
-            if _write_events(w, events, kinds, fired, counts):
-                return EVENT
-            if not end - (w.clock[BASE] + w.clock[TAU]) > 0.0:
-                return GOOD
-            outcome = restart(w)
-            if outcome != GOOD:
-                return outcome
-            start_margins(w, fired)
-            clear(fired)
-            h = first_size(w, end - w.clock[BASE])
-            size_last, norm_last = 0.0, 1.0
+            size = find_event(w, h, kinds)
+        if size == 0.0:
+            h *= 0.25
+            w.clock[H_FACTORED] = 0.0
             continue
+        whole = size == remaining
+        _move(w, size, end if whole else w.clock[BASE] + (w.clock[TAU] + size), times, outputs, steps, counts)
+        if whole:
+            w.clock[TAU] = end - w.clock[BASE]
         size_last, norm_last = h, max(norm, 1e-2)
         h = keep_matrices(w, h, proposed)
+        if kinds.shape[0] > 0 and any_true(w.fired):
+            if _write_events(w, events, kinds, counts):
+                return EVENT
+            h = 0.0
+    return GOOD
 
 
-@compiled_once
+@compiled
 def _run(
     w: Any,
     y0: Any,
@@ -169,55 +171,49 @@ def _run(
     segments: Any,
     times: Any,
     kinds: Any,
-    limits: Any,
+    max_steps: int,
     stop: Any,
     end: Any,
     counts: Any,
-    counters: Any,
     outputs: Any,
     steps: Any,
     events: Any,
 ) -> None:
     n = w.algebraic.shape[0]
-    n_margins = kinds.shape[0]
-    fired = w.fired
-    clear(fired)
+    clear(w.fired)
     clear(w.count)
     clear(w.ledger[Q])
     clear(w.margin[M_LARGEST])
-    w.clock[TAU] = 0.0
-    for j in range(n):
-        w.vector[Y, j] = y0[j]
-        w.vector[YDOT, j] = 0.0
-    status = FINISHED
+    copy(y0, w.vector[Y])
+    clear(w.vector[YDOT])
+    status = GOOD
     for segment in range(segments.shape[0] - 1):
         w.clock[BASE] = segments[segment]
         w.clock[TAU] = 0.0
         copy(parameters[segment], w.inputs[1 + 2 * n :])
-        status = _run_segment(
-            w,
-            segments[segment + 1],
-            kinds,
-            fired,
-            w.margin[M_SLOPE],
-            limits,
-            stop,
-            times,
-            outputs,
-            steps,
-            events,
-            counts,
-        )
+        status = _run_segment(w, segments[segment + 1], kinds, max_steps, stop, times, outputs, steps, events, counts)
         if status != GOOD:
             break
     counts[END] = FINISHED if status == GOOD else status
-    t = segments[-1] if status == GOOD else w.clock[BASE] + w.clock[TAU]
-    _write_state(w, end, t)
-    if n_margins > 0:
-        start_margins(w, fired)
-        copy(w.margin[M_NOW], end[end.shape[0] - n_margins :])
-    for i in range(N_COUNTERS):
-        counters[i] = w.count[i]
+    _write_state(w, end, segments[-1] if status == GOOD else w.clock[BASE] + w.clock[TAU])
+    if kinds.shape[0] > 0:
+        start_margins(w)
+        copy(w.margin[M_NOW], end[end.shape[0] - kinds.shape[0] :])
+    for i in range(COUNTERS):
+        counts[FIRST_COUNTER + i] = w.count[i]
+
+
+@compiled
+def _make_consistent(w: Any, parameters: Any, row: Any, counts: Any) -> None:
+    """The state of a row [t | y | ydot] made consistent in place."""
+    n = w.algebraic.shape[0]
+    w.inputs[0] = row[0]
+    copy(parameters[0], w.inputs[1 + 2 * n :])
+    copy(row[1 : 1 + n], w.vector[TRIAL])
+    copy(row[1 + n : 1 + 2 * n], w.vector[TRIAL_DOT])
+    counts[END] = find_consistent(w)
+    copy(w.vector[TRIAL], row[1:])
+    copy(w.vector[TRIAL_DOT], row[1 + n :])
 
 
 def run_batch(
@@ -225,9 +221,11 @@ def run_batch(
     last: int,
     code: Any,
     algebraic: Any,
-    limits: Any,
+    n_ledger: int,
+    max_steps: int,
     stop: Any,
-    tolerances: Any,
+    rtol: float,
+    atol: Any,
     kinds: Any,
     y0: Any,
     parameters: Any,
@@ -235,20 +233,25 @@ def run_batch(
     times: Any,
     ends: Any,
     counts: Any,
-    counters: Any,
     outputs: Any,
     steps: Any,
     events: Any,
 ) -> None:
     """Runs first to last - 1 of a batch; every run writes to its own rows, so the result does not depend on the
-    threads.
+    threads. Without segments the rows of ``ends`` are made consistent; parameters may then be one row for all.
     """
-    work = allocate(code, algebraic, parameters.shape[2], limits[1], kinds.shape[0])
-    w = reference(work)
-    w.clock[RTOL] = tolerances[0]
-    w.clock[LOOSE] = loosening(tolerances[0])
-    copy(tolerances[1:], w.vector[ATOL])
+    place = np.zeros(1, np.int64)
+    lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0])
+    memory = np.zeros(place[0] // 8, np.int64)
+    place[0] = memory.ctypes.data
+    w = reference(lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0]))
+    w.clock[RTOL] = rtol
+    w.clock[LOOSE] = loosening(rtol)
+    copy(atol, w.vector[ATOL])
     for i in range(first, last):
+        if segments.shape[0] == 0:
+            _make_consistent(w, parameters[i if parameters.shape[0] > 1 else 0], ends[i], counts[i])
+            continue
         _run(
             w,
             y0[i],
@@ -256,31 +259,13 @@ def run_batch(
             segments,
             times,
             kinds,
-            limits,
+            max_steps,
             stop,
             ends[i],
             counts[i],
-            counters[i],
             outputs[i],
             steps[i],
             events[i],
         )
-    keep_alive(work)
-
-
-def make_consistent(code: Any, algebraic: Any, t: Any, y: Any, ydot: Any, parameters: Any, outcomes: Any) -> None:
-    """Consistent states in place, row by row; parameters may be one row for all."""
-    n = algebraic.shape[0]
-    work = allocate(code, algebraic, parameters.shape[1], 0, 0)
-    w = reference(work)
-    for i in range(t.shape[0]):
-        w.inputs[0] = t[i]
-        copy(parameters[i if parameters.shape[0] > 1 else 0], w.inputs[1 + 2 * n :])
-        for j in range(n):
-            w.vector[TRIAL, j] = y[i, j]
-            w.vector[TRIAL_DOT, j] = ydot[i, j]
-        outcomes[i] = find_consistent(w)
-        for j in range(n):
-            y[i, j] = w.vector[TRIAL, j]
-            ydot[i, j] = w.vector[TRIAL_DOT, j]
-    keep_alive(work)
+    # A last use: Numba releases an array after the last statement that names it.
+    memory[0] = 0

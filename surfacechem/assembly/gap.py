@@ -1,0 +1,123 @@
+"""The normal gap where it moves by a balance: inertial, overdamped, quasi-static, under dead load, or rigid."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, derivative, where
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.system import Equilibrium, Fold, State, Transition
+
+FOLD = 1e-7
+"""Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
+
+
+def normal_gap(build: Build) -> None:
+    """Give the normal gap its role; where it moves by a balance, it and its velocity become states."""
+    mount = held(build, "n")
+    if mount is None:
+        return
+    if read_by_potentials(build, "g_n") or not mount.quasi_static:
+        build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
+        build.variables.get("g_n", "the mechanics")
+    else:
+        _rigid(build, mount)
+
+
+def _moving(build: Build, mount: Held) -> Expression:
+    symbol, dot = symengine.symbols("g_n dg_n_dt")
+    initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
+    build.states.append(State(VARIABLES["g_n"], symbol, dot, initial, LENGTH, algebraic=False))
+    build.gap_rates["g_n"] = dot
+    if mount.inertial:
+        velocity, change = symengine.symbols("v_n dv_n_dt")
+        start = build.scene.initial.get("v_n", 0.0)
+        build.states.append(State(VARIABLES["v_n"], velocity, change, start, LENGTH, algebraic=False))
+        build.variables.define("v_n", lambda: velocity, "evolved", mount.by)
+        build.gap_rates["g_n"] = velocity
+    return symbol
+
+
+def _rigid(build: Build, mount: Held) -> None:
+    """An interface that no potential lets open: closed it carries any traction, open it carries none."""
+    if not mount.law.k:
+        raise InputError("a rigid interface under dead load has no opening. Give the mounting a stiffness k.")
+    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"})
+    build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
+    build.variables.define("t_n", partial(_reaction, build, mount, closed), "derived", "equilibrium with the far field")
+    build.variables.define("p", partial(_pressure, build), "derived", "equilibrium with the far field")
+
+
+def _rigid_gap(build: Build, mount: Held, closed: Expression) -> Expression:
+    far = far_field(build, mount)
+    return build.name(VARIABLES["g_n"], (1 - closed) * (far.w + far.F / far.k))
+
+
+def _reaction(build: Build, mount: Held, closed: Expression) -> Expression:
+    far = far_field(build, mount)
+    quantity = Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc")
+    return build.areal(quantity, closed * (far.k * far.w + far.F))
+
+
+def _pressure(build: Build) -> Expression:
+    return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
+
+
+def normal_motion(build: Build) -> None:
+    """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
+    mount = held(build, "n")
+    if mount is None:
+        return
+    g = build.variables.get("g_n", "the mechanics")
+    far = far_field(build, mount)
+    if "g_n" not in build.gap_rates:
+        rate = build.total_derivative(g)
+        far.book(build, g, rate)
+        return
+    rate = build.gap_rates["g_n"]
+    t_n = derivative(build.psi, g)
+    far.book(build, g, rate)
+    if mount.inertial:
+        build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate
+        force = far.force(g, rate) - t_n - far.c_g * rate
+        build.rows["v_n"] = symengine.Symbol("dv_n_dt") - force / far.m
+    elif mount.damped:
+        build.rows["g_n"] = (far.c_b + far.c_g) * rate + t_n - far.k * (far.w - g) - far.c_b * far.w_dot - far.F
+    else:
+        _quasi_static(build, g, far, t_n)
+
+
+def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -> None:
+    """Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find."""
+    residual = far.k * (far.w - g) + far.F - t_n
+    size = far.k * (absolute(far.w) + absolute(g)) + absolute(far.F) + absolute(t_n)
+    build.rows["g_n"] = -build.total_derivative(residual)
+    build.equilibria.append(Equilibrium("g_n", residual, size))
+    tangent = far.k + _slope(build, t_n, g)
+    stiffness = far.k + absolute(derivative(t_n, g))
+    # Under dead load there is no stiffness to compare with; the secant of the traction takes its place.
+    relative = tangent / stiffness if far.k != 0 else where(t_n * g > 0, tangent * g / t_n, 1)
+    build.transitions.append(
+        Transition(
+            "snap",
+            relative - FOLD,
+            "the quasi-static equilibrium of the gap was lost (mechanical fold)",
+            settles=True,
+            fold=Fold("g_n", relative, -derivative(derivative(t_n, g), g)),
+        )
+    )
+
+
+def _slope(build: Build, t_n: Expression, g: Expression) -> Expression:
+    """Tangent of the traction: isentropic where the interface keeps its heat, else isothermal."""
+    slope = derivative(t_n, g)
+    node = build.node_of.get("interface")
+    if node is None or node.prescribed:
+        return slope
+    coupling = derivative(t_n, node.T)
+    return slope + node.T * coupling**2 / node.capacity() if coupling != 0 else slope

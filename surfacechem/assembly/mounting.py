@@ -1,0 +1,138 @@
+"""How the far field holds a direction of the gap: springs, masses, dampers and their energies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.expressions import Expression
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Mounting
+from surfacechem.system import Account
+from surfacechem.terms import Law, Varying, reads
+
+LENGTH = 1e-9
+"""Scale of gaps [m] and of their velocities [m/s] below which errors are absolute."""
+
+AXES = {"n": "normal gap", "t": "tangential displacement"}
+
+
+@dataclass(frozen=True)
+class Held:
+    """The mounting of a direction as the case gives it."""
+
+    law: Mounting
+    axis: str
+    by: str
+
+    @property
+    def inertial(self) -> bool:
+        return self.law.m > 0
+
+    @property
+    def damped(self) -> bool:
+        return self.law.c_b > 0 or self.law.c_g > 0
+
+    @property
+    def quasi_static(self) -> bool:
+        return not (self.inertial or self.damped)
+
+
+def held(build: Build, axis: str) -> Held | None:
+    """The mounting of a direction; a far-field traction alone is a dead load."""
+    scene = build.scene
+    law = scene.normal if axis == "n" else scene.tangential
+    if law is not None:
+        return Held(law, axis, law.path)
+    if f"F_{axis}" in scene.loading:
+        return Held(Mounting(), axis, f"loading.F_{axis}")
+    return None
+
+
+def read_by_potentials(build: Build, name: str) -> bool:
+    """Whether the free energy of the interface depends on a variable."""
+    return any(_reads(law, name) for law in build.interface.potentials)
+
+
+def _reads(law: Law, name: str) -> bool:
+    values = (getattr(law, parameter) for parameter, _ in law.specs())
+    factors = (factor for value in values if isinstance(value, Varying) for factor in value.factors)
+    return name in reads(law.statement) or any(factor.of == name for factor in factors)
+
+
+@dataclass(frozen=True)
+class FarField:
+    """A mounting with its parameters as symbols, and the histories that drive it."""
+
+    axis: str
+    k: Expression
+    m: Expression
+    c_b: Expression
+    c_g: Expression
+    beta_1: Expression
+    w: Expression
+    w_dot: Expression
+    F: Expression
+
+    def force(self, g: Expression, rate: Expression) -> Expression:
+        """Traction with which the far field pulls the gap open [Pa]."""
+        return self.k * (self.w - g) + self.c_b * (self.w_dot - rate) + self.F
+
+    def book(self, build: Build, g: Expression, rate: Expression) -> None:
+        """Energies of the bodies, work of the far field, heat of the dampers."""
+        text = AXES[self.axis]
+        spring, kinetic = self.k * (self.w - g) ** 2 / 2, self.m * rate**2 / 2
+        for name, energy, what in (
+            ("spring", spring, "elastic energy of the bodies"),
+            ("kinetic", kinetic, "kinetic energy"),
+        ):
+            if energy != 0:
+                quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
+                build.mechanical.append(build.name(quantity, energy))
+        bulk = self.w_dot - rate
+        power = (self.k * (self.w - g) + self.c_b * bulk) * self.w_dot + self.F * rate
+        if power != 0:
+            build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
+        if self.c_b != 0:
+            _bulk_damper(build, self, self.c_b * bulk**2)
+        if self.c_g != 0:
+            label = build.unique(f"contact_damper_{self.axis}")
+            build.dissipation[label] = self.c_g * rate**2
+            build.frictions.add(label)
+
+
+def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
+    label = f"bulk_damper_{far.axis}"
+    text = f"the damper of the bodies, {AXES[far.axis]}"
+    symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power)
+    build.ledger.append(
+        Account(Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}"), symbol, "dissipation", label)
+    )
+    produced = symengine.Integer(0)
+    for body, share in zip(build.scene.bodies, (far.beta_1, 1 - far.beta_1), strict=True):
+        node = build.node_of[body.name]
+        node.inflow.append(share * symbol)
+        build.into_body[body.name] += share * symbol
+        produced += share * symbol / node.T
+    build.production(label, text, produced)
+
+
+def far_field(build: Build, mount: Held) -> FarField:
+    """The mounting with symbols for its parameters; made once."""
+    if mount.axis not in build.far_fields:
+        law = build.variables.bind(
+            mount.law, f"mechanics.{'normal' if mount.axis == 'n' else 'tangential'}", f"_{mount.axis}"
+        )
+        w, F = f"w_{mount.axis}", f"F_{mount.axis}"
+        given = build.variables.has(w)
+        needed = law.k != 0 or law.c_b != 0
+        drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
+        force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
+        w_dot = build.rate_of(w) if needed and given else symengine.Integer(0)
+        build.far_fields[mount.axis] = FarField(
+            mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, drive, w_dot, force
+        )
+    far: FarField = build.far_fields[mount.axis]
+    return far

@@ -1,0 +1,243 @@
+"""The tangential motion: exact or elastic sticking, sliding, and what passes from one to the other.
+
+Exact sticking holds the displacement; elastic sticking lets the elastic gap take it up. Sliding is inertial, resisted
+by something that depends on its rate, or rate-independent, in which case the traction itself determines it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, derivative, sign, where
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.system import Equilibrium, Margin, State, Transition
+from surfacechem.terms import Friction, reads
+
+NONE = symengine.Integer(0)
+WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What determines the tangential motion of a scene."""
+
+    mount: Held | None
+    """None where the displacement is prescribed."""
+    elastic: bool
+    """Whether sticking is elastic: the free energy depends on the elastic gap."""
+    sticks: bool
+    """Whether some friction has a limit below which nothing slides."""
+    rate_dependent: bool
+    """Whether what resists sliding depends on its velocity."""
+
+    @property
+    def inertial(self) -> bool:
+        return self.mount is not None and self.mount.inertial
+
+
+def _kind(build: Build) -> Kind | None:
+    mount = held(build, "t")
+    elastic = read_by_potentials(build, "g_t") and "g_t" not in build.scene.loading
+    if mount is None and not (elastic and "u_t" in build.scene.loading):
+        return None
+    laws = build.interface.frictions
+    rate_dependent = any("v" in reads(law.statement) for law in laws)
+    if not elastic and mount is not None:
+        rate_dependent = rate_dependent or mount.damped
+    return Kind(mount, elastic, any(law.has_limit for law in laws), rate_dependent)
+
+
+def tangential_gap(build: Build) -> None:
+    """States and modes of the tangential motion."""
+    build.slip = kind = _kind(build)
+    if kind is None:
+        if build.variables.has("v"):
+            build.variables.define("direction", lambda: sign(build.variables.get("v", "the friction")), "internal", "v")
+        return
+    if kind.sticks:
+        _modes(build, kind)
+    if kind.mount is not None:
+        _displacement(build, kind)
+    if kind.elastic:
+        _elastic_gap(build, kind)
+    if kind.rate_dependent and not (kind.inertial and not kind.elastic):
+        symbol = _state(build, "v", algebraic=True)
+        build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
+    elif not kind.inertial or kind.elastic:
+        build.variables.define("v", partial(_sliding_velocity, build, kind), "derived", "what does not stick")
+
+
+def _modes(build: Build, kind: Kind) -> None:
+    start = sign(symengine.Symbol("v")) if kind.inertial and not kind.elastic else None
+    slip = build.mode("slip", 0.0, WORDS, start)
+    build.variables.define("direction", lambda: slip, "mode", "sticks or slides")
+    build.variables.define("sticking", lambda: 1 - slip**2, "mode", "sticks or slides")
+
+
+def _state(build: Build, name: str, *, algebraic: bool = False) -> Expression:
+    symbol, dot = symengine.symbols(f"{name} d{name}_dt")
+    start = build.scene.initial.get(name, 0.0)
+    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic))
+    return symbol
+
+
+def _displacement(build: Build, kind: Kind) -> None:
+    u = _state(build, "u_t")
+    build.variables.define("u_t", lambda: u, "evolved", "mechanics.tangential")
+    build.gap_rates["u_t"] = symengine.Symbol("du_t_dt")
+    if kind.inertial:
+        name = "v_t" if kind.elastic else "v"
+        velocity = _state(build, name)
+        build.variables.define(name, lambda: velocity, "evolved", "mechanics.tangential")
+        build.gap_rates["u_t"] = velocity
+
+
+def _elastic_gap(build: Build, kind: Kind) -> None:
+    g = _state(build, "g_t")
+    build.variables.define("g_t", lambda: g, "evolved", "elastic sticking")
+    build.gap_rates["g_t"] = symengine.Symbol("dg_t_dt")
+    if kind.mount is None:
+        build.gap_rates["u_t"] = (
+            build.rate_of("u_t") if build.variables.get("u_t", "the elastic gap") is not None else NONE
+        )
+
+
+def _sliding_velocity(build: Build, kind: Kind) -> Expression:
+    rate = build.gap_rates["u_t"]
+    if kind.elastic:
+        rate = rate - build.gap_rates["g_t"]
+    slip = build.variables.get("direction", "sliding")
+    return build.name(VARIABLES["v"], slip**2 * rate)
+
+
+def tangential_motion(build: Build) -> None:
+    """Balance of the tangential tractions, and the transitions between sticking and sliding."""
+    kind = build.slip
+    if kind is None:
+        return
+    far = far_field(build, kind.mount) if kind.mount else None
+    v, rate = build.variables.get("v", "the friction"), build.gap_rates["u_t"]
+    t_f = sum(build.sliding_tractions, NONE)
+    t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
+    carried = t_e if t_e is not None else t_f
+    needed = t_e if t_e is not None else far.force(symengine.Symbol("u_t"), NONE)  # type: ignore[union-attr]
+    slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(1)
+    if far is not None:
+        far.book(build, symengine.Symbol("u_t"), rate)
+        _balance(build, kind, far, slides, t_f, carried)
+    else:
+        build.supply("W_t", "work of the far field on the tangential displacement", carried * rate, None)
+    if kind.elastic:
+        _elastic_rows(build, kind, slides, t_f, t_e, v)
+    _name_traction(build, slides, carried, needed)
+    if kind.sticks:
+        _transitions(build, kind, needed, v)
+
+
+def _name_traction(build: Build, slides: Expression, carried: Expression, needed: Expression) -> None:
+    traction = slides * carried + (1 - slides) * needed
+    build.areal(Quantity("t_t", "Pa", "tangential traction on body 1", "t_t"), traction)
+
+
+def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: Expression, carried: Expression) -> None:
+    """Row of the displacement, and of its velocity where that is a variable of its own."""
+    u, du = symengine.symbols("u_t du_t_dt")
+    rate = build.gap_rates["u_t"]
+    if kind.inertial:
+        name = "v_t" if kind.elastic else "v"
+        moves = symengine.Integer(1) if kind.elastic else slides
+        build.rows["u_t"] = du - rate
+        dv = symengine.Symbol(f"d{name}_dt")
+        build.rows[name] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
+    elif kind.elastic:
+        _elastic_balance(build, far, u, du, carried)
+    elif kind.rate_dependent:
+        v = symengine.Symbol("v")
+        build.rows["u_t"] = du - v
+        driving = far.force(u, v) - t_f - far.c_g * v
+        build.rows["v"] = slides * driving + (1 - slides) * v
+        _stable_sliding(build, slides, driving, v)
+    else:
+        driving = far.force(u, NONE) - t_f
+        build.rows["u_t"] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
+        size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
+        build.equilibria.append(Equilibrium("u_t", slides * driving, size))
+
+
+def _elastic_balance(build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression) -> None:
+    """The body's spring and damper in series with the elastic gap."""
+    if far.c_b != 0 or far.c_g != 0:
+        build.rows["u_t"] = (far.c_b + far.c_g) * du - far.k * (far.w - u) - far.c_b * far.w_dot - far.F + t_e
+        return
+    residual = far.k * (far.w - u) + far.F - t_e
+    build.rows["u_t"] = -build.total_derivative(residual)
+    size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_e)
+    build.equilibria.append(Equilibrium("u_t", residual, size))
+
+
+def _elastic_rows(
+    build: Build, kind: Kind, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
+) -> None:
+    g, dg = symengine.symbols("g_t dg_t_dt")
+    rate = build.gap_rates["u_t"]
+    if kind.rate_dependent:
+        build.rows["g_t"] = dg - (rate - v)
+        driving = t_e - t_f
+        build.rows["v"] = slides * driving + (1 - slides) * v
+        _stable_sliding(build, slides, driving, symengine.Symbol("v"))
+        return
+    residual = t_f - t_e
+    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * derivative(t_e, g) * (dg - rate)
+    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f)))
+
+
+def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
+    """A velocity without inertia is stable while what resists it grows with it."""
+    slope = -derivative(build.expanded(driving), v)
+    if slope == 0:
+        raise InputError(
+            "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
+            "mass or a damper."
+        )
+    reason = "no steady sliding velocity: friction falls faster with velocity than anything else resists; a mass would"
+    build.margins.append(Margin("stable v", where(slides > 0, slope, 1), reason))
+
+
+def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
+    slip = build.variables.get("direction", "sliding")
+    limit = build.stick_limit
+    assert limit is not None
+    breaks = any(law.breaks_bonds for law in build.interface.frictions)
+    jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaks else {}
+    settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
+    for s, word in ((1, "forward"), (-1, "backward")):
+        margin = where(slip**2 > 0, 1, limit - s * needed)
+        reason = f"sticking gives way and the interface slides {word}"
+        build.transitions.append(
+            Transition(
+                f"slip {word}", margin, reason, {slip: symengine.Integer(s)}, jump, settles=settles, sinks="local"
+            )
+        )
+    onward = where(absolute(needed) <= limit, 0, sign(needed))
+    stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
+    build.transitions.append(
+        Transition("stop", where(slip**2 > 0, slip * v, 1), "sliding comes to a stop", {slip: onward}, stop)
+    )
+
+
+def stick_limit(build: Build, law: Friction, bound: Friction) -> None:
+    """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
+    if build.slip is None or not build.slip.sticks:
+        return
+    at_rest = {"v": NONE, "direction": symengine.Integer(1)}
+    kinetic = build.variables.call(bound, bound.statement, at_rest)
+    if law.has_limit:
+        static = build.variables.call(bound, bound.limit, at_rest)
+        kinetic = static if static == kinetic else where(static > kinetic, static, kinetic)
+    build.stick_limit = kinetic if build.stick_limit is None else build.stick_limit + kinetic

@@ -1,0 +1,300 @@
+"""Jumps of the state at a transition: energy is conserved, entropy is tested, gaps find their next equilibrium.
+
+Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (2021), section 6.3, for sudden debonding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Function, compile_function
+from surfacechem.expressions import derivative
+from surfacechem.system import Equilibrium, System, Transition
+
+Array = NDArray[np.float64]
+Curve = Callable[[Sequence[float] | Array], Array]
+
+DRIFT = 100.0
+"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
+
+ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
+
+ROUNDING = 1e-12
+"""Entropy that counts as none, relative to the entropies that change."""
+
+NEWTON = 60
+FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
+"""First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
+
+SMALLEST_GAP = 1e-12
+"""Gap [m] below which the search starts as if from this one."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A state with the parameters that hold there."""
+
+    t: float
+    y: Array
+    ydot: Array
+    parameters: Array
+
+    def inputs(self) -> Array:
+        return np.concatenate(([self.t], self.y, self.ydot, self.parameters))
+
+
+@dataclass(frozen=True)
+class Jump:
+    """What happened at a transition."""
+
+    t: float
+    transition: Transition
+    before: Point
+    after: Point
+    released: float
+    """Energy turned into heat [J/m^2]."""
+    entropy: float
+    """Entropy produced [J/(m^2 K)], what reservoirs take included."""
+    verdict: str
+    since: float = 0.0
+    """Time since the transition before [s], sharper than the difference of their times late in a run."""
+    heat_out: float = 0.0
+    """Heat passed to prescribed temperatures [J/m^2]."""
+    entropy_out: float = 0.0
+
+    @property
+    def stops(self) -> bool:
+        """Whether the run cannot, or may not, go on."""
+        return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.transition.violation == "refuse")
+
+
+class Jumper:
+    """The jumps of a system, compiled when the first one happens."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.states = [state.name for state in system.states]
+        mode_symbols = {mode.symbol for mode in system.modes}
+        self.mode_columns = [j for j, p in enumerate(system.parameters) if p.symbol in mode_symbols]
+
+    @cached_property
+    def _maps(self) -> list[Function]:
+        """For each transition the new states and the new modes."""
+        system = self.system
+        modes = [system.parameters[j].symbol for j in self.mode_columns]
+        return [
+            compile_function(
+                system.inputs,
+                [system.expand(item.jump.get(s.symbol, s.symbol)) for s in system.states]
+                + [system.expand(item.modes.get(m, m)) for m in modes],
+            )
+            for item in system.transitions
+        ]
+
+    @cached_property
+    def _books(self) -> Function:
+        """Total energy and entropy."""
+        totals = [self.system.find(name).expression for name in ("E_total", "S_total")]
+        return compile_function(self.system.inputs, [self.system.expand(item) for item in totals])
+
+    def _sink_function(self, kind: str) -> Function:
+        if kind not in self._sink_functions:
+            sinks = self.system.sinks[kind]
+            columns = [item for s in sinks for item in (s.T, s.share, s.energy, derivative(s.energy, s.T))]
+            expressions = [self.system.expand(item) for item in columns]
+            self._sink_functions[kind] = compile_function(self.system.inputs, expressions)
+        return self._sink_functions[kind]
+
+    @cached_property
+    def _sink_functions(self) -> dict[str, Function]:
+        return {}
+
+    @cached_property
+    def _equilibria(self) -> Function:
+        """Driving traction and size of its parts, for each quasi-static gap."""
+        items = [item for e in self.system.equilibria for item in (e.residual, e.size)]
+        return compile_function(self.system.inputs, [self.system.expand(item) for item in items])
+
+    @cached_property
+    def _folds(self) -> list[Function | None]:
+        """Tangent and curvature of the transitions that are folds."""
+        system = self.system
+        return [
+            compile_function(system.inputs, [system.expand(f.tangent), system.expand(f.curvature)]) if f else None
+            for f in (item.fold for item in system.transitions)
+        ]
+
+    def at_fold(self, index: int, point: Point) -> tuple[Point, float] | None:
+        """The point with its gap at the fold itself, and the direction in which it runs from there.
+
+        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. None where the
+        fold is out of reach.
+        """
+        fold, function = self.system.transitions[index].fold, self._folds[index]
+        assert fold is not None
+        assert function is not None
+        column = 1 + self.states.index(fold.state)
+        base = point.inputs()
+        direction = float(np.sign(function(base)[1]))
+
+        def tangent(gaps: Sequence[float] | Array) -> Array:
+            rows = np.repeat(base[None], len(gaps), axis=0)
+            rows[:, column] = gaps
+            return np.atleast_2d(function(rows))[:, 0]
+
+        g = _zero_ahead(tangent, float(base[column]), direction, 1.0)
+        if g is None:
+            return None
+        y = point.y.copy()
+        y[column - 1] = g
+        return Point(point.t, y, point.ydot, point.parameters), direction
+
+    def lost_equilibrium(self, point: Point, rtol: float) -> int | None:
+        """The fold that is so close to a point that time cannot tell them apart."""
+        for index, item in enumerate(self.system.transitions):
+            found = self.at_fold(index, point) if item.fold else None
+            if found is not None and self._is_close(index, point, found[0], DRIFT * rtol):
+                return index
+        return None
+
+    def _is_close(self, index: int, point: Point, fold: Point, tolerance: float) -> bool:
+        state = self.system.transitions[index].fold.state  # type: ignore[union-attr]
+        number = [e.state for e in self.system.equilibria].index(state)
+        size, left = (abs(float(self._equilibria(p.inputs())[2 * number + 1 - k])) for k, p in ((0, point), (1, fold)))
+        return left <= tolerance * size
+
+    def settle(self, point: Point) -> Point | None:
+        """The point with its quasi-static gaps in equilibrium, temperatures held; None where there is none."""
+        for e in self.system.equilibria:
+            found = self._next_equilibrium(point, e, "", 0.0, 0.0)
+            if found is None:
+                return None
+            point = found
+        return point
+
+    def make(self, index: int, before: Point) -> Jump:
+        """Carry out a transition."""
+        item = self.system.transitions[index]
+        values = self._maps[index](before.inputs())
+        n = len(before.y)
+        parameters = before.parameters.copy()
+        parameters[self.mode_columns] = values[n:]
+        start = Point(before.t, values[:n], np.zeros(n), parameters)
+        energy, entropy = self._books(before.inputs())
+        after: Point | None = start
+        if item.settles:
+            direction = 0.0
+            if item.fold is not None:
+                found = self.at_fold(index, before)
+                if found is not None:
+                    before, direction = found
+                    after = Point(start.t, before.y, start.ydot, parameters)
+            for e in self.system.equilibria:
+                after = after and self._next_equilibrium(after, e, item.sinks, energy, direction)
+        heated = self._heated(after, item.sinks, energy) if after is not None else None
+        if heated is None:
+            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE)
+        final, released, out, taken = heated
+        return self._judged(
+            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, heat_out=out, entropy_out=taken),
+            float(entropy),
+        )
+
+    def _judged(self, jump: Jump, before: float) -> Jump:
+        """The jump with the entropy it produces, and what the second law says of that."""
+        after = float(self._books(jump.after.inputs())[1])
+        gain = after - before + jump.entropy_out
+        size = max(abs(before), abs(after), abs(jump.entropy_out))
+        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -ROUNDING * size else VIOLATES)
+
+    def _heated(self, point: Point, kind: str, energy: float) -> tuple[Point, float, float, float] | None:
+        """The point with the released energy in its sinks: point, energy, heat and entropy passed to reservoirs."""
+        rows = point.inputs()[None]
+        heated, released = self._temperatures(rows, kind, energy)
+        if not np.all(np.isfinite(heated)):
+            return None
+        n = len(point.y)
+        sinks = self._sink_function(kind)(rows)[0].reshape(-1, 4)
+        out = [
+            (s, float(row[1] * released[0]), float(row[0]))
+            for s, row in zip(self.system.sinks[kind], sinks, strict=True)
+        ]
+        passed = [(heat, T) for s, heat, T in out if s.prescribed]
+        final = Point(point.t, heated[0, 1 : 1 + n], point.ydot, point.parameters)
+        return final, float(released[0]), sum(heat for heat, _ in passed), sum(heat / T for heat, T in passed)
+
+    def _temperatures(self, rows: Array, kind: str, energy: float) -> tuple[Array, Array]:
+        """Inputs with the temperatures that take up what is missing from the energy, and the energy released."""
+        rows = rows.copy()
+        released = energy - np.atleast_2d(self._books(rows))[:, 0]
+        function, sinks = self._sink_function(kind), self.system.sinks[kind]
+        start = np.atleast_2d(function(rows)).reshape(len(rows), -1, 4)
+        target = start[:, :, 2] + start[:, :, 1] * released[:, None]
+        columns = [None if s.prescribed else 1 + self.states.index(s.node) for s in sinks]
+        for _ in range(NEWTON):
+            now = np.atleast_2d(function(rows)).reshape(len(rows), -1, 4)
+            change = (target - now[:, :, 2]) / now[:, :, 3]
+            done = True
+            for j, column in enumerate(columns):
+                if column is None:
+                    continue
+                T = rows[:, column]
+                moved = T + change[:, j]
+                # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
+                rows[:, column] = np.where(moved > 0, moved, np.nan)
+                done = done and bool(np.all(~(np.abs(change[:, j]) > 4e-16 * np.abs(T))))
+            if done:
+                break
+        return rows, released
+
+    def _next_equilibrium(
+        self, point: Point, e: Equilibrium, kind: str, energy: float, direction: float
+    ) -> Point | None:
+        """The nearest zero of the driving traction in the direction in which it pushes."""
+        column = 1 + self.states.index(e.state)
+        number = self.system.equilibria.index(e)
+        base = point.inputs()
+
+        def driving(gaps: Sequence[float] | Array) -> Array:
+            rows = np.repeat(base[None], len(gaps), axis=0)
+            rows[:, column] = gaps
+            if kind:
+                heated, _ = self._temperatures(rows, kind, energy)
+                rows = np.where(np.isfinite(heated), heated, rows)
+            return np.asarray(np.atleast_2d(self._equilibria(rows))[:, 2 * number])
+
+        g = self._march(driving, float(base[column]), direction)
+        if g is None:
+            return None
+        y = point.y.copy()
+        y[column - 1] = g
+        return Point(point.t, y, point.ydot, point.parameters)
+
+    def _march(self, driving: Curve, start: float, direction: float) -> float | None:
+        """The gap at which the push of the driving traction, or that from a fold, ends."""
+        push = float(np.sign(driving([start])[0]))
+        if push == 0.0 and direction == 0.0:
+            return start
+        return _zero_ahead(driving, start, direction or push, direction or push)
+
+
+def _zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> float | None:
+    """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
+    from scipy.optimize import brentq
+
+    size = FIRST * max(abs(start), SMALLEST_GAP)
+    gaps = start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1)
+    values = sign * curve(np.asarray(gaps))
+    first = int(np.argmax(values > 0))
+    crossed = np.nonzero(~(values[first:] > 0))[0]
+    if not values[first] > 0 or len(crossed) == 0 or not np.isfinite(values[first + crossed[0]]):
+        return None
+    j = first + int(crossed[0])
+    if values[j] == 0.0:
+        return float(gaps[j])
+    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300))

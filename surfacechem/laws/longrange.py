@@ -1,0 +1,214 @@
+r"""Long-range interaction of surfaces that do not touch: Lennard-Jones type, van der Waals, electrostatic.
+
+Between flats the energy is per area. Between a sphere and a plane it is divided by a reference area, the one that all
+other quantities of the scene are per: the tension is the attractive force over that area. The force of a sphere of
+sites on its surface is exact, :math:`F = -2\pi R\,[W(g_n) - W(g_n + 2R)]` with the energy W(g_n) between flats.
+Derjaguin's approximation drops the second term.
+"""
+
+from __future__ import annotations
+
+import math
+
+from surfacechem.expressions import Expression, is_symbolic, log, where
+from surfacechem.laws._sites import InteractingSites
+from surfacechem.terms import Potential, parameter
+
+WALL = 0.01
+"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
+
+ATOMIC = 1.65e-10
+"""Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
+
+
+class LennardJonesFlatFlat(InteractingSites):
+    r"""Lennard-Jones type attraction and repulsion between sites on two flats.
+
+    .. math::
+        \Psi = A g_0^2 \left[ \frac1{360} \left( \frac{g_0}{g_n} \right)^8
+        - \frac16 \left( \frac{g_0}{g_n} \right)^2 \right], \quad A = 2 \pi n_1 n_2 \psi_0
+
+    The sum of :math:`\psi_{12} = \psi_0 [\frac1{45} (g_0/r)^{10} - \frac13 (g_0/r)^4]` over all pairs. No traction at
+    :math:`g_0 15^{-1/6}`, where the adhesion energy is :math:`\frac{15^{1/3}}8 A g_0^2`; strength
+    :math:`\frac{2\sqrt5}9 A g_0` at :math:`g_0 5^{-1/6}`. Source: Sauer, Duong & Mandadapu (2021), eqs. e:psi12ex and
+    e:bt_sr. g_n > 0; below :math:`0.01\,g_0` the energy goes on as its parabola.
+
+    >>> flats = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
+    >>> round(flats.energy(g_n=3e-9), 12)
+    -0.002261946673
+    """
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (1 / 360, 8), (-1 / 6, 2))
+
+
+class LennardJonesSpherePlane(InteractingSites):
+    r"""Lennard-Jones type attraction and repulsion between sites on a sphere and on a plane, exact.
+
+    .. math::
+        t_n = -\frac{2 \pi R}{a} [W(g_n) - W(g_n + 2R)], \quad
+        \Psi = \frac{2 \pi R}{a} [V(g_n) - V(g_n + 2R)], \quad
+        V = A g_0^3 \left[ \frac1{2520} \left( \frac{g_0}{g} \right)^7 - \frac16 \frac{g_0}{g} \right]
+
+    W is the energy between flats. The double sum over all pairs, for any ratio of radius and gap. Source: integral of
+    Sauer, Duong & Mandadapu (2021), eq. e:psi12ex, over sphere and plane. g_n > 0; below :math:`0.01\,g_0` the energy
+    goes on as its parabola.
+
+    >>> tip = LennardJonesSpherePlane(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10, R=5e-8, area=1e-16)
+    >>> f"{tip.energy(g_n=3e-9):.9g}"
+    '-0.0206974228'
+    """
+
+    R: float = parameter("m", "radius of the sphere", above=0)
+    area: float = parameter("m^2", "reference area", above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        near, far = (_repelling(gap / self.g_0, (1 / 2520, 7), (-1 / 6, 1)) for gap in (g_n, g_n + 2 * self.R))
+        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
+
+
+class LennardJonesDerjaguin(InteractingSites):
+    r"""Lennard-Jones type attraction and repulsion between a large sphere and a plane.
+
+    .. math::
+        t_n = -\frac{2 \pi R}{a} W(g_n), \quad
+        \Psi = \frac{2 \pi R}{a} A g_0^3 \left[ \frac1{2520} \left( \frac{g_0}{g_n} \right)^7
+        - \frac16 \frac{g_0}{g_n} \right]
+
+    W is the energy between flats. Pull-off force :math:`2 \pi R` times the adhesion energy of flats. Two surfaces of
+    radii :math:`R_1, R_2` count as one sphere of :math:`R_1 R_2 / (R_1 + R_2)`.
+    Source: Derjaguin (1934), doi 10.1007/BF01433225, with Sauer, Duong & Mandadapu (2021), eq. e:psi12ex. g_n > 0, and
+    R much larger than g_n: the error is about :math:`(g_n / 2R)^2` of the attraction.
+
+    >>> tip = LennardJonesDerjaguin(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10, R=5e-8, area=1e-16)
+    >>> f"{tip.energy(g_n=3e-9):.9g}"
+    '-0.0213183455'
+    """
+
+    R: float = parameter("m", "radius of the sphere", above=0)
+    area: float = parameter("m^2", "reference area", above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        shape = _repelling(g_n / self.g_0, (1 / 2520, 7), (-1 / 6, 1))
+        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
+
+
+class VanDerWaalsFlatFlat(Potential):
+    r"""Van der Waals attraction between two half-spaces.
+
+    .. math:: \Psi = -\frac{A_H}{12 \pi (g_n + D_0)^2}, \quad t_n = \frac{A_H}{6 \pi (g_n + D_0)^3}
+
+    The gap counts from contact, where the outermost atoms are :math:`D_0` apart: there the energy is the work of
+    adhesion :math:`A_H / 12 \pi D_0^2`. Below contact the traction stays what it is at contact; a law of contact has to
+    bear it.
+
+    Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7; cut-off of Israelachvili, Intermolecular and Surface
+    Forces (2011), ch. 13. Not retarded: gaps below about 10 nm.
+
+    >>> round(VanDerWaalsFlatFlat(A_H=6.5e-20).energy(g_n=0.0), 6)
+    -0.063331
+    """
+
+    A_H: float = parameter("J", "Hamaker constant", at_least=0)
+    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=ATOMIC, above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        distance = _outside(g_n) + self.D_0
+        contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
+        return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
+
+
+class VanDerWaalsSpherePlane(Potential):
+    r"""Van der Waals attraction between a sphere and a half-space, exact.
+
+    .. math::
+        \Psi = -\frac{A_H}{6 a} \left[ \frac R h + \frac R{h + 2R} + \ln \frac h{h + 2R} \right], \quad
+        t_n = \frac{2 A_H R^3}{3 a h^2 (h + 2R)^2}, \quad h = g_n + D_0
+
+    For a large sphere :math:`a\,t_n = A_H R / 6 h^2`. The gap counts from contact, where the outermost atoms are
+    :math:`D_0` apart. Below contact the traction stays what it is at contact; a law of contact has to bear it.
+
+    Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7. Not retarded: gaps below about 10 nm.
+
+    >>> round(VanDerWaalsSpherePlane(A_H=6.5e-20, R=5e-8, area=1e-16).energy(g_n=0.0), 6)
+    -0.032188
+    """
+
+    A_H: float = parameter("J", "Hamaker constant", at_least=0)
+    R: float = parameter("m", "radius of the sphere", above=0)
+    area: float = parameter("m^2", "reference area", above=0)
+    D_0: float = parameter("m", "distance of the outermost atoms in contact", default=ATOMIC, above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        slope = 4 * self.R**3 / (self.D_0**2 * (self.D_0 + 2 * self.R) ** 2)
+        apart, contact = self._shape(_outside(g_n) + self.D_0), self._shape(self.D_0)
+        return self.A_H / (6 * self.area) * where(g_n > 0, apart, contact + slope * g_n)
+
+    def _shape(self, h: Expression) -> Expression:
+        far = h + 2 * self.R
+        return -self.R / h - self.R / far - log(h / far)
+
+
+class ElectrostaticFlatFlat(Potential):
+    r"""Coulomb interaction of two charged flats.
+
+    .. math:: \Psi = -\frac{s_1 s_2}{2 \varepsilon} g_n, \quad t_n = -\frac{s_1 s_2}{2 \varepsilon}
+
+    Charges of one sign repel. The traction does not fall with the gap as long as that is small against the flats.
+    Source: Coulomb's law summed over two planes (Jackson, Classical Electrodynamics, 1999, ch. 1); Sauer, Duong &
+    Mandadapu (2021), remark r:59. Fixed charges; any g_n.
+
+    >>> round(ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4).energy(g_n=1e-6), 8)
+    0.00112941
+    """
+
+    s_1: float = parameter("C/m^2", "charge density of body 1")
+    s_2: float = parameter("C/m^2", "charge density of body 2")
+    epsilon: float = parameter("F/m", "permittivity of the medium", default=8.8541878128e-12, above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return -self.s_1 * self.s_2 / (2 * self.epsilon) * g_n
+
+
+class ElectrostaticSpherePlane(Potential):
+    r"""Coulomb interaction of a sphere, charged on its surface, with a charged plane.
+
+    .. math:: \Psi = -\frac{2 \pi R^2 s_1 s_2}{\varepsilon\,a} g_n
+
+    Source: Coulomb's law summed over sphere and plane: the charge :math:`4 \pi R^2 s_1` in the field
+    :math:`s_2 / 2 \varepsilon` of the plane (Jackson, Classical Electrodynamics, 1999, ch. 1). Fixed charges; any g_n.
+
+    >>> round(ElectrostaticSpherePlane(s_1=1e-4, s_2=-2e-4, R=1e-6, area=1e-12).energy(g_n=1e-6), 8)
+    0.01419257
+    """
+
+    s_1: float = parameter("C/m^2", "charge density of the sphere")
+    s_2: float = parameter("C/m^2", "charge density of the plane")
+    R: float = parameter("m", "radius of the sphere", above=0)
+    area: float = parameter("m^2", "reference area", above=0)
+    epsilon: float = parameter("F/m", "permittivity of the medium", default=8.8541878128e-12, above=0)
+
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return -2 * math.pi * self.R**2 * self.s_1 * self.s_2 / (self.epsilon * self.area) * g_n
+
+
+def _outside(g_n: Expression) -> Expression:
+    """The gap where the formula for open gaps is looked at; of floats both branches are."""
+    return g_n if is_symbolic(g_n) else max(g_n, 0.0)
+
+
+def _repelling(x: Expression, *terms: tuple[float, int]) -> Expression:
+    """Sum of c x^-n, continued by its parabola below WALL, where nothing comes but trial states of a solver."""
+    level, slope, curvature = (
+        sum(c * math.prod(-n - i for i in range(order)) * WALL ** (-n - order) for c, n in terms) for order in range(3)
+    )
+    inside, beyond = x if is_symbolic(x) else max(x, WALL), x - WALL
+    powers = sum(c * inside**-n for c, n in terms)
+    return where(x > WALL, powers, level + beyond * (slope + beyond * curvature / 2))

@@ -1,0 +1,39 @@
+"""Linear elastic contact in series with elastic bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+
+class ElasticContact(Reference):
+    r"""Elastic bodies pressed or pulled through an elastic interface; the penalty limit is rigid contact.
+
+    .. math:: g_n=\frac{kw}{k+E_n},\quad t_n=E_ng_n,\quad\tfrac12E_ng_n^2=\frac{t_n^2}{2E_n}
+
+    For :math:`E_n\to\infty` the traction tends to k w and the energy of the contact to nothing.
+    Here :math:`w=w_i+\dot wt`; with a unilateral penalty w <= 0. Any stiffness: the energies are good to rounding over
+    all decades.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c, in series with a spring.
+
+    >>> contact = ElasticContact(k=1e12, E_n=1e15, w_i=-1e-8)
+    >>> f"{contact.solution(0.0)['t_n']:.6f}"
+    '-9990.009990'
+    """
+
+    name: ClassVar[str] = "elastic-contact"
+
+    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
+    E_n: float = parameter("Pa/m", "contact stiffness", above=0)
+    w_i: float = parameter("m", "initial far-field displacement")
+    rate: float = parameter("m/s", "speed of the far field", default=0.0)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        w = self.w_i + self.rate * t
+        g, delta = self.k / (self.k + self.E_n) * w, self.E_n / (self.k + self.E_n) * w
+        energies = {"U_bulk": 0.5 * self.k * delta**2, "U_contact": 0.5 * self.E_n * g**2}
+        return {"w": w, "g_n": g, "t_n": self.E_n * g, **energies}
