@@ -90,8 +90,7 @@ MISTAKES = [
     (
         "loading: {v:",
         "loading: {w:",
-        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, w_n, "
-        "w_t.",
+        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, w_n",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
