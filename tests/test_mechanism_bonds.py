@@ -19,6 +19,7 @@ from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttac
 from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.kinds import names
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene, Sites
