@@ -17,6 +17,9 @@ BOLTZMANN = 1.380649e-23
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant [J/(mol K)] (exact, SI 2019)."""
 
+STEFAN_BOLTZMANN = 5.670374419e-8
+"""Stefan-Boltzmann constant [W/(m^2 K^4)] (SI 2019, rounded)."""
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -40,6 +43,8 @@ VARIABLES = _table(
     ("T_2", "K", "temperature of body 2", "T_2"),
     ("T_c", "K", "interface temperature", "T_c"),
     ("T_a", "K", "temperature of the surroundings", "T_a"),
+    ("T_from", "K", "temperature of the first end of a heat path"),
+    ("T_to", "K", "temperature of the second end of a heat path"),
     ("phi", "1", "bonding state: bonded sites per reference site", r"\phi", "e:phi_def"),
     ("g_n", "m", "normal gap", "g_n"),
     ("g_t", "m", "elastic tangential gap", "g_t"),

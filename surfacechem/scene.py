@@ -65,7 +65,8 @@ class Interface:
     """What stands between the bodies.
 
     ``temperature`` is the interface's node, a prescribed history, or None where there is no medium: then friction and
-    reaction heat go straight into the bodies, the fraction ``partition`` into body 1.
+    reaction heat go straight into the bodies, the fraction ``partition`` into body 1, the fraction ``loss`` into the
+    surroundings and the rest into body 2.
     """
 
     temperature: str | Load | None = None
@@ -77,6 +78,7 @@ class Interface:
     variables: Sequence[BondingVariable] = ()
     bonds: Sequence[str] = ()
     """Names of those variables that count as bonds where phi is not itself a state."""
+    loss: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def _interface() -> Schema:
     properties = {
         "temperature": _ref("temperature"),
         "sites": {"anyOf": [density, sides]},
-        "partition": _quantity("fraction of heat into body 1 where there is no medium"),
+        "partition": _shares(),
         "potential": _list(Potential, "terms of the free energy"),
         "friction": _list(Friction, "friction laws, whose tractions add up"),
         "bonding": _list(RateLaw, "reactions, whose rates add up"),
@@ -109,6 +109,13 @@ def _interface() -> Schema:
     }
     assert set(properties) == set(INTERFACE_KEYS)
     return _object(properties)
+
+
+def _shares() -> Schema:
+    fraction = _quantity("fraction of the heat")
+    into = {"type": "object", "additionalProperties": fraction}
+    text = "fraction of heat into body 1 where there is no medium, or fractions by body, the rest to the surroundings"
+    return {"description": text, "anyOf": [fraction, into]}
 
 
 def _initial() -> Schema:

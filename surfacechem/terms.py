@@ -27,7 +27,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self, dataclass_transform
+from typing import Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
@@ -128,6 +128,11 @@ class Law(ABC):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Ranges of variables outside which the law is an extrapolation; a run that leaves them says so."""
+        return {}
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Ranges of variables outside which the law has no value; a run that reaches an end of them stops."""
         return {}
 
     @property
@@ -249,13 +254,26 @@ class RateLaw(Law):
 
 
 class HeatTransfer(Law):
-    """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold."""
+    """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold.
+
+    A formula that reads ``T_from`` and ``T_to`` gets the temperatures of the two ends.
+    """
 
     contract = "heat"
     formula = "conductance"
+    channel: ClassVar[str] = "conduction"
+    """What carries the heat, for the names of fluxes."""
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
+    closure: Literal["direct", "medium"] = option(
+        "'direct' from end to end, or 'medium': through the interface, with twice the conductance on each side",
+        default="direct",
+    )
     conductance: ClassVar[Callable[..., Expression]]
+
+    def channels(self) -> Mapping[str, Callable[..., Expression]]:
+        """The conductances in parallel that the whole is the sum of, by what carries the heat."""
+        return {self.channel: self.statement}
 
 
 class Load(Law):

@@ -1,6 +1,6 @@
 """From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
 
-Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals.
+Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals, touch.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, totals
+from surfacechem.assembly.touch import touch
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
 from surfacechem.system import System
@@ -28,6 +29,7 @@ STAGES = (
     heat_paths,
     equations,
     totals,
+    touch,
 )
 
 
@@ -50,7 +52,7 @@ def assemble(scene: Scene) -> System:
         ranges=tuple(build.ranges),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
-        warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),
+        warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
     )
 
 

@@ -60,8 +60,8 @@ class Build:
         """Power that each interface law turns into heat [W/m^2], by the law's label."""
         self.into_body: dict[str, Expression] = {}
         """Heat that reaches each body other than through the interface [W/m^2]."""
-        self.from_interface: dict[str, Expression] = {}
-        """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
+        self.from_interface: dict[str, dict[str, Expression]] = {}
+        """Heat that each body receives from the interface and the other body by stated laws, by channel [W/m^2]."""
         self.loads: dict[str, Load] = {}
         """Histories that are in use, by variable."""
         self.rates: dict[Any, Expression] = {}
@@ -70,6 +70,9 @@ class Build:
         """Power and heat that flow into the interface [W/m^2]."""
         self.breakpoints: set[float] = set()
         self.ranges: list[Range] = []
+        self.conductances: dict[tuple[str, str], list[Expression]] = {}
+        """Conductances in parallel between two ends [W/(m^2 K)]."""
+        self.warnings: list[str] = []
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
@@ -182,15 +185,26 @@ class Build:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
+        for name, (low, high) in law.limits.items():
+            value, slack = self.variables.get(name, law), NOTHING * (high - low)
+            reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
+            self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
+            self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
 
-    def shares(self) -> tuple[Expression, Expression]:
-        """Fractions of the interface's heat that go into body 1 and 2 where there is no medium."""
-        if not self.variables.has("partition"):
-            path, value = "interface.partition", self.interface.partition
-            spec = Spec("1", "fraction of heat into body 1", at_least=0, at_most=1)
-            self.variables.define("partition", lambda: self.constant("alpha", path, spec, value), "constant", path)
-        alpha = self.variables.get("partition", "the interface")
-        return alpha, 1 - alpha
+    def shares(self) -> dict[str, Expression]:
+        """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""
+        alpha = self._share("alpha", "interface.partition", self.interface.partition, "body 1")
+        first, second = (body.name for body in self.scene.bodies)
+        if not self.interface.loss:
+            return {first: alpha, second: 1 - alpha}
+        loss = self._share("alpha_a", "interface.partition.surroundings", self.interface.loss, "the surroundings")
+        return {first: alpha, second: 1 - alpha - loss, "surroundings": loss}
+
+    def _share(self, name: str, path: str, value: float, end: str) -> Expression:
+        if not self.variables.has(path):
+            spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
+            self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
+        return self.variables.get(path, "the interface")
 
     def expanded(self, expression: Expression) -> Expression:
         """The expression without names of quantities."""

@@ -23,7 +23,7 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     Potential: ("bonding", "contact"),
     RateLaw: ("kinetics",),
     Friction: ("friction",),
-    HeatTransfer: ("heat",),
+    HeatTransfer: ("heat", "contact_conductance", "gap_conductance"),
     Load: ("loading",),
     Factor: ("factors",),
 }
