@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from surfacechem.errors import InputError
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw
+from surfacechem.terms import BodyEnergy, Fluid, Friction, HeatTransfer, Load, Potential, Property, RateLaw
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,18 @@ class BondingVariable:
 
 
 @dataclass(frozen=True)
+class Medium:
+    """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
+
+    A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap.
+    """
+
+    fluid: Fluid | None = None
+    properties: Mapping[str, float | Property] = field(default_factory=dict)
+    thickness: float | None = None
+
+
+@dataclass(frozen=True)
 class Interface:
     """What stands between the bodies.
 
@@ -79,6 +91,7 @@ class Interface:
     bonds: Sequence[str] = ()
     """Names of those variables that count as bonds where phi is not itself a state."""
     loss: float = 0.0
+    medium: Medium | None = None
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,18 @@ from typing import Any
 from surfacechem import laws, references, solvers
 from surfacechem.assembly import LOADABLE
 from surfacechem.case import TOP_KEYS
+from surfacechem.case.medium import MEDIUM_KEYS, PROPERTIES
 from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.quantities import VARIABLES
-from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Load, Potential, RateLaw, Spec
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Load, Potential, Property, RateLaw, Spec
 
 Schema = dict[str, Any]
 
 QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
 """A number, with or without a unit."""
 
-CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Load, Factor)
+CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Property, Load, Factor)
 
 _TEXTS = {
     "until": "end of the run [s]",
@@ -102,6 +103,7 @@ def _interface() -> Schema:
         "temperature": _ref("temperature"),
         "sites": {"anyOf": [density, sides]},
         "partition": _shares(),
+        "medium": _medium(),
         "potential": _list(Potential, "terms of the free energy"),
         "friction": _list(Friction, "friction laws, whose tractions add up"),
         "bonding": _list(RateLaw, "reactions, whose rates add up"),
@@ -109,6 +111,15 @@ def _interface() -> Schema:
     }
     assert set(properties) == set(INTERFACE_KEYS)
     return _object(properties)
+
+
+def _medium() -> Schema:
+    law = {"anyOf": [_ref("quantity"), _ref(Property.contract)]}
+    properties = {key: {**law, "description": _variable(name)} for key, name in PROPERTIES.items()}
+    fluid = {"fluid": _string("name of a fluid that CoolProp knows"), "pressure": _quantity("pressure [Pa]")}
+    found = _object({**fluid, "thickness": _quantity("thickness, else the normal gap [m]"), **properties})
+    assert set(found["properties"]) == set(MEDIUM_KEYS)
+    return {**found, "description": "what fills the space between the bodies"}
 
 
 def _shares() -> Schema:

@@ -11,6 +11,7 @@ import symengine
 
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
+from surfacechem.refit import Fit
 from surfacechem.terms import Load, Spec
 
 
@@ -133,6 +134,8 @@ class System:
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()
+    fit: Fit | None = None
+    """How the properties of the medium's fluid follow a run; None where nothing reads any."""
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:

@@ -12,6 +12,7 @@ contract           states                                              audited f
 :class:`Friction`      traction that opposes sliding                       traction * v >= 0
 :class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
+:class:`Property`      property of the medium between the bodies           --
 :class:`Load`          prescribed history of a variable                    --
 :class:`Factor`        how a parameter varies with one variable            --
 =================  ==================================================  ===========================
@@ -27,10 +28,13 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
+
+if TYPE_CHECKING:
+    from surfacechem.fits import Piece
 
 
 @dataclass(frozen=True)
@@ -274,6 +278,46 @@ class HeatTransfer(Law):
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """The conductances in parallel that the whole is the sum of, by what carries the heat."""
         return {self.channel: self.statement}
+
+
+class Property(Law):
+    """Property of the medium between the bodies, as a function of temperature and pressure."""
+
+    contract = "property"
+    formula = "value"
+    quantity: ClassVar[str]
+    """Name of the property in the table of quantities."""
+
+    value: ClassVar[Callable[..., Expression]]
+
+
+@dataclass(frozen=True)
+class FluidRange:
+    """Temperatures [K] at which a fluid stays what it is, and what happens beyond."""
+
+    low: float
+    high: float
+    reason_low: str
+    reason_high: str
+
+
+class Fluid(ABC):
+    """A substance whose properties have no formula; they are fitted where a scene reads them.
+
+    Properties go by the names of the table of quantities; ``capacity_m`` is the heat capacity per volume over T,
+    rho_m cp_m / T [J/(m^3 K^2)].
+    """
+
+    name: str
+    pressure: float
+
+    @abstractmethod
+    def range(self, T: float) -> FluidRange:
+        """Temperatures around T [K] at which it has properties; InputError where it has none at T."""
+
+    @abstractmethod
+    def fit(self, quantity: str, low: float, high: float) -> tuple[Piece, ...]:
+        """A property between two temperatures [K]; InputError where it has none."""
 
 
 class Load(Law):

@@ -113,7 +113,7 @@ def test_refuses_what_is_not_finite_or_out_of_range(law):
 def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest():
     assert find(Friction, "coulomb").name() == "coulomb"
     with pytest.raises(
-        InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: coulomb, viscous"
+        InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: coulomb, film-shear, viscous"
     ):
         find(Friction, "colomb")
 

@@ -12,16 +12,16 @@ import surfacechem.data
 
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
-    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
+    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
     "contracts": ["terms", "scene"],
-    "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
+    "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "events", "integrate"],
     "results": ["solution", "audit"],
     "studies": ["references.*", "sweep", "precision", "stability", "check", "listing", "plots", "printing", "report"],
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
-WING = ["laws.*", "mechanism.*"]
+WING = ["laws.*", "mechanism.*", "media.*"]
 WING_SEES = ["words", "contracts"]
 SEES_WING = ["studies", "doors"]
 

@@ -1,6 +1,6 @@
 """From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
 
-Each stage is a module: temperatures, interface, chemistry, exchange, equations, totals, touch.
+Each stage is a module: temperatures, interface, medium, chemistry, exchange, equations, totals, touch.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
+from surfacechem.assembly.medium import medium
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, totals
 from surfacechem.assembly.touch import touch
@@ -23,6 +24,7 @@ STAGES = (
     temperatures,
     prescribed_variables,
     bonding_variables,
+    medium,
     free_energy,
     reactions,
     friction,
@@ -52,6 +54,7 @@ def assemble(scene: Scene) -> System:
         ranges=tuple(build.ranges),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
+        fit=build.fit() if build.fit else None,
         warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
     )
 

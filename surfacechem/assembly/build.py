@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from surfacechem.balances import Node
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
+from surfacechem.refit import Fit
 from surfacechem.scene import Scene
 from surfacechem.system import Account, Margin, Named, Range, State
 from surfacechem.terms import Law, Load, Spec
@@ -73,6 +75,8 @@ class Build:
         self.conductances: dict[tuple[str, str], list[Expression]] = {}
         """Conductances in parallel between two ends [W/(m^2 K)]."""
         self.warnings: list[str] = []
+        self.fit: Callable[[], Fit] | None = None
+        """The fit of the medium's fluid, once a law asks for one of its properties."""
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
@@ -185,11 +189,14 @@ class Build:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
-        for name, (low, high) in law.limits.items():
-            value, slack = self.variables.get(name, law), NOTHING * (high - low)
+        for name, ends in law.limits.items():
+            value, (low, high) = self.variables.get(name, law), ends
+            slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
             reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
-            self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
-            self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
+            if math.isfinite(low):
+                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
+            if math.isfinite(high):
+                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
 
     def shares(self) -> dict[str, Expression]:
         """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""

@@ -12,13 +12,14 @@ from surfacechem.assembly import LOADABLE
 from surfacechem.case.fields import choice, items, mapping, number
 from surfacechem.case.laws import build, history, law, law_list
 from surfacechem.case.mechanism import read_mechanism
+from surfacechem.case.medium import read_medium
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Load, Potential, RateLaw, Spec
 
-INTERFACE_KEYS = ("temperature", "sites", "partition", "potential", "friction", "bonding", "mechanism")
+INTERFACE_KEYS = ("temperature", "sites", "partition", "medium", "potential", "friction", "bonding", "mechanism")
 
 NODE = re.compile(r"T[A-Za-z0-9_]*")
 """Names of temperatures start with T, so that they never clash with another quantity."""
@@ -146,8 +147,11 @@ class SceneReader:
         frictions = law_list(Friction, given.get("friction"), self.units)
         sites = self._sites()
         partition, loss = self._partition()
+        medium = read_medium(given.get("medium"), self.units)
         if mechanism is None:
-            return Interface(self.temperatures[2], potentials, frictions, reactions, sites, partition, loss=loss)
+            return Interface(
+                self.temperatures[2], potentials, frictions, reactions, sites, partition, loss=loss, medium=medium
+            )
         return Interface(
             self.temperatures[2],
             (*potentials, *mechanism.potentials),
@@ -158,6 +162,7 @@ class SceneReader:
             mechanism.variables,
             mechanism.bonds,
             loss,
+            medium,
         )
 
     def _partition(self) -> tuple[float, float]:

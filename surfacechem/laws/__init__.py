@@ -15,15 +15,17 @@ from surfacechem.terms import (
     Law,
     Load,
     Potential,
+    Property,
     RateLaw,
 )
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact"),
+    Potential: ("bonding", "contact", "films"),
     RateLaw: ("kinetics",),
-    Friction: ("friction",),
-    HeatTransfer: ("heat", "contact_conductance", "gap_conductance"),
+    Friction: ("friction", "films"),
+    HeatTransfer: ("heat", "contact_conductance", "gap_conductance", "films"),
+    Property: ("media",),
     Load: ("loading",),
     Factor: ("factors",),
 }
