@@ -6,7 +6,7 @@ long as they can be, so that the kinks lie between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 DEGREE = 10
 """Degree of each polynomial."""
 
-PIECES = 4
-"""Pieces of a fit, always as many, so that equations do not change with the fit."""
+MOST = 12
+"""Most pieces of a fit."""
 
-TARGET = 1e-9
+TARGET = 2e-9
 """Largest relative error at the points of verification; between them it is of the same size."""
 
 CHECKS = 5
@@ -50,23 +50,32 @@ class Piece:
 
 
 def fit(function: Callable[[Array], Array], low: float, high: float) -> tuple[Piece, ...]:
-    """The function on low <= T <= high in PIECES pieces, relative error below TARGET; NoFitError where it takes more.
+    """The function on low <= T <= high, relative error below TARGET; NoFitError where that takes too many pieces.
 
     >>> pieces = fit(lambda T: np.exp(600 / T), 280.0, 360.0)
     >>> len(pieces), bool(abs(pieces[0](300.0) / np.exp(2) - 1) < 1e-10)
-    (4, True)
+    (1, True)
     """
     pieces: list[Piece] = []
     start = low
     while start < high:
-        if len(pieces) == PIECES:
-            raise NoFitError(f"more than {PIECES} polynomials would be needed between {low:g} and {high:g} K.")
+        if len(pieces) == MOST:
+            raise NoFitError(f"more than {MOST} polynomials would be needed between {low:g} and {high:g} K.")
         pieces.append(_polynomial(function, start, high) or _longest(function, start, high))
         start = pieces[-1].high
-    while len(pieces) < PIECES:
-        widest = max(range(len(pieces)), key=lambda i: pieces[i].high - pieces[i].low)
-        pieces[widest : widest + 1] = _halves(pieces[widest])
     return tuple(pieces)
+
+
+def divided(pieces: Sequence[Piece], count: int) -> tuple[Piece, ...]:
+    """The same function in so many pieces; NoFitError where it has more."""
+    found = list(pieces)
+    if len(found) > count:
+        span = f"between {found[0].low:g} and {found[-1].high:g} K"
+        raise NoFitError(f"{len(found)} polynomials are needed {span}, {count} were at the start.")
+    while len(found) < count:
+        widest = max(range(len(found)), key=lambda i: found[i].high - found[i].low)
+        found[widest : widest + 1] = _halves(found[widest])
+    return tuple(found)
 
 
 def _halves(piece: Piece) -> list[Piece]:

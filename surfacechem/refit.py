@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.errors import InputError
 from surfacechem.terms import Fluid
 
 Array = NDArray[np.float64]
@@ -51,10 +52,15 @@ class Fit:
 
     def wider(self, values: Mapping[str, float], visited: Array) -> dict[str, float] | None:
         """The values with a range that goes beyond what a run has visited; None where it need not or cannot."""
+        try:
+            return self._wider(values, visited)
+        except InputError:
+            return None
+
+    def _wider(self, values: Mapping[str, float], visited: Array) -> dict[str, float] | None:
         low, high = self._range(values)
-        coldest, hottest = float(np.min(visited)), float(np.max(visited))
+        coldest, hottest, room = float(np.min(visited)), float(np.max(visited)), high - low
         start = _mean(self._temperatures(values))
-        room = high - low
         span = self.fluid.range(start)
         if coldest <= low + NEAR * room:
             low = max(min(low, coldest) - room, span.low)
@@ -63,7 +69,11 @@ class Fit:
         return None if (low, high) == self._range(values) else {**values, **self.coefficients(low, high, start)}
 
     def reason(self, values: Mapping[str, float], T: float) -> str:
-        """Why there are no properties beyond T [K]."""
+        """Why there are no properties beyond T [K], where a run could not go on."""
+        try:
+            self._wider(values, np.array([T]))
+        except InputError as error:
+            return error.message.rstrip(".")
         low, high = self._range(values)
         span = self.fluid.range(_mean(self._temperatures(values)))
         words = span.reason_low if abs(T - low) < abs(T - high) else span.reason_high

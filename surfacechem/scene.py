@@ -65,11 +65,13 @@ class Medium:
     """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
 
     A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap.
+    ``temperatures`` [K] are some that the fluid's properties must cover from the start.
     """
 
     fluid: Fluid | None = None
     properties: Mapping[str, float | Property] = field(default_factory=dict)
     thickness: float | None = None
+    temperatures: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,7 @@ def _medium() -> Schema:
     law = {"anyOf": [_ref("quantity"), _ref(Property.contract)]}
     properties = {key: {**law, "description": _variable(name)} for key, name in PROPERTIES.items()}
     fluid = {"fluid": _string("name of a fluid that CoolProp knows"), "pressure": _quantity("pressure [Pa]")}
+    fluid["temperatures"] = {"type": "array", "items": _ref("quantity"), "description": "covered from the start [K]"}
     found = _object({**fluid, "thickness": _quantity("thickness, else the normal gap [m]"), **properties})
     assert set(found["properties"]) == set(MEDIUM_KEYS)
     return {**found, "description": "what fills the space between the bodies"}

@@ -11,8 +11,9 @@ import numpy as np
 import symengine
 
 from surfacechem.assembly.build import Build
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
-from surfacechem.fits import DEGREE, PIECES, Piece
+from surfacechem.fits import DEGREE, NoFitError, Piece, divided
 from surfacechem.quantities import VARIABLES
 from surfacechem.refit import Fit, first_range
 from surfacechem.system import Margin
@@ -23,6 +24,14 @@ PATH = "interface.medium.fluid"
 ENERGY = "capacity_m"
 """Heat capacity per volume over T; minus its double integral is the free energy."""
 
+PIECES = 4
+"""Fewest pieces of a fit."""
+
+SPARE = 2
+"""Pieces beyond those that the first range takes, for the kinks of a wider one."""
+
+REMEDY = "Give `interface.medium.temperatures`: those that the run will reach."
+
 KELVIN = Spec("K", "where a piece of the fit ends")
 NUMBER = Spec("1", "coefficient of the fit")
 
@@ -32,13 +41,14 @@ class Coefficients:
     """The fits of a fluid as values of parameters, by path."""
 
     fluid: Fluid
-    quantities: list[str] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    """Number of pieces of each property."""
 
     def __call__(self, low: float, high: float, T_start: float) -> Mapping[str, float]:
         """Values between two temperatures; the energy is zero with its slope at ``T_start`` [K]."""
         values = {f"{PATH}.low": low, f"{PATH}.high": high}
-        for quantity in self.quantities:
-            pieces = self.fluid.fit(quantity, low, high)
+        for quantity, count in self.counts.items():
+            pieces = self._pieces(quantity, count, low, high)
             for i, piece in enumerate(pieces):
                 values[f"{PATH}.{quantity}.ends[{i}]"] = piece.high
                 values |= {f"{PATH}.{quantity}[{i}][{k}]": c for k, c in enumerate(piece.coefficients)}
@@ -47,6 +57,12 @@ class Coefficients:
                     values[f"{PATH}.{quantity}.constant[{i}]"] = constant
                     values[f"{PATH}.{quantity}.slope[{i}]"] = slope
         return values
+
+    def _pieces(self, quantity: str, count: int, low: float, high: float) -> tuple[Piece, ...]:
+        try:
+            return divided(self.fluid.fit(quantity, low, high), count)
+        except NoFitError as error:
+            raise InputError(f"the fit of {quantity} of {self.fluid.name} cannot go on: {error} {REMEDY}") from None
 
 
 def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
@@ -80,7 +96,8 @@ class FluidFit:
     def __init__(self, build: Build, fluid: Fluid) -> None:
         self.build = build
         self.T = build.variables.get("T_c", "the medium")
-        self.held = tuple(_held(build))
+        assert build.interface.medium is not None
+        self.held = (*_held(build), *build.interface.medium.temperatures)
         starts = [build.scene.initial.get(node.name) for node in build.nodes.values() if not node.prescribed]
         self.states = tuple(node.name for node in build.nodes.values() if not node.prescribed)
         known = [*self.held, *(T for T in starts if T is not None)] or [build.scene.T_0 or 300.0]
@@ -125,14 +142,15 @@ class FluidFit:
         return symengine.Piecewise(*branches)
 
     def _values(self, quantity: str) -> Mapping[str, float]:
-        self.coefficients.quantities.append(quantity)
-        return Coefficients(self.coefficients.fluid, [quantity])(self.low, self.high, self.start)
+        fluid, counts = self.coefficients.fluid, self.coefficients.counts
+        counts[quantity] = max(PIECES, len(fluid.fit(quantity, self.low, self.high)) + SPARE)
+        return Coefficients(fluid, {quantity: counts[quantity]})(self.low, self.high, self.start)
 
     def _pieces(self, quantity: str, values: Mapping[str, float]) -> list[tuple[Expression, list[Expression]]]:
         """Scaled temperature and coefficients of each piece."""
         ends = (self.ends[0], *self._ends(quantity, values))
         xs = [(2 * self.T - low - high) / (high - low) for low, high in pairwise(ends)]
-        keys = [[f"[{i}][{k}]" for k in range(DEGREE + 1)] for i in range(PIECES)]
+        keys = [[f"[{i}][{k}]" for k in range(DEGREE + 1)] for i in range(len(xs))]
         return [(x, [self._coefficient(quantity, key, values) for key in row]) for x, row in zip(xs, keys, strict=True)]
 
     def _coefficient(self, quantity: str, key: str, values: Mapping[str, float]) -> Expression:
@@ -140,7 +158,7 @@ class FluidFit:
         return self._number(symbol, f"{quantity}{key}", NUMBER, values[f"{PATH}.{quantity}{key}"])
 
     def _ends(self, quantity: str, values: Mapping[str, float]) -> list[Expression]:
-        return [self._part(quantity, "ends", i, values) for i in range(PIECES)]
+        return [self._part(quantity, "ends", i, values) for i in range(self.coefficients.counts[quantity])]
 
     def _part(self, quantity: str, part: str, i: int, values: Mapping[str, float]) -> Expression:
         key = f"{quantity}.{part}[{i}]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surfacechem.case.fields import mapping, number, text
+from surfacechem.case.fields import items, mapping, number, text
 from surfacechem.case.laws import Units, law
 from surfacechem.document import Tree
 from surfacechem.errors import InputError
@@ -15,7 +15,7 @@ from surfacechem.terms import Fluid, Property, Spec
 PROPERTIES = {"conductivity": "k_m", "viscosity": "eta_m", "density": "rho_m", "heat-capacity": "cp_m"}
 """Keys of single properties and the quantities that they are."""
 
-MEDIUM_KEYS = ("fluid", "pressure", "thickness", *PROPERTIES)
+MEDIUM_KEYS = ("fluid", "pressure", "temperatures", "thickness", *PROPERTIES)
 
 
 def read_medium(tree: Tree | None, units: Units) -> Medium | None:
@@ -25,7 +25,8 @@ def read_medium(tree: Tree | None, units: Units) -> Medium | None:
     given = mapping(tree, MEDIUM_KEYS)
     properties = {name: _property(given[key], key, name, units) for key, name in PROPERTIES.items() if key in given}
     thickness = _positive(given["thickness"], "thickness", "m") if "thickness" in given else None
-    return Medium(_fluid(tree, given), properties, thickness)
+    temperatures = tuple(_positive(item, "temperature", "K") for item in items(given.get("temperatures"), "[300 K]"))
+    return Medium(_fluid(tree, given), properties, thickness, temperatures)
 
 
 def _positive(tree: Tree, name: str, unit: str) -> float:
@@ -44,8 +45,9 @@ def _property(tree: Tree, key: str, name: str, units: Units) -> float | Property
 
 def _fluid(tree: Tree, given: Mapping[str, Tree]) -> Fluid | None:
     if "fluid" not in given:
-        if "pressure" in given:
-            raise given["pressure"].error("the pressure is that of a fluid. Add `fluid:`, or remove it.")
+        for key in ("pressure", "temperatures"):
+            if key in given:
+                raise given[key].error(f"`{key}` belongs to a fluid. Add `fluid:`, or remove it.")
         return None
     if "pressure" not in given:
         raise tree.error("the fluid needs a `pressure`, for example `pressure: 1 atm`.")

@@ -14,7 +14,7 @@ from surfacechem.terms import HeatTransfer, option, parameter
 class GapConductance(HeatTransfer):
     r"""Conductance of a gap: contact spots that let go exponentially, gas and radiation that take over.
 
-    .. math:: h = h_{rad} + h_{gas} + (h_0 - h_{rad} - h_{gas})\,e^{-C_{trans} g_n}, \\
+    .. math:: h = h_{rad} + h_{gas} + (h_0 - h_{rad} - h_{gas})\,e^{-C_{trans} g_n}, \quad
               h_{gas} = \frac{k_{gas}}{g_n + g_0}, \quad
               h_{rad} = \frac{\sigma (T_1^2 + T_2^2)(T_1 + T_2)}{1/\varepsilon_1 + 1/\varepsilon_2 - 1}
 

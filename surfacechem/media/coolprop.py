@@ -95,10 +95,12 @@ class CoolPropFluid(Fluid):
             found = np.asarray(_coolprop().PropsSI(letter, "T", T, "P", self.pressure, self.name), dtype=float)
         except ValueError as error:
             raise InputError(f"{self.title}: {_reason(error)}") from None
-        if not np.all(np.isfinite(found)):
-            bad = T[~np.isfinite(found)]
-            raise InputError(f"{self.title} has no properties at {bad[0]:g} K.")
-        return found
+        if np.all(np.isfinite(found)):
+            return found
+        if T.ndim == 0:
+            raise InputError(f"{self.title} has no properties at {float(T):g} K.")
+        self._properties(letter, T[~np.isfinite(found)][0])  # alone, it tells the reason
+        raise InputError(f"{self.title}: CoolProp does not give the same twice.")
 
     def _call(self, letter: str) -> float:
         try:
