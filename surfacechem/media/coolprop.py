@@ -93,14 +93,20 @@ class CoolPropFluid(Fluid):
     def _properties(self, letter: str, T: Array) -> Array:
         try:
             found = np.asarray(_coolprop().PropsSI(letter, "T", T, "P", self.pressure, self.name), dtype=float)
+        except ValueError:
+            found = np.full(T.shape, np.inf)
+        for bad in T[~np.isfinite(found)]:
+            raise InputError(f"{self.title}: {self._refusal(letter, float(bad))}")
+        return found
+
+    def _refusal(self, letter: str, T: float) -> str:
+        """Why there is no property at T [K]; CoolProp tells only of a single value."""
+        try:
+            return (
+                f"no finite value at {T:g} K, but {_coolprop().PropsSI(letter, 'T', T, 'P', self.pressure, self.name)}."
+            )
         except ValueError as error:
-            raise InputError(f"{self.title}: {_reason(error)}") from None
-        if np.all(np.isfinite(found)):
-            return found
-        if T.ndim == 0:
-            raise InputError(f"{self.title} has no properties at {float(T):g} K.")
-        self._properties(letter, T[~np.isfinite(found)][0])  # alone, it tells the reason
-        raise InputError(f"{self.title}: CoolProp does not give the same twice.")
+            return _reason(error)
 
     def _call(self, letter: str) -> float:
         try:
