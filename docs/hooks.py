@@ -25,6 +25,7 @@ PLACES = {
     "bonding": "interface.bonding",
     "friction": "interface.friction",
     "heat": "heat",
+    "property": "interface.medium, under the name of the property",
     "loading": "loading.NAME",
     "factor": "the list `times` of a parameter that varies",
 }
