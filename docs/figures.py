@@ -97,17 +97,16 @@ def adhesive() -> Figure:
 
 
 def press() -> Figure:
-    """Fluxes through spots and gas while a plate is pressed on another."""
+    """Flux through contact spots while a plate is pressed on another."""
     run = surfacechem.run("press-conductance").dataset
     figure = new(7.2, 2.8)
     left, right = figure.subplots(1, 2, sharex=True)
-    left.plot(run.time, run.q_1_spots / 1e3, color=BLUE, label="spots")
-    left.plot(run.time, run.q_1_gas / 1e3, color=RED, label="gas")
-    left.set(xlabel="time [s]", ylabel="heat flux [kW/m$^2$]")
+    left.plot(run.time, run.q_1_spots / 1e3, color=BLUE)
+    left.set_xlabel("time [s]")
+    left.set_ylabel("heat flux [kW/m$^2$]", color=BLUE)
     pressure = left.twinx()
     pressure.plot(run.time, run.p / 1e3, color="0.6", linestyle="--")
     pressure.set_ylabel("pressure [kPa]", color="0.4")
-    left.legend()
     _temperatures(right, run, "T_1", "T_2")
     return figure
 
@@ -127,17 +126,14 @@ def closing_gap() -> Figure:
 
 
 def oil_film() -> Figure:
-    """Temperatures, viscosity and traction of an oil film that heats."""
+    """Temperatures and viscosity of an oil film that heats."""
     run = surfacechem.run("lubricated-sliding").dataset
     figure = new(7.2, 2.8)
     left, right = figure.subplots(1, 2, sharex=True)
     _temperatures(left, run, "T_1", "T_2", "T_c")
     right.plot(run.time, run.eta_m * 1e3, color=BLUE)
     right.set_xlabel("time [s]")
-    right.set_ylabel("viscosity [mPa s]", color=BLUE)
-    traction = right.twinx()
-    traction.plot(run.time, run.t_film_shear / 1e3, color=RED, linestyle="--")
-    traction.set_ylabel("friction traction [kPa]", color=RED)
+    right.set_ylabel("viscosity [mPa s]")
     return figure
 
 

@@ -8,6 +8,7 @@ import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.sources import by_channel, by_source
 from surfacechem.balances import Node
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import VARIABLES, Quantity
@@ -73,7 +74,8 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
     """
     node = build.node_of[body.name]
     sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
-    flux = _stated(build, k, body) if not sharing else symengine.Add(*build.from_interface[body.name].values())
+    stated = symengine.Add(*build.from_interface[body.name].values())
+    flux = stated if sharing else by_channel(build, k, body)
     if sharing and node.prescribed:
         if sharing != ["interface"]:
             return None
@@ -84,19 +86,11 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
         flux = recovered if sharing else flux
         if not node.prescribed:
             _book_heat(build, k, body, recovered)
+            if sharing:
+                by_source(build, k, body, flux)
             return flux
     _book_heat(build, k, body, flux)
     return flux
-
-
-def _stated(build: Build, k: int, body: Body) -> Expression:
-    """Heat into a body by stated laws; where several channels carry it, the sum of a flux for each."""
-    channels = build.from_interface[body.name]
-    if len(channels) < 2:
-        return symengine.Add(*channels.values())
-    text = f"heat flux from the interface into {body.name} by"
-    parts = [(Quantity(f"q_{k}_{name}", "W/m^2", f"{text} {name}"), heat) for name, heat in channels.items()]
-    return symengine.Add(*(build.areal(quantity, heat) for quantity, heat in parts))
 
 
 def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
