@@ -226,6 +226,8 @@ def mechanism(
     temperatures = span(temperature, "K", "--temperature", above=0.0)
     forces = span(force, "N", "--force")
     kind = _format(output) if output else ""
+    if output:
+        refuse_unwritable(output)
     from surfacechem.mechanism import load_mechanism
     from surfacechem.ratecurves import Curves
 

@@ -1,4 +1,4 @@
-"""What a run found about pairs of one-way reactions: whether their rates know the equilibrium of the potential.
+"""What a run found about rates that are stated both ways: whether they know the equilibrium of the potential.
 
 Where the interface is in equilibrium every reaction runs as often forward as back, so that k_f/k_r is the equilibrium
 constant K(g, T), the elastic energy of the bonds included. A reversible law has this by construction; two laws that run
@@ -23,7 +23,7 @@ ROUNDED = 1e-3
 
 @dataclass(frozen=True)
 class Verdict:
-    """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether the pair produced entropy all the time."""
+    """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether they produced entropy all the time."""
 
     title: str
     low: float
@@ -37,13 +37,13 @@ class Verdict:
 
     @property
     def consistent(self) -> bool:
-        """Whether the pair keeps detailed balance, up to rounding of its parameters."""
+        """Whether the rates keep detailed balance, up to rounding of their parameters."""
         return self.largest <= ROUNDED
 
     def __str__(self) -> str:
         """The verdict in words."""
         entropy = "entropy production stayed positive" if self.dissipates else "it DESTROYED ENTROPY"
-        return f"{self.title} (pair): {said(self.low, self.high)}; {entropy}"
+        return f"{self.title}: {said(self.low, self.high)}; {entropy}"
 
 
 def said(low: float, high: float) -> str:
@@ -61,7 +61,7 @@ def said(low: float, high: float) -> str:
 
 
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
-    """The verdict on each pair, over all outputs and steps."""
+    """The verdict on each pair of rates, over all outputs and steps."""
     found = []
     for pair in trajectory.model.system.pairs:
         values = trajectory.everywhere[pair.departure]

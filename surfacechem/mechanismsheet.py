@@ -44,11 +44,6 @@ class Span:
         ends = dict.fromkeys(f"{end * scale:g}" for end in (self.low, self.high))
         return f"{' to '.join(ends)} {unit}"
 
-    @property
-    def middle(self) -> float:
-        """The mean of the ends."""
-        return (self.low + self.high) / 2
-
 
 def span(text: str, unit: str, option: str, above: float = -math.inf) -> Span:
     """A range such as ``280..360 K``, or one value.
@@ -66,11 +61,16 @@ def span(text: str, unit: str, option: str, above: float = -math.inf) -> Span:
     return Span(low, high)
 
 
+def reference(temperatures: Span) -> float:
+    """The one temperature [K] at which a range is shown."""
+    inside = temperatures.low <= STANDARD <= temperatures.high
+    return STANDARD if inside else (temperatures.low + temperatures.high) / 2
+
+
 def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     """Everything about a mechanism, one fact a line."""
     mechanism = curves.mechanism
-    inside = temperatures.low <= STANDARD <= temperatures.high
-    shown = STANDARD if inside else temperatures.middle
+    shown = reference(temperatures)
     sections = [
         f"phase {mechanism.phase}, {curves.site_density:.6g} sites/m^2",
         _section(f"Species at {shown:g} K, without force", _species(curves, shown)),

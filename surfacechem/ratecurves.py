@@ -42,6 +42,13 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, SurfaceReaction)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
+        symbols = {label: _symbols(law) for label, law in self.laws.items()}
+        self._bound = {label: law.bind(symbols[label]) for label, law in self.laws.items()}
+        self._numbers = {
+            symbol: float(getattr(self.laws[label], name))
+            for label in symbols
+            for name, symbol in symbols[label].items()
+        }
         self._amounts = {variable.name: variable.density for variable in mechanism.variables}
         self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
         self._psi = sum(self._call(law.statement) for law in mechanism.potentials)
@@ -95,7 +102,7 @@ class Curves:
 
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
         """At coverages of one, over the amount of the bond that the reaction makes or breaks."""
-        total = log_sum([self._call(self.laws[label].log_forward) for label in labels])
+        total = log_sum([self._call(self._bound[label].log_forward) for label in labels])
         return self._filled(total) - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float]) -> Expression:
@@ -122,9 +129,14 @@ class Curves:
         return spring.rest_length + FORCE / spring.stiffness if spring else 0.0
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
-        function = symengine.Lambdify([TEMPERATURE, FORCE], [expression])
-        points = np.stack(np.broadcast_arrays(temperatures, forces), axis=-1)
+        function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [expression])
+        points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
         return np.asarray(function(points), dtype=np.float64)[..., 0]
+
+
+def _symbols(law: SurfaceReaction) -> dict[str, Expression]:
+    """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
+    return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
 
 
 def _thermo(species: Species, temperature: float) -> Thermo:

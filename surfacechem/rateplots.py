@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from surfacechem.mechanismsheet import Span
+from surfacechem.mechanismsheet import Span, reference
 from surfacechem.plots import COLOURS, STYLE, Plot
 from surfacechem.ratecurves import Curves
 
@@ -31,15 +31,9 @@ def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
         _row(axes[0], curves, T, T, np.zeros(1), "Temperature [K]")
         if curves.loaded:
             f = forces.values(POINTS)
-            _row(
-                axes[1],
-                curves,
-                f * 1e12,
-                np.array([temperatures.middle]),
-                f,
-                f"Force on {curves.pulled or 'a bond'} [pN]",
-            )
-            axes[1][0].set_title(f"at {temperatures.middle:g} K", loc="left", fontsize=8, color="#555555")
+            shown, label = reference(temperatures), f"Force on {curves.pulled or 'a bond'} [pN]"
+            _row(axes[1], curves, f * 1e12, np.array([shown]), f, label)
+            axes[1][0].set_title(f"at {shown:g} K", loc="left", fontsize=8, color="#555555")
         handles, labels = axes[0][0].get_legend_handles_labels()
         plot.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3))
         plot.suptitle(f"Phase {curves.mechanism.phase}", x=0.01, ha="left", fontsize=11, fontweight="bold")

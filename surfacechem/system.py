@@ -183,7 +183,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Pair:
-    """One-way reactions that undo each other, held against equilibrium along a run.
+    """Rates forward and backward that are stated apart, held against equilibrium along a run.
 
     ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy they produce together.
     """

@@ -281,6 +281,14 @@ class RateLaw(Law):
         """
         return None
 
+    @property
+    def log_ratio(self) -> Callable[..., Expression] | None:
+        """Logarithm of the forward over the backward rate where the law states both; None where they are not its own.
+
+        It is held against the equilibrium of the potential.
+        """
+        return None
+
 
 class RateFactor(Law):
     """What multiplies a rate coefficient under load; stated as its logarithm, so that no factor can overflow."""

@@ -138,3 +138,12 @@ def test_forces_of_any_size_are_shown(file):
     text = sheet(Curves(load_mechanism(file("Bell"))), Span(T, T), Span(0.0, 1e-8))
     assert "nan" not in text
     assert "inf" not in text
+
+
+def test_a_direction_that_is_switched_off_is_shown(file):
+    path = file("Bell")
+    path.write_text(path.read_text().replace("A: 10.0", "A: 0.0"), encoding="utf-8")
+    curves = Curves(load_mechanism(path))
+    text = sheet(curves, Span(T, T), Span(0.0, 4e-11))
+    assert "one of the two never runs" in text
+    assert figure(curves, Span(T, T), Span(0.0, 4e-11)).axes

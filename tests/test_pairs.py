@@ -8,7 +8,7 @@ import thermodynamics as laws
 
 import surfacechem
 from surfacechem.expressions import log_sum
-from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 
 DH, DS = -20e3, -50.0
 """Enthalpy and entropy of bonding [J/mol, J/(mol K)]."""
@@ -149,3 +149,60 @@ def test_a_direction_that_is_switched_off_is_said(pair):
 @pytest.mark.parametrize("logs", [(0.0, 0.0), (-1000.0, 5.0), (1e5, -1e5), (800.0, 800.0, 801.0)])
 def test_logarithm_of_a_sum(logs):
     assert log_sum(list(logs)) == pytest.approx(np.logaddexp.reduce(logs), rel=1e-14)
+
+
+SPRINGS = """\
+title: A law that states both rates
+bodies:
+  lower: {{temperature: 300 K}}
+  upper: {{temperature: 300 K}}
+interface:
+  temperature: 300 K
+  sites: 1e14 1/m^2
+  potential:
+    - lattice-gas: {{epsilon: {epsilon!r} J}}
+    - bond-springs: {{k_b: 5 pN/nm}}
+  bonding:
+    - {law}
+initial: {{phi: {phi}}}
+loading: {{g_n: {{ramp: {{rate: 2 nm/s}}}}}}
+run: {{until: 2 s, accuracy: 1e-8}}
+"""
+KT = BOLTZMANN * 300
+BELL = "bell: {k_off: 1 1/s, x_off: 0.4 nm, k_on: 10 1/s, x_on: -0.4 nm}"
+DEMBO = "dembo-spring: {k_off: 1 1/s, stiffness: 5 pN/nm, transition_stiffness: 2 pN/nm, k_on: 10 1/s}"
+
+
+def with_springs(folder, law, phi=0.5):
+    text = SPRINGS.format(epsilon=KT * math.log(10), law=law, phi=phi)
+    (folder / "springs.yaml").write_text(text, encoding="utf-8")
+    return surfacechem.load(folder / "springs.yaml").run()
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.5, 1.0])
+def test_a_law_with_both_rates_is_held_against_the_potential(phi, tmp_path):
+    solution = with_springs(tmp_path, BELL, phi)
+    f = solution.dataset.f
+    expected = f**2 / (2 * 5e-3 * KT) - f * 0.8e-9 / KT
+    np.testing.assert_allclose(solution.dataset.departure_bell, expected, rtol=1e-10, atol=1e-10)
+    assert "bell: k_f/k_r departs from K(g, T) by a factor exp(5.79) at most" in solution.attributes["detailed_balance"]
+
+
+def test_springs_in_the_rates_and_in_the_potential_agree(tmp_path):
+    solution = with_springs(tmp_path, DEMBO)
+    assert np.max(np.abs(solution.dataset.departure_dembo_spring)) < 1e-12
+    assert solution.warnings == ()
+
+
+@pytest.mark.parametrize("law", ["reversible-bell: {k_off: 1 1/s}", "bell: {k_off: 1 1/s}"])
+def test_laws_without_a_backward_rate_of_their_own_have_no_departure(law, tmp_path):
+    assert with_springs(tmp_path, law).verdicts == ()
+
+
+def test_a_potential_that_knows_nothing_of_bonds_is_no_equilibrium(tmp_path):
+    """Force spectroscopy: rates and a load, no energy."""
+    text = SPRINGS.format(epsilon=0.0, law=BELL, phi=0.5)
+    start, end = text.index("  potential:"), text.index("  bonding:")
+    text = (text[:start] + text[end:]).replace("g_n: {ramp: {rate: 2 nm/s}}", "f: 10 pN")
+    (tmp_path / "rates.yaml").write_text(text, encoding="utf-8")
+    assert surfacechem.load(tmp_path / "rates.yaml").run().verdicts == ()

@@ -8,7 +8,7 @@ import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Bond, Build
-from surfacechem.assembly.pairs import departure, opposed
+from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account
@@ -31,6 +31,7 @@ def reactions(build: Build) -> None:
         build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
         for x, n in nu.items():
             change[x] += n * rate
+        own_departure(build, label, law, affinity)
     for pair in pairs:
         departure(build, pair, mu)
     for name, bond in build.bonding.items():

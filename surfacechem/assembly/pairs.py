@@ -1,4 +1,4 @@
-"""Reactions that run one way only and undo each other: whether the two agree with the equilibrium of the potential."""
+"""Rates forward and backward that are stated apart: whether they agree with the equilibrium of the potential."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from surfacechem.assembly.build import Build
-from surfacechem.expressions import Expression, log_sum, where
+from surfacechem.expressions import Expression, depends, log_sum, where
 from surfacechem.quantities import BOLTZMANN, Quantity
 from surfacechem.system import Pair
 from surfacechem.terms import RateLaw
 
 LEAST_COVERAGE = 1e-280
 """A vanished coverage counts as this, where its logarithm still cancels from rates and chemical potentials."""
+
+LARGEST_COVERAGE = 1 - 1e-15
+"""A full coverage counts as this, for the logarithm of what is left."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +60,32 @@ def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
 
 
 def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> None:
-    """Name ln(k_f / k_r) - ln K, which is what the rates lack to balance where the affinity vanishes."""
-    T = build.variables.get("T_c", "the equilibrium of a reaction")
-    affinity = sum(n * mu[name] for name, n in group.change.items())
+    """Name what the rates of one-way laws lack to balance where the affinity vanishes."""
     forward, backward = (_log_rate(build, laws.values()) for laws in (group.forward, group.backward))
-    value = build.expanded(forward - backward + affinity / (BOLTZMANN * T))
-    present = {
-        bond.symbol: where(bond.symbol > LEAST_COVERAGE, bond.symbol, LEAST_COVERAGE) for bond in build.bonding.values()
-    }
-    text = f"ln(k_f/k_r) - ln K(g, T) of {group.title}"
-    build.name(Quantity(f"departure_{group.label}", "1", text), value.subs(present))
-    build.pairs.append(Pair(f"departure_{group.label}", group.title, group.label))
+    affinity = sum(n * mu[name] for name, n in group.change.items())
+    _name(build, group.label, f"{group.title} (pair)", forward - backward, affinity)
+
+
+def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> None:
+    """The same for a law that states its rates both ways, where the potential knows of the reaction at all."""
+    known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
+    if law.log_ratio is not None and known:
+        _name(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
+
+
+def _name(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> None:
+    T = build.variables.get("T_c", "the equilibrium of a reaction")
+    value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
+    inside = {bond.symbol: _inside(bond.symbol) for bond in build.bonding.values()}
+    quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
+    build.name(quantity, value.subs(inside))
+    build.pairs.append(Pair(quantity.name, title, label))
+
+
+def _inside(coverage: Expression) -> Expression:
+    """The coverage, within bounds where its logarithm and that of its complement exist."""
+    below = where(coverage < LARGEST_COVERAGE, coverage, LARGEST_COVERAGE)
+    return where(coverage > LEAST_COVERAGE, below, LEAST_COVERAGE)
 
 
 def _log_rate(build: Build, laws: Iterable[RateLaw]) -> Expression:

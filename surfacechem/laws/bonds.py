@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surfacechem.expressions import Expression, exp, expm1, log_fraction, where
+from surfacechem.expressions import Expression, exp, expm1, log, log_fraction, where
 from surfacechem.laws.forces import (
     BellFactor,
     DemboFactor,
     DemboFormationFactor,
     DudkoFactor,
     GapFactor,
+    StatedBothWays,
     TwoPathwayFactor,
 )
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import RateLaw, parameter
 
 
-class Bell(RateLaw):
+class Bell(StatedBothWays):
     r"""Slip bond: force speeds up rupture, and slows down or speeds up formation.
 
     .. math:: R = n_c \left[ k_{on} e^{f x_{on} / k_B T_c} (1 - \phi) - k_{off} e^{f x_{off} / k_B T_c}\,\phi \right]
@@ -33,6 +34,11 @@ class Bell(RateLaw):
     x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
     x_on: float = parameter("m", "distance to the transition state of formation", default=0.0)
+
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+        on, off = (BellFactor(x_beta=x).log_factor(f, T_c) for x in (self.x_on, self.x_off))
+        return log(self.k_on) + on, log(self.k_off) + off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
@@ -65,7 +71,7 @@ class ReversibleBell(RateLaw):
         return n_c * self.k_off * where(affinity > 0, forming, exp(breaking) * expm1(affinity))
 
 
-class DemboSpring(RateLaw):
+class DemboSpring(StatedBothWays):
     r"""Bond spring: slip, ideal or catch bond by how stiff it is in the transition state.
 
     .. math:: R = n_c \left[ k_{on} e^{-\kappa_{ts} f^2 / 2 \kappa^2 k_B T_c} (1 - \phi)
@@ -84,6 +90,13 @@ class DemboSpring(RateLaw):
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
 
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+        bond, transition = self.stiffness, self.transition_stiffness
+        formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
+        rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
+        return log(self.k_on) + formation.log_factor(f, T_c), log(self.k_off) + rupture.log_factor(f, T_c)
+
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         bond, transition = self.stiffness, self.transition_stiffness
@@ -94,7 +107,7 @@ class DemboSpring(RateLaw):
         return n_c * (on * (1 - phi) - off * phi)
 
 
-class TwoPathway(RateLaw):
+class TwoPathway(StatedBothWays):
     r"""Catch-slip bond: force closes one way out of the bound state and opens another.
 
     .. math:: R = n_c \left[ k_{on} (1 - \phi)
@@ -113,6 +126,12 @@ class TwoPathway(RateLaw):
     x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
     k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
 
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+        ratio = self.k_catch / self.k_slip
+        factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
+        return log(self.k_on), log(self.k_slip) + factor.log_factor(f, T_c)
+
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         ratio = self.k_catch / self.k_slip
@@ -121,7 +140,7 @@ class TwoPathway(RateLaw):
         return n_c * (self.k_on * (1 - phi) - off * phi)
 
 
-class DudkoHummerSzabo(RateLaw):
+class DudkoHummerSzabo(StatedBothWays):
     r"""Slip bond with a barrier of a given height and shape.
 
     .. math:: R = n_c \left[ k_{on} (1 - \phi) - k_{off}\,s^{1/\nu - 1}
@@ -145,6 +164,11 @@ class DudkoHummerSzabo(RateLaw):
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Forces below that at which the barrier vanishes."""
         return DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu).ranges
+
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+        factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
+        return log(self.k_on), log(self.k_off) + factor.log_factor(f, T_c)
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

@@ -6,12 +6,13 @@ Every factor is stated as its logarithm: a rate is one exponential of a sum, and
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from surfacechem.expressions import FRACTION_FLOOR, Expression, log, log_sum, where
+from surfacechem.expressions import FRACTION_FLOOR, Expression, is_symbolic, log, log_fraction, log_sum, where
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import RateFactor, Varying, parameter
+from surfacechem.terms import RateFactor, RateLaw, Varying, parameter
 
 
 class BellFactor(RateFactor):
@@ -154,3 +155,21 @@ class GapFactor(RateFactor):
     def log_factor(self, g_n: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor."""
         return -self.stiffness * (g_n - self.rest_length) ** 2 / (2 * BOLTZMANN * T_c)
+
+
+class StatedBothWays(RateLaw):
+    """Bonds that form and break at coefficients of their own; subclasses state these."""
+
+    @abstractmethod
+    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
+        """Logarithms of the coefficients of formation and rupture."""
+
+    @property
+    def log_ratio(self) -> Callable[..., Expression] | None:
+        """Logarithm of the rate of formation over that of rupture; None where no bonds form."""
+        k_on = vars(self)["k_on"]
+        return self._log_ratio if is_symbolic(k_on) or k_on else None
+
+    def _log_ratio(self, phi: Expression, f: Expression, T_c: Expression) -> Expression:
+        on, off = self.log_coefficients(f, T_c)
+        return on - off + log_fraction(1 - phi) - log_fraction(phi)
