@@ -19,7 +19,7 @@ from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
-from surfacechem.system import START, System
+from surfacechem.system import START, Role, System
 from surfacechem.terms import Spec
 
 __all__ = ["LOADABLE", "assemble"]
@@ -65,7 +65,7 @@ def assemble(scene: Scene) -> System:
         rows={state.name: build.rows[state.name] for state in build.states},
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
-        roles=tuple(build.variables.roles),
+        roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
         ranges=tuple(build.ranges),
         pairs=tuple(build.pairs),
         regime=regime(build),
@@ -76,6 +76,12 @@ def assemble(scene: Scene) -> System:
         sinks=taking,
         warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),
     )
+
+
+def _is_there(build: Build, role: Role) -> bool:
+    """Whether a derived variable was derived: one that nobody reads is not there."""
+    name = role.variable
+    return role.role != "derived" or build.variables.was_read(name) or any(item.name == name for item in build.named)
 
 
 def _refuse_idle_initial_values(build: Build) -> None:
