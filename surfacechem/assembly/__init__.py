@@ -13,6 +13,7 @@ from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
+from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.programme import programme, stage_ends
 from surfacechem.assembly.slip import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
@@ -44,6 +45,7 @@ STAGES = (
     equations,
     stage_ends,
     totals,
+    logarithmic_state,
 )
 
 
