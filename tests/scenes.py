@@ -1,6 +1,7 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
-from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonds import ReversibleBell
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity, NormalStiffness, TangentialStiffness
 from surfacechem.laws.factors import Activated, Exponential, Linear, LinearInTemperature, Polynomial, Power
@@ -153,6 +154,32 @@ def cure() -> Scene:
     return perfect_contact([LinearEnthalpy(H_r=300.0)], [reaction], T=320.0, energy=Constant)
 
 
+def loaded_bonds() -> Scene:
+    """Elastic bonds across an opening gap: their force speeds up rupture, their energy cools what they stretch."""
+    potentials = [LatticeGas(epsilon=3e-20), BondSprings(k_b=varying(1e-3, LinearInTemperature(slope=-1e-3)))]
+    interface = Interface(
+        "T_c",
+        [*potentials, InterfaceCapacity(C_c=3.0)],
+        reactions=[ReversibleBell(k_off=2.0, x_off=4e-10)],
+        sites=SITES,
+    )
+    heat = [path("lower", "interface", 100.0), path("interface", "upper", 70.0)]
+    initial = {"T_1": 300.0, "T_2": 305.0, "T_c": 310.0, "phi": 0.6}
+    return Scene(bodies(), interface, heat, {"g_n": Ramp(start=2e-9, rate=1e-9)}, None, 300.0, initial)
+
+
+def shared_load() -> Scene:
+    """A contact under tension whose bonds form and break at rates of their own."""
+    interface = Interface(
+        "T",
+        [LatticeGas(epsilon=3e-20), NormalStiffness(E_n=1e15)],
+        reactions=[ReversibleBell(k_off=2.0, x_off=4e-10)],
+        sites=SITES,
+    )
+    loading = {"g_n": Ramp(start=1e-9, rate=1e-10)}
+    return Scene(bodies("T", "T"), interface, (), loading, None, 300.0, {"T": 300.0, "phi": 0.6})
+
+
 def sliding() -> Scene:
     """Dry sliding that reverses."""
     loading = {"v": Harmonic(amplitude=0.02, frequency=1.0), "p": Hold(level=1e5)}
@@ -169,5 +196,7 @@ ALL = [
     stretched,
     prescribed_bonding,
     cure,
+    loaded_bonds,
+    shared_load,
     sliding,
 ]
