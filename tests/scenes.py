@@ -25,7 +25,7 @@ from surfacechem.laws.friction import Coulomb, MohrCoulomb, Viscous
 from surfacechem.laws.heat import Conductance
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.laws.longrange import LennardJonesFlatFlat, VanDerWaalsSpherePlane
+from surfacechem.laws.longrange import VanDerWaalsFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import Varying, parameter  # noqa: F401 - scenes may define laws
 
@@ -184,7 +184,7 @@ def adhesive() -> Scene:
         ExponentialCohesiveZone(t_max=strength, g_0=varying(1e-6, LinearInTemperature(slope=1e-3)), E_n=1e12),
         XuNeedleman(Phi_n=0.3, g_0=1e-6, g_t0=2e-6, q=0.8, r=0.2),
         AdhesionIntensity(C_N=1e12, C_T=5e11, w=0.2, E_n=1e13),
-        LennardJonesFlatFlat(n_1=1e19, n_2=1e19, psi_0=1e-27, g_0=1e-6),
+        VanDerWaalsFlatFlat(A_H=1e-19, D_0=1e-7),
         VanDerWaalsSpherePlane(A_H=1e-19, R=1e-6, area=1e-12),
         BondSprings(E_b=1e11, E_n=1e12),
         Penalty(E_n=varying(1e12, Power(exponent=-1.0))),
