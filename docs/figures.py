@@ -96,8 +96,63 @@ def adhesive() -> Figure:
     return plots.figure(dataset, ["T_1", "T_2", "T_c", "phi", "q_1", "q_2"])
 
 
+def press() -> Figure:
+    """Fluxes through spots and gas while a plate is pressed on another."""
+    run = surfacechem.run("press-conductance").dataset
+    figure = new(7.2, 2.8)
+    left, right = figure.subplots(1, 2, sharex=True)
+    left.plot(run.time, run.q_1_spots / 1e3, color=BLUE, label="spots")
+    left.plot(run.time, run.q_1_gas / 1e3, color=RED, label="gas")
+    left.set(xlabel="time [s]", ylabel="heat flux [kW/m$^2$]")
+    pressure = left.twinx()
+    pressure.plot(run.time, run.p / 1e3, color="0.6", linestyle="--")
+    pressure.set_ylabel("pressure [kPa]", color="0.4")
+    left.legend()
+    _temperatures(right, run, "T_1", "T_2")
+    return figure
+
+
+def closing_gap() -> Figure:
+    """Conductance of gas and radiation against the gap."""
+    run = surfacechem.run("closing-gas-gap").dataset
+    figure = new(4.6, 2.8)
+    ax = figure.subplots()
+    difference = run.T_2 - run.T_1
+    for channel, colour, label in (("film", BLUE, "gas"), ("radiation", RED, "radiation")):
+        ax.loglog(run.g_n * 1e6, run[f"q_1_{channel}"] / difference, color=colour, label=label)
+    ax.loglog(run.g_n * 1e6, run.k_m / run.g_n, color="0.6", linestyle="--", linewidth=0.8, label="$k_m/g_n$")
+    ax.set(xlabel="gap [um]", ylabel="conductance [W/(m$^2$ K)]")
+    ax.legend()
+    return figure
+
+
+def oil_film() -> Figure:
+    """Temperatures, viscosity and traction of an oil film that heats."""
+    run = surfacechem.run("lubricated-sliding").dataset
+    figure = new(7.2, 2.8)
+    left, right = figure.subplots(1, 2, sharex=True)
+    _temperatures(left, run, "T_1", "T_2", "T_c")
+    right.plot(run.time, run.eta_m * 1e3, color=BLUE)
+    right.set_xlabel("time [s]")
+    right.set_ylabel("viscosity [mPa s]", color=BLUE)
+    traction = right.twinx()
+    traction.plot(run.time, run.t_film_shear / 1e3, color=RED, linestyle="--")
+    traction.set_ylabel("friction traction [kPa]", color=RED)
+    return figure
+
+
+def _temperatures(ax: Any, run: Any, *names: str) -> None:
+    for name, colour in zip(names, (BLUE, RED, GREEN), strict=False):
+        ax.plot(run.time, run[name], color=colour, label=f"${name}$")
+    ax.set(xlabel="time [s]", ylabel="temperature [K]")
+    ax.legend()
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "accuracy.svg": accuracy,
     "signs.svg": signs,
+    "press.svg": press,
+    "closing-gap.svg": closing_gap,
+    "oil-film.svg": oil_film,
     "dna-adhesive.svg": adhesive,
 }

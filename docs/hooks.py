@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 
 import surfacechem
 from surfacechem import case as cases
-from surfacechem import data, references
+from surfacechem import data, listing, references
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.quantities import VARIABLES
 from surfacechem.terms import Law, Spec, reads
@@ -25,6 +25,7 @@ PLACES = {
     "bonding": "interface.bonding",
     "friction": "interface.friction",
     "heat": "heat",
+    "property": "interface.medium, under the name of the property",
     "loading": "loading.NAME",
     "factor": "the list `times` of a parameter that varies",
 }
@@ -240,6 +241,25 @@ def made_mechanisms() -> str:
     return table(("file", "what it is"), rows)
 
 
+def made_rate_types() -> str:
+    """Every rate type of a mechanism with its own keys, formula and source."""
+    from surfacechem.mechanism.kinds import PREFIX, kinds
+
+    rows = []
+    for kind, law in sorted(kinds().items()):
+        specs = dict(law.specs())
+        own = ", ".join(f"`{key}` [{specs[name].unit}]" for key, name in law.own_keys().items())
+        rows.append(
+            (
+                f"`{kind.removeprefix(PREFIX)}`",
+                own or "–",
+                inline(law).partition(" in a mechanism")[0],
+                listing.source(law),
+            )
+        )
+    return table(("`type`", "keys beside `rate-constant`", "what it is", "source"), rows)
+
+
 def made_variables(name: str) -> str:
     """The variables of a case's dataset."""
     dataset = surfacechem.run(name).dataset
@@ -289,6 +309,7 @@ MAKERS: dict[str, Callable[..., str]] = {
     "references": made_references,
     "cases": made_cases,
     "mechanisms": made_mechanisms,
+    "rate_types": made_rate_types,
     "variables": made_variables,
     "variable_table": made_variable_table,
     "cli": made_cli,

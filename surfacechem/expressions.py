@@ -37,14 +37,15 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
 
     >>> import symengine
     >>> x, T = symengine.symbols("x T")
-    >>> derivative(derivative(T * log_fraction(x), T), T)
-    0
+    >>> derivative(derivative(T * log_fraction(x), T), T), derivative(power(x, 0.95), T)
+    (0, 0)
     """
     import symengine
 
     result = symengine.diff(symengine.sympify(expression), symbol)
-    empty = {piece: symengine.Integer(0) for piece in result.atoms(symengine.Piecewise) if _vanishes(piece)}
-    return result.xreplace(empty) if empty else result
+    while empty := {piece: symengine.Integer(0) for piece in result.atoms(symengine.Piecewise) if _vanishes(piece)}:
+        result = result.xreplace(empty)
+    return result
 
 
 def _vanishes(piece: Any) -> bool:

@@ -207,12 +207,17 @@ class Model:
 
     def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
         method = solver(run.solver)
+        fit = self.system.fit
+        values = fit.started(values) if fit else values
         problem = self.problem(run, values)
         method.prepare()
         start = time.perf_counter()
         result, jumps, ended = self._integrate(method, problem)
+        while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
+            values = wider
+            result, jumps, ended = self._integrate(method, self.problem(run, values))
         seconds = time.perf_counter() - start
-        status, reason = ended or self._verdict(result)
+        status, reason = ended or self._verdict(result, values)
         return Trajectory(self, run, result, values, status, reason, seconds, jumps)
 
     def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
@@ -225,12 +230,27 @@ class Model:
         ended = (word, f"{hybrid.reason} at t = {result.t:.9g} s") if hybrid.reason else None
         return result, tuple(hybrid.jumps), ended
 
-    def _verdict(self, result: Result) -> tuple[str, str]:
+    def _visited(self, result: Result, temperature: str) -> Array:
+        """A temperature at all steps and at the end."""
+        steps = result.steps
+        assert steps is not None
+        t = np.append(steps.t, result.t)
+        y, ydot = np.vstack([steps.y, result.y]), np.vstack([steps.ydot, result.ydot])
+        names = [state.name for state in self.system.states]
+        if temperature in names:
+            return y[:, names.index(temperature)]
+        outputs = [item.name for item in self.system.outputs]
+        return self.evaluate(result, t, y, ydot)[:, outputs.index(temperature)]
+
+    def _verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
             return "finished", f"reached the end at {where}"
         if result.status is Status.EVENT:
-            return "stopped", f"{self.margins[int(result.events.index[-1])].reason} at {where}"
+            margin, fit = self.margins[int(result.events.index[-1])], self.system.fit
+            fitted = fit is not None and margin.name == fit.margin
+            why = fit.reason(values, self._visited(result, fit.temperature)[-1]) if fit and fitted else margin.reason
+            return "stopped", f"{why} at {where}"
         shrunk = self._closest_margin(result)
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"

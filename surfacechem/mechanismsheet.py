@@ -39,6 +39,11 @@ class Span:
         """Evenly spaced values; one where the ends are the same."""
         return np.linspace(self.low, self.high, number if self.high > self.low else 1)
 
+    def words(self, unit: str, scale: float = 1.0) -> str:
+        """The range in a unit of which ``scale`` make one in SI."""
+        ends = dict.fromkeys(f"{end * scale:g}" for end in (self.low, self.high))
+        return f"{' to '.join(ends)} {unit}"
+
     @property
     def middle(self) -> float:
         """The mean of the ends."""
@@ -71,7 +76,7 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
         _section(f"Species at {shown:g} K, without force", _species(curves, shown)),
         "\n".join(["Reactions", *_reactions(curves, temperatures, forces)]),
         _section("Against temperature, without force; rates per bond at coverages of one", _hot(curves, temperatures)),
-        _section(f"Against force per bond, at {shown:g} K", _loaded(curves, shown, forces)),
+        _section(f"Against the force on {curves.pulled or 'a bond'}, at {shown:g} K", _loaded(curves, shown, forces)),
         "\n".join(["Rate types", *(_source(law) for law in _types(curves))]),
         _section("Remarks", [(remark,) for remark in remarks(curves)]),
     ]
@@ -97,8 +102,8 @@ def _composition(elements: Mapping[str, float] | None) -> str:
     return " ".join(f"{name}{number:g}" for name, number in (elements or {}).items()) or "-"
 
 
-def _number(value: float) -> str:
-    return f"{value + 0.0:.6g}" if abs(value) > 1e-9 else "0"
+def _number(value: float, digits: int = 6) -> str:
+    return f"{value:.{digits}g}" if abs(value) > 1e-9 else "0"
 
 
 def _reactions(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:
@@ -125,7 +130,8 @@ def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str
     grid = np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
     values = curves.departure(pair, *grid)
     others = " and ".join(other for other in pair.labels if other != label)
-    return f"pair with {others}: {said(float(values.min()), float(values.max()))}"
+    where = temperatures.words("K") + (f", {forces.words('pN', 1e12)}" if curves.loaded else "")
+    return f"pair with {others}: {said(float(values.min()), float(values.max()))} ({where})"
 
 
 def _hot(curves: Curves, temperatures: Span) -> Iterator[tuple[str, ...]]:
@@ -149,6 +155,9 @@ def _rows(curves: Curves, T: Array, f: Array, labels: list[str]) -> Iterator[tup
         yield "", "forward [1/s]", *map(power_of_ten, curves.log_forward(label, T, f))
         if reverse is not None:
             yield "", "reverse [1/s]", *map(power_of_ten, reverse)
+    for pair in curves.pairs:
+        departure = curves.departure(pair, T, f)
+        yield " ".join(pair.labels), "ln(k_f/k_r) - ln K", *(_number(value, 3) for value in departure)
 
 
 def power_of_ten(logarithm: float) -> str:
@@ -170,7 +179,7 @@ def _types(curves: Curves) -> list[type[SurfaceReaction]]:
 
 
 def _source(law: type[SurfaceReaction]) -> str:
-    text = f"{law.kind}: {source(law)}"
+    text = f"{law.kind}: {source(law)}".replace("``", "")
     return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
 
 

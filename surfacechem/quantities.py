@@ -17,6 +17,9 @@ BOLTZMANN = 1.380649e-23
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant [J/(mol K)] (exact, SI 2019)."""
 
+STEFAN_BOLTZMANN = 5.670374419e-8
+"""Stefan-Boltzmann constant [W/(m^2 K^4)] (SI 2019, rounded)."""
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -40,6 +43,8 @@ VARIABLES = _table(
     ("T_2", "K", "temperature of body 2", "T_2"),
     ("T_c", "K", "interface temperature", "T_c"),
     ("T_a", "K", "temperature of the surroundings", "T_a"),
+    ("T_from", "K", "temperature of the first end of a heat path"),
+    ("T_to", "K", "temperature of the second end of a heat path"),
     ("phi", "1", "bonding state: bonded sites per reference site", r"\phi", "e:phi_def"),
     ("ln_phi", "1", "logarithm of the bonding state", r"\ln\phi"),
     ("g_n", "m", "normal gap", "g_n"),
@@ -59,6 +64,14 @@ VARIABLES = _table(
     ("t_n", "Pa", "normal traction on body 1, tension positive", "t_n", "e:cons_tc"),
     ("f", "N", "force per bond, tension positive", "f"),
     ("J_c", "1", "area stretch of the reference surface", "J_c"),
+    ("d_m", "m", "thickness of the medium between the bodies"),
+    ("p_m", "Pa", "pressure of the medium"),
+    ("k_m", "W/(m K)", "thermal conductivity of the medium"),
+    ("eta_m", "Pa s", "viscosity of the medium", r"\eta_m"),
+    ("rho_m", "kg/m^3", "density of the medium", r"\rho_m"),
+    ("cp_m", "J/(kg K)", "heat capacity of the medium at constant pressure", "c_{p,m}"),
+    ("gamma_m", "1", "ratio of the heat capacities of the medium", r"\gamma_m"),
+    ("f_m", "J/m^3", "thermal free energy of the medium per volume"),
     ("Q_1", "W/m^2", "external heat supplied to body 1", "Q_1"),
     ("Q_2", "W/m^2", "external heat supplied to body 2", "Q_2"),
     ("Q_c", "W/m^2", "external heat supplied to the interface", "Q_c"),

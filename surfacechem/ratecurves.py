@@ -14,7 +14,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.assembly.pairs import Opposed, opposed
-from surfacechem.expressions import Expression, derivative, log, log_sum
+from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import SurfaceReaction
@@ -48,9 +48,15 @@ class Curves:
 
     @property
     def loaded(self) -> bool:
-        """Whether a force changes any rate."""
-        names = {name for law in self.laws.values() for name in reads(law.log_forward)}
-        return any(name == "f" or name.startswith("f_") for name in names)
+        """Whether a force changes any rate or constant."""
+        rates = (self._log_rate([label], law.change) for label, law in self.laws.items())
+        constants = (self._log_equilibrium(law.change) for law in self.laws.values())
+        return any(depends(expression, FORCE) for expression in (*rates, *constants))
+
+    @property
+    def pulled(self) -> str:
+        """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
+        return next((name for name, item in self.species.items() if item.spring and item.spring.stiffness), "")
 
     @property
     def species(self) -> dict[str, Species]:
@@ -102,18 +108,18 @@ class Curves:
         return symengine.sympify(expression).subs(dict.fromkeys(self._coverages.values(), 1))
 
     def _call(self, formula: Callable[..., Expression]) -> Expression:
-        known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE}
+        known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": self._gap}
         known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
-        known |= self._stretched()
+        for item in self.species.values():
+            if item.spring:
+                known[f"f_{item.variable}"] = item.spring.stiffness * (self._gap - item.spring.rest_length)
         return formula(**{name: known[name] for name in reads(formula)})
 
-    def _stretched(self) -> dict[str, Expression]:
-        """The gap at which the first of the elastic bonds carries the force, and what the others carry there."""
-        springs = {item.variable: item.spring for item in self.species.values() if item.spring}
-        first = next(iter(springs.values()), None)
-        gap = first.rest_length + FORCE / first.stiffness if first else 0.0
-        forces = {f"f_{name}": spring.stiffness * (gap - spring.rest_length) for name, spring in springs.items()}
-        return {"g_n": gap, **forces}
+    @property
+    def _gap(self) -> Expression:
+        """The gap at which the pulled bond carries the force; zero where no bond is elastic."""
+        spring = self.species[self.pulled].spring if self.pulled else None
+        return spring.rest_length + FORCE / spring.stiffness if spring else 0.0
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
         function = symengine.Lambdify([TEMPERATURE, FORCE], [expression])

@@ -31,7 +31,14 @@ def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
         _row(axes[0], curves, T, T, np.zeros(1), "Temperature [K]")
         if curves.loaded:
             f = forces.values(POINTS)
-            _row(axes[1], curves, f * 1e12, np.array([temperatures.middle]), f, "Force per bond [pN]")
+            _row(
+                axes[1],
+                curves,
+                f * 1e12,
+                np.array([temperatures.middle]),
+                f,
+                f"Force on {curves.pulled or 'a bond'} [pN]",
+            )
             axes[1][0].set_title(f"at {temperatures.middle:g} K", loc="left", fontsize=8, color="#555555")
         handles, labels = axes[0][0].get_legend_handles_labels()
         plot.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3))

@@ -6,7 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from surfacechem.errors import InputError, Place
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, parameter
+from surfacechem.terms import (
+    BodyEnergy,
+    Fluid,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Load,
+    Potential,
+    Property,
+    RateLaw,
+    parameter,
+)
 
 
 @dataclass(frozen=True)
@@ -104,11 +116,26 @@ class BondingVariable:
 
 
 @dataclass(frozen=True)
+class Medium:
+    """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
+
+    A property that is given goes before that of the fluid. Without ``thickness`` [m] it fills the normal gap.
+    ``temperatures`` [K] are some that the fluid's properties must cover from the start.
+    """
+
+    fluid: Fluid | None = None
+    properties: Mapping[str, float | Property] = field(default_factory=dict)
+    thickness: float | None = None
+    temperatures: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Interface:
     """What stands between the bodies.
 
     ``temperature`` is the interface's node, a prescribed history, or None where there is no medium: then friction and
-    reaction heat go straight into the bodies, the fraction ``partition`` into body 1.
+    reaction heat go straight into the bodies, the fraction ``partition`` into body 1, the fraction ``loss`` into the
+    surroundings and the rest into body 2.
     """
 
     temperature: str | Load | None = None
@@ -121,6 +148,8 @@ class Interface:
     bonds: Sequence[str] = ()
     """Names of those variables that count as bonds where phi is not itself a state."""
     limits: Sequence[Limit] = ()
+    loss: float = 0.0
+    medium: Medium | None = None
 
 
 @dataclass(frozen=True)

@@ -13,18 +13,31 @@ from surfacechem import laws, references, solvers
 from surfacechem.assembly import LOADABLE
 from surfacechem.case import TOP_KEYS
 from surfacechem.case.mechanics import MOVING, WAYS
+from surfacechem.case.medium import MEDIUM_KEYS, PROPERTIES
 from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Mounting
-from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
+from surfacechem.terms import (
+    BodyEnergy,
+    Factor,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Load,
+    Potential,
+    Property,
+    RateLaw,
+    Spec,
+)
 
 Schema = dict[str, Any]
 
 QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
 """A number, with or without a unit."""
 
-CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Load, Factor)
+CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Property, Load, Factor)
 
 _TEXTS = {
     "until": "end of the run [s]",
@@ -111,7 +124,8 @@ def _interface() -> Schema:
     properties = {
         "temperature": _ref("temperature"),
         "sites": {"anyOf": [density, sides]},
-        "partition": _quantity("fraction of heat into body 1 where there is no medium"),
+        "partition": _shares(),
+        "medium": _medium(),
         "potential": _list(Potential, "terms of the free energy"),
         "friction": _list(Friction, "friction laws, whose tractions add up"),
         "bonding": _list(RateLaw, "reactions, whose rates add up"),
@@ -135,6 +149,23 @@ def _programme() -> Schema:
     stage = _object({**rates, "for": _quantity("length of the stage [s]"), "until": until})
     items = {"type": "object", "additionalProperties": stage, "minProperties": 1, "maxProperties": 1}
     return {"type": "array", "description": "stages of the loading, one after the other", "items": items}
+
+
+def _medium() -> Schema:
+    law = {"anyOf": [_ref("quantity"), _ref(Property.contract)]}
+    properties = {key: {**law, "description": _variable(name)} for key, name in PROPERTIES.items()}
+    fluid = {"fluid": _string("name of a fluid that CoolProp knows"), "pressure": _quantity("pressure [Pa]")}
+    fluid["temperatures"] = {"type": "array", "items": _ref("quantity"), "description": "covered from the start [K]"}
+    found = _object({**fluid, "thickness": _quantity("thickness, else the normal gap [m]"), **properties})
+    assert set(found["properties"]) == set(MEDIUM_KEYS)
+    return {**found, "description": "what fills the space between the bodies"}
+
+
+def _shares() -> Schema:
+    fraction = _quantity("fraction of the heat")
+    into = {"type": "object", "additionalProperties": fraction}
+    text = "fraction of heat into body 1 where there is no medium, or fractions by body, the rest to the surroundings"
+    return {"description": text, "anyOf": [fraction, into]}
 
 
 def _initial() -> Schema:

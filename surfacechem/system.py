@@ -11,6 +11,7 @@ import symengine
 
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
+from surfacechem.refit import Fit
 from surfacechem.terms import Load, Spec
 
 START = "run.t_start"
@@ -227,6 +228,8 @@ class System:
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the energy that a jump releases, by the kind of the jump."""
     pairs: tuple[Pair, ...] = ()
+    fit: Fit | None = None
+    """How the properties of the medium's fluid follow a run; None where nothing reads any."""
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:

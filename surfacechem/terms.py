@@ -13,6 +13,7 @@ contract           states                                              audited f
 :class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
 :class:`RateFactor`    logarithm of what load does to a rate coefficient   --
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
+:class:`Property`      property of the medium between the bodies           --
 :class:`Load`          prescribed history of a variable                    --
 :class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
 :class:`Factor`        how a parameter varies with one variable            --
@@ -29,10 +30,13 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
+
+if TYPE_CHECKING:
+    from surfacechem.fits import Piece
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,11 @@ class Law(ABC):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Ranges of variables outside which the law is an extrapolation; a run that leaves them says so."""
+        return {}
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Ranges of variables outside which the law has no value; a run that reaches an end of them stops."""
         return {}
 
     @property
@@ -283,13 +292,66 @@ class RateFactor(Law):
 
 
 class HeatTransfer(Law):
-    """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold."""
+    """Conductance [W/(m^2 K)] between two temperatures; heat flows from hot to cold.
+
+    A formula that reads ``T_from`` and ``T_to`` gets the temperatures of the two ends.
+    """
 
     contract = "heat"
     formula = "conductance"
+    channel: ClassVar[str] = "conduction"
+    """What carries the heat, for the names of fluxes."""
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
+    closure: Literal["direct", "medium"] = option(
+        "'direct' from end to end, or 'medium': through the interface, with twice the conductance on each side",
+        default="direct",
+    )
     conductance: ClassVar[Callable[..., Expression]]
+
+    def channels(self) -> Mapping[str, Callable[..., Expression]]:
+        """The conductances in parallel that the whole is the sum of, by what carries the heat."""
+        return {self.channel: self.statement}
+
+
+class Property(Law):
+    """Property of the medium between the bodies, as a function of temperature and pressure."""
+
+    contract = "property"
+    formula = "value"
+    quantity: ClassVar[str]
+    """Name of the property in the table of quantities."""
+
+    value: ClassVar[Callable[..., Expression]]
+
+
+@dataclass(frozen=True)
+class FluidRange:
+    """Temperatures [K] at which a fluid stays what it is, and what happens beyond."""
+
+    low: float
+    high: float
+    reason_low: str
+    reason_high: str
+
+
+class Fluid(ABC):
+    """A substance whose properties have no formula; they are fitted where a scene reads them.
+
+    Properties go by the names of the table of quantities; ``capacity_m`` is the heat capacity per volume over T,
+    rho_m cp_m / T [J/(m^3 K^2)].
+    """
+
+    name: str
+    pressure: float
+
+    @abstractmethod
+    def range(self, T: float) -> FluidRange:
+        """Temperatures around T [K] at which it has properties; InputError where it has none at T."""
+
+    @abstractmethod
+    def fit(self, quantity: str, low: float, high: float) -> tuple[Piece, ...]:
+        """A property between two temperatures [K]; InputError where it has none."""
 
 
 class Limit(Law):

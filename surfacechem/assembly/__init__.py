@@ -1,6 +1,6 @@
 """From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
 
-Each stage is a module: temperatures, interface, force, chemistry, exchange, equations, totals.
+Each stage is a module, in the order of STAGES.
 """
 
 from __future__ import annotations
@@ -14,10 +14,12 @@ from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
 from surfacechem.assembly.logarithms import logarithmic_state
+from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
 from surfacechem.assembly.slip import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
+from surfacechem.assembly.touch import touch
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
 from surfacechem.system import START, Role, System
@@ -33,6 +35,7 @@ STAGES = (
     normal_gap,
     tangential_gap,
     bonded_mode,
+    medium,
     free_energy,
     force,
     limits,
@@ -45,6 +48,7 @@ STAGES = (
     equations,
     stage_ends,
     totals,
+    touch,
     logarithmic_state,
 )
 
@@ -76,7 +80,8 @@ def assemble(scene: Scene) -> System:
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),
         sinks=taking,
-        warnings=tuple(f"loading: {name} is prescribed but nothing reads it." for name in unread),
+        fit=build.fit() if build.fit else None,
+        warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
     )
 
 

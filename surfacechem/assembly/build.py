@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from surfacechem.balances import Node
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
+from surfacechem.refit import Fit
 from surfacechem.scene import Scene
 from surfacechem.system import Account, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
 from surfacechem.terms import Law, Load, Spec
@@ -60,10 +62,11 @@ class Build:
         """Power that each interface law turns into heat [W/m^2], by the law's label."""
         self.into_body: dict[str, Expression] = {}
         """Heat that reaches each body other than through the interface [W/m^2]."""
-        self.from_interface: dict[str, Expression] = {}
-        """Heat that each body receives from the interface and the other body by stated laws [W/m^2]."""
+        self.from_interface: dict[str, dict[str, Expression]] = {}
+        """Heat that each body receives from the interface and the other body by stated laws, by channel [W/m^2]."""
         for body in scene.bodies:
-            self.into_body[body.name] = self.from_interface[body.name] = symengine.Integer(0)
+            self.into_body[body.name] = symengine.Integer(0)
+            self.from_interface[body.name] = {}
         self.loads: dict[str, Load] = {}
         """Histories that are in use, by variable."""
         self.rates: dict[Any, Expression] = {}
@@ -89,6 +92,11 @@ class Build:
         self.gap_rates: dict[str, Expression] = {}
         """Rates of the gaps that move by a balance."""
         self.pairs: list[Pair] = []
+        self.conductances: dict[tuple[str, str], list[Expression]] = {}
+        """Conductances in parallel between two ends [W/(m^2 K)]."""
+        self.warnings: list[str] = []
+        self.fit: Callable[[], Fit] | None = None
+        """The fit of the medium's fluid, once a law asks for one of its properties."""
         self.used_names: set[str] = set()
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
@@ -219,15 +227,29 @@ class Build:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
+        for name, ends in law.limits.items():
+            value, (low, high) = self.variables.get(name, law), ends
+            slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
+            reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
+            if math.isfinite(low):
+                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
+            if math.isfinite(high):
+                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
 
-    def shares(self) -> tuple[Expression, Expression]:
-        """Fractions of the interface's heat that go into body 1 and 2 where there is no medium."""
-        if not self.variables.has("partition"):
-            path, value = "interface.partition", self.interface.partition
-            spec = Spec("1", "fraction of heat into body 1", at_least=0, at_most=1)
-            self.variables.define("partition", lambda: self.constant("alpha", path, spec, value), "constant", path)
-        alpha = self.variables.get("partition", "the interface")
-        return alpha, 1 - alpha
+    def shares(self) -> dict[str, Expression]:
+        """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""
+        alpha = self._share("alpha", "interface.partition", self.interface.partition, "body 1")
+        first, second = (body.name for body in self.scene.bodies)
+        if not self.interface.loss:
+            return {first: alpha, second: 1 - alpha}
+        loss = self._share("alpha_a", "interface.partition.surroundings", self.interface.loss, "the surroundings")
+        return {first: alpha, second: 1 - alpha - loss, "surroundings": loss}
+
+    def _share(self, name: str, path: str, value: float, end: str) -> Expression:
+        if not self.variables.has(path):
+            spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
+            self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
+        return self.variables.get(path, "the interface")
 
     def expanded(self, expression: Expression) -> Expression:
         """The expression without names of quantities."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
 import symengine
 
-from surfacechem.assembly.build import Build
+from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.slip import stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, suggestion
@@ -41,24 +44,59 @@ def _reversal(build: Build) -> None:
 
 def heat_paths(build: Build) -> None:
     """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
-    for law in build.scene.heat:
-        _heat_path(build, law)
+    for paths in _by_ends(build):
+        _between(build, paths)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
             _external_heat(build, member, Q)
     if build.interface.temperature is None:
-        heat = sum(build.dissipation.values(), symengine.Integer(0))
-        if heat != 0:
-            _share(build, heat)
+        _shares_margin(build)
+        for label, power in build.dissipation.items():
+            _share(build, power, "friction" if label in build.frictions else "reaction")
 
 
-def _share(build: Build, heat: Expression) -> None:
-    for body, share in zip(build.scene.bodies, build.shares(), strict=True):
-        build.node_of[body.name].inflow.append(share * heat)
-        build.from_interface[body.name] += share * heat
+def _shares_margin(build: Build) -> None:
+    if build.interface.loss:
+        rest = build.shares()[build.scene.bodies[1].name]
+        reason = "the fractions of the interface's heat add up to more than 1"
+        build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
 
 
-def _heat_path(build: Build, law: HeatTransfer) -> None:
+def _share(build: Build, heat: Expression, channel: str) -> None:
+    for end, share in build.shares().items():
+        if share * heat != 0:
+            build.node_of[end].inflow.append(share * heat)
+            _receive(build, end, share * heat, channel)
+
+
+def _receive(build: Build, end: str, heat: Expression, channel: str) -> None:
+    """Remember the heat that a body gets from the interface or the other body, by what carries it."""
+    if end in build.from_interface:
+        received = build.from_interface[end]
+        received[channel] = received.get(channel, symengine.Integer(0)) + heat
+    elif end == "interface":
+        build.into_interface.append(heat)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """A conductance between two ends [W/(m^2 K)], by what carries the heat."""
+
+    ends: tuple[str, str]
+    channels: Mapping[str, Expression]
+
+
+def _by_ends(build: Build) -> list[list[_Path]]:
+    """The heat paths, those between the same two ends together."""
+    groups: dict[frozenset[str], list[_Path]] = {}
+    for law in build.scene.heat:
+        for path in _paths(build, law):
+            groups.setdefault(frozenset(path.ends), []).append(path)
+    return list(groups.values())
+
+
+def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
+    """The path of a law, or through the medium two paths of twice the conductance."""
     a, b = law.between
     from_node, to_node = _end(build, a), _end(build, b)
     if from_node is to_node:
@@ -66,33 +104,61 @@ def _heat_path(build: Build, law: HeatTransfer) -> None:
             f"the heat path between {a} and {b} has one temperature, {from_node.name}; remove it.", law.place
         )
     bound = build.variables.bind(law, f"heat.{law.name()}")
-    h = build.variables.call(bound, bound.statement)
+    own = {"T_from": from_node.T, "T_to": to_node.T}
+    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
+    build.law_ranges(law)
+    build.law_margins(law, {})
+    if law.closure == "direct":
+        yield _Path((a, b), channels)
+        return
+    if not {a, b} <= {body.name for body in build.scene.bodies}:
+        raise InputError("`closure: medium` belongs to a path between the two bodies.", law.place)
+    double = {name: 2 * h for name, h in channels.items()}
+    for ends in ((a, "interface"), ("interface", b)):
+        if _end(build, ends[0]) is not _end(build, ends[1]):
+            yield _Path(ends, double)
+
+
+def _between(build: Build, paths: list[_Path]) -> None:
+    """All paths between two ends: a flux of each channel where there are several, and their sum."""
+    a, b = paths[0].ends
+    from_node, to_node = _end(build, a), _end(build, b)
     area = symengine.Integer(1) if "surroundings" in (a, b) else build.stretch
-    quantity = Quantity(_path_name(build, law), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
+    channels: dict[str, Expression] = {}
+    for path in paths:
+        for channel, h in path.channels.items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
+    build.conductances[a, b] = list(channels.values())
     difference = from_node.T - to_node.T
-    flux = build.name(quantity, area * h * difference)
-    from_node.inflow.append(-flux)
-    to_node.inflow.append(flux)
-    production = area * h * difference**2 / (from_node.T * to_node.T)
-    build.production(quantity.name, f"heat flow from {a} to {b}", production)
-    _received(build, law, flux)
+    name, text = _path_name(build, a, b), f"heat flux from {a} to {b}"
+    parts = {channel: area * h * difference for channel, h in channels.items()}
+    if len(parts) > 1:
+        for channel, part in parts.items():
+            quantity = Quantity(f"{name}_{channel}", "W/m^2", f"{text} by {channel}")
+            parts[channel] = build.name(quantity, part)
+    total = build.name(Quantity(name, "W/m^2", text, tag="e:qc_k1"), symengine.Add(*parts.values()))
+    from_node.inflow.append(-total)
+    to_node.inflow.append(total)
+    production = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
+    build.production(name, f"heat flow from {a} to {b}", production)
+    _received(build, (a, b), parts if len(parts) > 1 else {next(iter(parts)): total})
 
 
-def _received(build: Build, law: HeatTransfer, flux: Expression) -> None:
-    """Remember which part of a body's heat comes from the interface or the other body, and which from elsewhere."""
-    group = build.into_body if "surroundings" in law.between else build.from_interface
-    for end, heat in zip(law.between, (-flux, flux), strict=True):
-        if end in group:
-            group[end] += heat
-        elif end == "interface":
-            build.into_interface.append(heat)
+def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expression]) -> None:
+    """Book fluxes from the first end to the second; with the surroundings, a body's heat is not the interface's."""
+    for channel, flux in parts.items():
+        for end, heat in zip(ends, (-flux, flux), strict=True):
+            if "surroundings" in ends and end in build.into_body:
+                build.into_body[end] += heat
+            else:
+                _receive(build, end, heat, channel)
 
 
-def _path_name(build: Build, law: HeatTransfer) -> str:
-    """Name of the flux along a heat path: q_12, q_c1, q_1a."""
+def _path_name(build: Build, a: str, b: str) -> str:
+    """Name of the flux from one end to another: q_12, q_c1, q_1a."""
     short = {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
     short |= {"interface": "c", "surroundings": "a"}
-    return build.unique("q_" + "".join(short[end] for end in law.between))
+    return build.unique(f"q_{short[a]}{short[b]}")
 
 
 def _end(build: Build, end: str) -> Node:
@@ -113,7 +179,7 @@ def _external_heat(build: Build, member: str, name: str) -> None:
         build.supply(f"H_{name[2:]}", text, Q, build.node_of[member].T)
     else:
         build.supply(f"H_{name[2:]}", text, Q, build.variables.get("T_c", "the external heat"))
-        _share(build, Q)
+        _share(build, Q, "external")
     if member in build.into_body:
         build.into_body[member] += Q
     else:

@@ -58,7 +58,7 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> None:
 
 
 def _traction(build: Build, law: Limit) -> Expression:
-    if not any(item.name == "t_n" for item in build.named) and not build.variables.has("t_n"):
+    if not build.variables.has("t_n"):
         message = "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
         raise InputError(message, law.place)
-    return build.variables.get("t_n", law) if build.variables.has("t_n") else symengine.Symbol("t_n")
+    return build.variables.get("t_n", law)

@@ -62,9 +62,12 @@ def _new_node(build: Build, name: str, load: Load | None) -> Node:
 
 
 def _mean_temperature(build: Build) -> Expression:
-    T_1, T_2 = (build.variables.get(f"T_{k}", "the interface") for k in (1, 2))
-    share_1, share_2 = build.shares()
-    return build.name(VARIABLES["T_c"], 1 / (share_1 / T_1 + share_2 / T_2))
+    shares = build.shares()
+    if "surroundings" in shares and "surroundings" not in build.node_of:
+        raise InputError("interface: heat is lost to surroundings that have no temperature. Add `surroundings`.")
+    return build.name(
+        VARIABLES["T_c"], 1 / symengine.Add(*(share / build.node_of[end].T for end, share in shares.items()))
+    )
 
 
 def _body_energy(build: Build, body: Body, suffix: str) -> None:

@@ -73,7 +73,7 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
     """
     node = build.node_of[body.name]
     sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
-    flux = build.from_interface[body.name]
+    flux = _stated(build, k, body) if not sharing else symengine.Add(*build.from_interface[body.name].values())
     if sharing and node.prescribed:
         if sharing != ["interface"]:
             return None
@@ -87,6 +87,16 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
             return flux
     _book_heat(build, k, body, flux)
     return flux
+
+
+def _stated(build: Build, k: int, body: Body) -> Expression:
+    """Heat into a body by stated laws; where several channels carry it, the sum of a flux for each."""
+    channels = build.from_interface[body.name]
+    if len(channels) < 2:
+        return symengine.Add(*channels.values())
+    text = f"heat flux from the interface into {body.name} by"
+    parts = [(Quantity(f"q_{k}_{name}", "W/m^2", f"{text} {name}"), heat) for name, heat in channels.items()]
+    return symengine.Add(*(build.areal(quantity, heat) for quantity, heat in parts))
 
 
 def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:

@@ -13,13 +13,16 @@ from surfacechem.case.fields import choice, items, mapping, number
 from surfacechem.case.laws import build, history, law, law_list
 from surfacechem.case.mechanics import MOVING, STIFFNESS_KEYS, read_mountings, read_programme
 from surfacechem.case.mechanism import read_mechanism
+from surfacechem.case.medium import read_medium
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, suggestion
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
 
-INTERFACE_KEYS = ("temperature", "sites", "partition", "potential", "friction", "bonding", "limits", "mechanism")
+INTERFACE_KEYS = (
+    *("temperature", "sites", "partition", "medium", "potential", "friction", "bonding", "limits", "mechanism"),
+)
 
 NODE = re.compile(r"T[A-Za-z0-9_]*")
 """Names of temperatures start with T, so that they never clash with another quantity."""
@@ -114,7 +117,7 @@ class SceneReader:
         return value
 
     def _check_owner(self, name: str, tree: Tree, found: list[str | Load | None]) -> None:
-        if name == "T_a" or (name in OWNERS and found[OWNERS[name]] != name):
+        if name in ("T_a", "T_from", "T_to") or (name in OWNERS and found[OWNERS[name]] != name):
             raise tree.error(f"'{name}' is {VARIABLES[name].long_name}, which has its own; use another name.")
 
     def _above_zero(self, load: Load, tree: Tree) -> Load:
@@ -152,9 +155,20 @@ class SceneReader:
         frictions = law_list(Friction, given.get("friction"), self.units)
         limits = law_list(Limit, given.get("limits"), self.units)
         sites = self._sites()
-        partition = self._partition()
+        partition, loss = self._partition()
+        medium = read_medium(given.get("medium"), self.units)
         if mechanism is None:
-            return Interface(self.temperatures[2], potentials, frictions, reactions, sites, partition, limits=limits)
+            return Interface(
+                self.temperatures[2],
+                potentials,
+                frictions,
+                reactions,
+                sites,
+                partition,
+                limits=limits,
+                loss=loss,
+                medium=medium,
+            )
         return Interface(
             self.temperatures[2],
             (*potentials, *mechanism.potentials),
@@ -165,15 +179,28 @@ class SceneReader:
             mechanism.variables,
             mechanism.bonds,
             limits,
+            loss,
+            medium,
         )
 
-    def _partition(self) -> float:
+    def _partition(self) -> tuple[float, float]:
+        """Fractions of the heat into body 1 and into the surroundings."""
         tree = self.interface.get("partition")
         if tree is None:
-            return 0.5
+            return 0.5, 0.0
         if "temperature" in self.interface:
             raise tree.error("an interface with a temperature divides its heat by itself; remove `partition`.")
-        return number(tree, "1", "partition", Spec("1", "fraction of heat into body 1", at_least=0, at_most=1))
+        spec = Spec("1", "fraction of heat", at_least=0, at_most=1)
+        if not isinstance(tree.value, dict):
+            return number(tree, "1", "partition", spec), 0.0
+        first, second = self.bodies
+        given = mapping(tree, [first, second, "surroundings"])
+        shares = {name: number(child, "1", name, spec) for name, child in given.items()}
+        if abs(sum(shares.values()) - 1) > 1e-9:
+            raise tree.error(f"the fractions of the heat must add up to 1, not {sum(shares.values()):g}.")
+        if shares.get("surroundings") and "surroundings" not in self.top:
+            raise tree.error("the surroundings have no temperature. Add `surroundings: {temperature: ...}`.")
+        return shares.get(first, 0.0), shares.get("surroundings", 0.0)
 
     def _sites(self) -> Sites | None:
         tree = self.interface.get("sites")
@@ -211,7 +238,8 @@ class SceneReader:
             raise InputError(f"a heat path needs two different ends, not {path.between[0]} twice.", place)
         if "surroundings" in path.between and "surroundings" not in self.top:
             raise InputError("the surroundings have no temperature. Add `surroundings: {temperature: ...}`.", place)
-        if "interface" in path.between and "temperature" not in self.interface:
+        through = path.closure == "medium" or "interface" in path.between
+        if through and "temperature" not in self.interface:
             raise InputError("the interface has no temperature. Add `interface.temperature`.", place)
         return cast(HeatTransfer, path)
 

@@ -16,16 +16,18 @@ from surfacechem.terms import (
     Limit,
     Load,
     Potential,
+    Property,
     RateLaw,
 )
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange"),
+    Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange", "films"),
     RateLaw: ("kinetics", "bonds", "adhesion"),
-    Friction: ("friction",),
-    HeatTransfer: ("heat",),
+    Friction: ("friction", "films"),
+    HeatTransfer: ("heat", "contact_conductance", "gap_conductance", "films"),
     Limit: ("limits",),
+    Property: ("media",),
     Load: ("loading",),
     Factor: ("factors",),
 }

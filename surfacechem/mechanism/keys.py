@@ -44,7 +44,6 @@ PHASE = frozenset(
     )
 )
 SPECIES = frozenset(("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"))
-BOND = frozenset(("stiffness", "rest-length"))
 CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
 POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
@@ -62,6 +61,8 @@ REACTION = frozenset(
         "description",
     )
 )
+BOND = {"stiffness": "N/m", "rest-length": "m"}
+"""Keys of the elasticity of a bond with the units they have."""
 STATE = frozenset(("T", "P", "coverages"))
 
 REMEDIES = {
@@ -166,7 +167,9 @@ def _check_species(source: Source, entry: Any) -> None:
     for key in ("h0", "s0", "cp0"):
         values.check_bare(source, thermo, key, title, entry)
     if "bond" in entry:
-        _keys(source, entry["bond"], BOND, f"{title}: bond")
+        _keys(source, entry["bond"], BOND, f"{title}: bond", source.place(entry, "bond"))
+        for key, unit in BOND.items():
+            values.check_dimension(source, entry["bond"], key, f"{title}: bond", unit, entry)
 
 
 def _check_composition(source: Source, phase: Any, entry: Any) -> None:
@@ -194,21 +197,22 @@ def _names(source: Source, phase: Any, entries: list[Any]) -> list[str]:
 
 def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) -> None:
     title = f"reaction {entry.get('equation')}"
-    _keys(source, entry, REACTION.union(*map(_keys_of, kinds().values())), title)
+    _keys(source, entry, REACTION.union(*map(_own, kinds().values())), title)
     values.check_units(source, entry)
     if "equation" not in entry:
         raise InputError("a reaction has no `equation`.", source.place(entry))
     law = _law(source, entry, title)
     for key in entry:
-        if key not in REACTION | _keys_of(law):
-            having = ", ".join(sorted(kind for kind, other in kinds().items() if key in _keys_of(other)))
+        if key not in REACTION | _own(law):
+            having = ", ".join(sorted(kind for kind, other in kinds().items() if key in _own(other)))
             message = f"{title}: '{key}' is no key of {law.kind}; it belongs to {having}."
             raise InputError(message, source.place(entry, key))
     left_out = _check_equation(source, phase, entry, names, title)
     _check_rate(source, entry, law, [] if left_out else names, title)
 
 
-def _keys_of(law: type[SurfaceReaction]) -> set[str]:
+def _own(law: type[SurfaceReaction]) -> set[str]:
+    """Keys that a reaction has because of its rate type."""
     return {*law.keys, *law.own_keys()}
 
 
@@ -256,7 +260,11 @@ def _check_rate(source: Source, entry: Any, law: type[SurfaceReaction], names: l
             _keys(source, node, inner, f"{title}: {key}")
     if isinstance(entry.get("orders"), Mapping) and names:
         _known(source, entry["orders"], names, f"{title}: orders")
-    _check_numbers(source, entry, title)
+    if "rate-constant" in law.keys:
+        _check_arrhenius(source, entry, title)
+    specs = dict(law.specs())
+    for key, name in law.own_keys().items():
+        values.check_dimension(source, entry, key, title, specs[name].unit, entry)
 
 
 def _check_coverages(source: Source, entry: Any, inner: Iterable[str], names: list[str], title: str) -> None:
@@ -271,7 +279,7 @@ def _check_coverages(source: Source, entry: Any, inner: Iterable[str], names: li
             values.check_bare(source, terms, "E", title, entry)
 
 
-def _check_numbers(source: Source, entry: Any, title: str) -> None:
+def _check_arrhenius(source: Source, entry: Any, title: str) -> None:
     rate = entry.get("rate-constant")
     if not isinstance(rate, Mapping):
         raise InputError(f"{title} has no `rate-constant: {{A, b, Ea}}`.", source.place(entry))
@@ -290,9 +298,9 @@ def _known(source: Source, node: Any, names: Iterable[str], title: str) -> None:
             raise InputError(f"{title}: no species '{name}'.{suggestion(str(name), names)}", source.place(node, name))
 
 
-def _keys(source: Source, node: Any, known: Iterable[str], title: str) -> None:
+def _keys(source: Source, node: Any, known: Iterable[str], title: str, place: Place | None = None) -> None:
     if not isinstance(node, Mapping):
-        raise InputError(f"{title} is not a mapping: {node!r}.", Place(source.file))
+        raise InputError(f"{title} is not a mapping: {node!r}.", place or Place(source.file))
     allowed = set(known)
     for key in node:
         if key in allowed:

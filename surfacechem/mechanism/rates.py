@@ -86,9 +86,9 @@ class SurfaceReaction(RateLaw):
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
         """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
 
-    @abstractmethod
     def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
-        """Logarithm of the rate coefficient."""
+        """Logarithm of the rate coefficient; to be overridden where the coefficient may vanish."""
+        return log(self.coefficient(values, 0))
 
     def own_reads(self) -> tuple[str, ...]:
         """Variables that the coefficient reads beside the temperature."""

@@ -27,6 +27,11 @@ BARE = {
 }
 """Entries whose bare number Cantera counts per kmol: what in `units` says otherwise, the unit, and an example."""
 
+DIMENSIONS = {"m": ("length",), "N/m": ("length",), "J": ENERGY, "J/mol": ENERGY}
+"""What in `units` gives a bare number of that unit a meaning."""
+
+EXAMPLES = {"m": "0.4 nm", "N/m": "1 pN/nm", "J": "10 kJ/mol", "J/mol": "50 kJ/mol"}
+
 NUMBER = r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)"
 
 
@@ -78,6 +83,15 @@ def check_bare(source: Source, node: Any, key: str, title: str, entry: Any = Non
                 f"`{key}: {example}`, or say at the top `units: {{quantity: mol, activation-energy: kJ/mol}}`."
             )
             raise InputError(message, source.place(node, key))
+
+
+def check_dimension(source: Source, node: Any, key: str, title: str, unit: str, entry: Any) -> None:
+    """A length, stiffness or energy without a unit is refused where the file does not say what it counts in."""
+    value, wanted = node.get(key), DIMENSIONS.get(unit, ())
+    bare = isinstance(value, int | float) and value
+    if bare and wanted and not any(item in source.defaults(entry) for item in wanted):
+        message = f"{title}: {key}: {value:g} has no unit, and `units` says nothing about it; write it in {unit}, "
+        raise InputError(f"{message}such as `{key}: {EXAMPLES[unit]}`.", source.place(node, key))
 
 
 def check_positive(source: Source, node: Any, key: str, title: str) -> None:

@@ -1,0 +1,122 @@
+"""Functions of temperature that have no formula as polynomials in pieces, within a verified error.
+
+A property of a fluid is smooth but for kinks, where a correlation ends or a critical enhancement fades. Pieces are as
+long as they can be, so that the kinks lie between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+DEGREE = 10
+"""Degree of each polynomial."""
+
+MOST = 12
+"""Most pieces of a fit."""
+
+TARGET = 2e-9
+"""Largest relative error at the points of verification; between them it is of the same size."""
+
+CHECKS = 5
+"""Points of verification for each coefficient."""
+
+SHORTEST = 1e-7
+"""Kinks are located to this part of the range."""
+
+
+class NoFitError(ValueError):
+    """The function is no piecewise polynomial to the wanted accuracy."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A polynomial on low <= T <= high, its coefficients those of the powers of x = (2 T - low - high)/(high - low)."""
+
+    low: float
+    high: float
+    coefficients: tuple[float, ...]
+
+    def __call__(self, T: Array) -> Array:
+        """Values at T."""
+        x = (2 * T - self.low - self.high) / (self.high - self.low)
+        return np.asarray(np.polynomial.polynomial.polyval(x, np.array(self.coefficients)))
+
+
+def fit(function: Callable[[Array], Array], low: float, high: float) -> tuple[Piece, ...]:
+    """The function on low <= T <= high, relative error below TARGET; NoFitError where that takes too many pieces.
+
+    >>> pieces = fit(lambda T: np.exp(600 / T), 280.0, 360.0)
+    >>> len(pieces), bool(abs(pieces[0](300.0) / np.exp(2) - 1) < 1e-10)
+    (1, True)
+    """
+    pieces: list[Piece] = []
+    start = low
+    while start < high:
+        if len(pieces) == MOST:
+            raise NoFitError(f"more than {MOST} polynomials would be needed between {low:g} and {high:g} K.")
+        pieces.append(_polynomial(function, start, high) or _longest(function, start, high))
+        start = pieces[-1].high
+    return tuple(pieces)
+
+
+def divided(pieces: Sequence[Piece], count: int) -> tuple[Piece, ...]:
+    """The same function in so many pieces; NoFitError where it has more."""
+    found = list(pieces)
+    if len(found) > count:
+        span = f"between {found[0].low:g} and {found[-1].high:g} K"
+        raise NoFitError(f"{len(found)} polynomials are needed {span}, {count} were at the start.")
+    while len(found) < count:
+        widest = max(range(len(found)), key=lambda i: found[i].high - found[i].low)
+        found[widest : widest + 1] = _halves(found[widest])
+    return tuple(found)
+
+
+def _halves(piece: Piece) -> list[Piece]:
+    """The same polynomial in two pieces."""
+    middle = (piece.low + piece.high) / 2
+    return [_moved(piece, piece.low, middle), _moved(piece, middle, piece.high)]
+
+
+def _moved(piece: Piece, low: float, high: float) -> Piece:
+    """The same polynomial between other ends."""
+    width = piece.high - piece.low
+    x = np.polynomial.Polynomial([(low + high - piece.low - piece.high) / width, (high - low) / width])
+    return Piece(low, high, _filled(np.polynomial.Polynomial(np.array(piece.coefficients))(x).coef))
+
+
+def _filled(powers: ArrayLike) -> tuple[float, ...]:
+    given = [float(power) for power in np.asarray(powers, dtype=float)]
+    return (*given, *[0.0] * (DEGREE + 1 - len(given)))
+
+
+def _longest(function: Callable[[Array], Array], low: float, high: float) -> Piece:
+    """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
+    good, bad, found = low, high, None
+    while bad - good > SHORTEST * (high - low):
+        middle = (good + bad) / 2
+        piece = _polynomial(function, low, middle)
+        if piece is None:
+            bad = middle
+        else:
+            good, found = middle, piece
+    if found is None:
+        raise NoFitError(f"it is not smooth at {low:g} K.")
+    return _moved(found, low, bad)
+
+
+def _polynomial(function: Callable[[Array], Array], low: float, high: float) -> Piece | None:
+    """The polynomial through the Chebyshev nodes, unless it is off elsewhere."""
+    nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+    values = function((low + high) / 2 + (high - low) / 2 * nodes)
+    powers = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))
+    piece = Piece(low, high, _filled(powers))
+    T = np.linspace(low, high, CHECKS * (DEGREE + 1) + 1)
+    exact = function(T)
+    return piece if bool(np.all(np.abs(piece(T) - exact) <= TARGET * np.abs(exact))) else None

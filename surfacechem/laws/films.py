@@ -1,0 +1,105 @@
+"""Films of a medium: conduction, rarefied gas, shear, heat capacity."""
+
+from __future__ import annotations
+
+import math
+
+from surfacechem.expressions import Expression, sqrt
+from surfacechem.terms import Friction, HeatTransfer, Potential, parameter
+
+
+class Film(HeatTransfer):
+    r"""Conduction across a film of the medium.
+
+    .. math:: h = k_m / d_m
+
+    The conductivity is that of the medium at :math:`T_c`. Source: Fourier's law. Films that are thick against the mean
+    free path, and thin enough not to convect.
+
+    >>> round(Film(between=("lower", "upper")).conductance(k_m=0.026, d_m=1e-5), 9)
+    2600.0
+    """
+
+    channel = "film"
+    positive = ("d_m",)
+
+    def conductance(self, k_m: Expression, d_m: Expression) -> Expression:
+        """Conductance [W/(m^2 K)]."""
+        return k_m / d_m
+
+
+class RarefiedFilm(HeatTransfer):
+    r"""Conduction across a gas film, with temperature jumps at its walls.
+
+    .. math:: h = \frac{k_m}{d_m + M}, \quad
+              M = \left(\frac{2 - \alpha_1}{\alpha_1} + \frac{2 - \alpha_2}{\alpha_2}\right)
+              \frac{2 \gamma}{\gamma + 1} \frac{\Lambda}{\mathrm{Pr}}, \quad
+              \Lambda = \eta_m \sqrt{\frac{\pi}{2 p_m \rho_m}}
+
+    Everything but the accommodation is a property of the medium at :math:`T_c`. Source: Yovanovich, DeVaal & Hegazy
+    (1982), AIAA paper 82-0888; the jump is that of Kennard, Kinetic Theory of Gases (1938). Dilute gases; from
+    continuum to free molecules within a few per cent where the jumps are small against the temperatures.
+
+    >>> law = RarefiedFilm(between=("lower", "upper"))
+    >>> gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
+    >>> round(law.conductance(d_m=1e-6, **gas), 3)
+    21328.612
+    """
+
+    channel = "film"
+
+    alpha_1: float = parameter("1", "thermal accommodation at the first end", default=1.0, above=0, at_most=1)
+    alpha_2: float = parameter("1", "thermal accommodation at the second end", default=1.0, above=0, at_most=1)
+
+    def conductance(
+        self,
+        k_m: Expression,
+        eta_m: Expression,
+        rho_m: Expression,
+        cp_m: Expression,
+        gamma_m: Expression,
+        p_m: Expression,
+        d_m: Expression,
+    ) -> Expression:
+        """Conductance [W/(m^2 K)]."""
+        walls = (2 - self.alpha_1) / self.alpha_1 + (2 - self.alpha_2) / self.alpha_2
+        mean_free_path = eta_m * sqrt(math.pi / (2 * p_m * rho_m))
+        prandtl = eta_m * cp_m / k_m
+        return k_m / (d_m + walls * 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl)
+
+
+class FilmShear(Friction):
+    r"""Newtonian film of the medium.
+
+    .. math:: t_t = \eta_m\,v / d_m
+
+    The viscosity is that of the medium at :math:`T_c`, so that the film thins as it heats.
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric. Any v; laminar. Dissipates :math:`t_t v \ge 0`.
+
+    >>> round(FilmShear().traction(eta_m=0.5, d_m=1e-6, v=0.25), 6)
+    125000.0
+    """
+
+    positive = ("d_m",)
+
+    def traction(self, eta_m: Expression, d_m: Expression, v: Expression) -> Expression:
+        """Tangential traction [Pa]."""
+        return eta_m * v / d_m
+
+
+class FilmCapacity(Potential):
+    r"""Heat that a film of the medium stores.
+
+    .. math:: \Psi = d_m f_m(T_c), \quad -T_c\,f_m'' = \rho_m c_{p,m}
+
+    :math:`f_m` is the exact double integral of the heat capacity, zero with its slope at the start. The film keeps its
+    thickness; the work of its thermal expansion goes to its surroundings at constant pressure. Source: classical
+    thermodynamics.
+
+    >>> FilmCapacity().energy(d_m=1e-6, f_m=-2.5e7)
+    -25.0
+    """
+
+    def energy(self, d_m: Expression, f_m: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return d_m * f_m

@@ -1,0 +1,54 @@
+"""Tables as smooth curves, for the laws that are given as numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, positive, where
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points joined by cubics that keep their order: no overshoot, continuous slope; never below zero.
+
+    Source: Fritsch & Butland (1984), doi 10.1137/0905021.
+
+    >>> curve = Curve([0.0, 1.0, 3.0], [1.0, 2.0, 2.5])
+    >>> curve.value(1.0, linear=False), curve.value(-7.0, linear=False)
+    (2.0, 1.0)
+    """
+
+    at: Sequence[float]
+    values: Sequence[float]
+
+    @staticmethod
+    def check(at: Sequence[float], values: Sequence[float], of: str, what: str) -> None:
+        """Raise InputError unless the points are finite, increasing, not negative and at least two."""
+        if len(at) != len(values) or len(at) < 2:
+            raise InputError(f"a table needs as many {of} ({len(at)}) as {what} ({len(values)}), at least 2.")
+        if not all(math.isfinite(x) for x in (*at, *values)) or min(values) < 0:
+            raise InputError(f"{of} and {what} of a table must be finite, and the {what} not negative.")
+        if any(b <= a for a, b in pairwise(at)):
+            raise InputError(f"{of} of a table must increase from each to the next.")
+
+    def value(self, x: Expression, *, linear: bool) -> Expression:
+        """Value at x; beyond the ends constant, or continued by the end slopes."""
+        from scipy.interpolate import PchipInterpolator
+
+        cubics = PchipInterpolator(self.at, self.values).c.T.tolist()
+        slopes = (cubics[0][2], self._end_slope(cubics[-1])) if linear else (0.0, 0.0)
+        result = self.values[-1] + slopes[1] * (x - self.at[-1])
+        for (low, high), (a, b, c, d) in reversed(list(zip(pairwise(self.at), cubics, strict=True))):
+            z = x - low
+            result = where(x < high, d + z * (c + z * (b + z * a)), result)
+        result = where(x < self.at[0], self.values[0] + slopes[0] * (x - self.at[0]), result)
+        return positive(result) if linear else result
+
+    def _end_slope(self, cubic: Sequence[float]) -> float:
+        a, b, c, _ = cubic
+        z = self.at[-1] - self.at[-2]
+        return c + z * (2 * b + 3 * z * a)

@@ -1,0 +1,1 @@
+"""Substances between the bodies whose properties other packages know."""

@@ -1,0 +1,143 @@
+"""Fluids of CoolProp, by any name it knows: pure and pseudo-pure fluids, mixtures, incompressible liquids.
+
+CoolProp: Bell, Wronski, Quoilin & Lemort (2014), doi 10.1021/ie4033999.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import fits
+from surfacechem.errors import InputError
+from surfacechem.terms import Fluid, FluidRange
+
+Array = NDArray[np.float64]
+
+BESIDE = 1e-5
+"""Relative distance from saturation at which properties end."""
+
+WORDS = {
+    "k_m": "conductivity",
+    "eta_m": "viscosity",
+    "rho_m": "density",
+    "cp_m": "heat capacity",
+    "gamma_m": "ratio of heat capacities",
+    "capacity_m": "heat capacity",
+}
+
+Getter = Callable[[str], Array]
+
+COMBINED: Mapping[str, Callable[[Getter, Array], Array]] = {
+    "k_m": lambda get, _: get("L"),
+    "eta_m": lambda get, _: get("V"),
+    "rho_m": lambda get, _: get("D"),
+    "cp_m": lambda get, _: get("C"),
+    "gamma_m": lambda get, _: get("C") / get("O"),
+    "capacity_m": lambda get, T: get("D") * get("C") / T,
+}
+"""Properties from CoolProp's letters; the last one is rho c_p / T, whose integrals are entropy and energy."""
+
+
+@dataclass(frozen=True)
+class CoolPropFluid(Fluid):
+    """A fluid at a constant pressure [Pa].
+
+    >>> CoolPropFluid("Water", 101325.0).range(300.0).reason_high
+    'Water at 101325 Pa boils'
+    """
+
+    name: str
+    pressure: float
+
+    def range(self, T: float) -> FluidRange:
+        """Temperatures around T [K] at which the fluid stays what it is; InputError where it has no properties."""
+        low, high = self._call("Tmin"), self._call("Tmax")
+        if not low <= T <= high:
+            span = f"CoolProp's range is {low:g} to {high:g} K"
+            raise InputError(f"{self.title} has no properties at {T:g} K: {span}.")
+        end = f"{self.title} has no properties beyond"
+        boils, condenses = self._saturation(0), self._saturation(1)
+        if boils is not None and boils > T:
+            return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")
+        if condenses is not None and condenses < T:
+            return FluidRange(condenses * (1 + BESIDE), high, f"{self.title} condenses", end)
+        if boils is not None:
+            raise InputError(f"{self.title} is a mixture of liquid and vapour at {T:g} K.")
+        return FluidRange(low, high, end, end)
+
+    def check(self) -> None:
+        """Raise InputError unless CoolProp knows the fluid."""
+        self._call("Tmin")
+
+    @property
+    def title(self) -> str:
+        """The fluid and its pressure in words."""
+        return f"{self.name} at {self.pressure:g} Pa"
+
+    def fit(self, quantity: str, low: float, high: float) -> tuple[fits.Piece, ...]:
+        """A property between two temperatures [K]; InputError where CoolProp has none."""
+        return _fit(self, quantity, low, high)
+
+    def values(self, quantity: str, T: Array) -> Array:
+        """A property at temperatures [K] as CoolProp has it."""
+        return COMBINED[quantity](lambda letter: self._properties(letter, T), T)
+
+    def _properties(self, letter: str, T: Array) -> Array:
+        try:
+            found = np.asarray(_coolprop().PropsSI(letter, "T", T, "P", self.pressure, self.name), dtype=float)
+        except ValueError:
+            found = np.full(T.shape, np.inf)
+        for bad in T[~np.isfinite(found)]:
+            raise InputError(f"{self.title}: {self._refusal(letter, float(bad))}")
+        return found
+
+    def _refusal(self, letter: str, T: float) -> str:
+        """Why there is no property at T [K]; CoolProp tells only of a single value."""
+        try:
+            return (
+                f"no finite value at {T:g} K, but {_coolprop().PropsSI(letter, 'T', T, 'P', self.pressure, self.name)}."
+            )
+        except ValueError as error:
+            return _reason(error)
+
+    def _call(self, letter: str) -> float:
+        try:
+            return float(_coolprop().PropsSI(letter, "T", 0, "P", 0, self.name))
+        except ValueError as error:
+            close = difflib.get_close_matches(self.name, _coolprop().FluidsList(), n=1)
+            hint = f"Did you mean '{close[0]}'?" if close else _reason(error)
+            raise InputError(f"CoolProp knows no fluid '{self.name}'. {hint}") from None
+
+    def _saturation(self, quality: int) -> float | None:
+        """Temperature at which it boils (0) or condenses (1); None where it does neither."""
+        try:
+            return float(_coolprop().PropsSI("T", "P", self.pressure, "Q", quality, self.name))
+        except ValueError:
+            return None
+
+
+@cache
+def _fit(fluid: CoolPropFluid, quantity: str, low: float, high: float) -> tuple[fits.Piece, ...]:
+    try:
+        return fits.fit(lambda T: fluid.values(quantity, T), low, high)
+    except fits.NoFitError as error:
+        raise InputError(f"the {WORDS[quantity]} of {fluid.title} cannot be fitted: {error}") from None
+
+
+def _coolprop() -> Any:
+    from CoolProp import CoolProp
+
+    return CoolProp
+
+
+def _reason(error: ValueError) -> str:
+    """What CoolProp says, without the call that it repeats."""
+    return re.sub(r"\s*:? *PropsSI\(.*", "", str(error), flags=re.DOTALL).strip().rstrip(".") + "."

@@ -1,0 +1,266 @@
+"""Media: fits against CoolProp, runs that leave their range, what is refused, and nothing imported without need."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from surfacechem import case, fits, simulation
+from surfacechem.assembly import assemble
+from surfacechem.audit import audit
+from surfacechem.errors import InputError
+from surfacechem.integrate import Model, Run
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, RarefiedFilm
+from surfacechem.laws.loading import Hold
+from surfacechem.laws.media import Roelands, Vogel
+from surfacechem.media.coolprop import COMBINED, CoolPropFluid
+from surfacechem.scene import Body, Interface, Medium, Scene
+from surfacechem.simulation import computed
+
+BOUND = 1e-8
+FLUIDS = [
+    ("Nitrogen", 101325.0, 220.0, 480.0),
+    ("Air", 1e5, 250.0, 600.0),
+    ("Helium", 1e5, 250.0, 400.0),
+    ("CarbonDioxide", 1e5, 280.0, 500.0),
+    ("Water", 1e6, 280.0, 440.0),
+    ("n-Dodecane", 1e5, 290.0, 420.0),
+    ("INCOMP::MEG-50%", 1e5, 260.0, 360.0),
+    ("INCOMP::S800", 1e5, 290.0, 450.0),
+]
+
+
+def medium(fluid="Water", p=1e5, thickness=2e-6) -> Medium:
+    return Medium(CoolPropFluid(fluid, p), {}, thickness)
+
+
+def lubricated(found: Medium, v=2.0, T=300.0, C=500.0, capacity=True) -> Scene:
+    """Two bodies that slide on a film of the medium."""
+    interface = Interface("T_c", [FilmCapacity()] * capacity, [FilmShear()], medium=found)
+    pair = Body("lower", "T_1", Constant(C=C)), Body("upper", "T_2", Constant(C=C))
+    initial = {"T_1": T, "T_2": T} | ({"T_c": T} if capacity else {})
+    heat = [Film(between=("lower", "upper"), closure="medium")]
+    return Scene(pair, interface, heat, {"v": Hold(level=v)}, None, 300.0, initial)
+
+
+def solved(scene: Scene, *times: float, **changes: float):
+    return Model(assemble(scene)).solve(Run(times=times), changes)
+
+
+# -- fits -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "p", "low", "high"), FLUIDS, ids=[row[0] for row in FLUIDS])
+def test_fits_are_within_their_bound(name, p, low, high):
+    fluid = CoolPropFluid(name, p)
+    T = np.random.default_rng(7).uniform(low, high, 400)
+    for quantity in COMBINED:
+        if name.startswith("INCOMP") and quantity == "gamma_m":
+            continue
+        pieces = fluid.fit(quantity, low, high)
+        assert [pieces[0].low, *(piece.high for piece in pieces)][-1] == high
+        index = np.searchsorted([piece.high for piece in pieces], T)
+        values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
+        assert np.max(np.abs(values / fluid.values(quantity, T) - 1)) < BOUND, quantity
+
+
+def test_kinks_and_jumps_lie_between_pieces():
+    kinked = fits.fit(lambda T: 1 + np.abs(np.sin(T / 50 - 6.1)), 280.0, 330.0)
+    jumping = fits.fit(lambda T: np.exp(T / 300) + (T > 311.7), 280.0, 330.0)
+    assert min(abs(piece.high - 305.0) for piece in kinked) < 1e-4
+    assert min(abs(piece.high - 311.7) for piece in jumping) < 1e-4
+
+
+def test_what_is_not_smooth_is_refused():
+    noise = np.random.default_rng(3)
+    with pytest.raises(fits.NoFitError):
+        fits.fit(lambda T: 1 + 1e-6 * noise.random(len(T)), 280.0, 330.0)
+
+
+@pytest.mark.parametrize("name", ["Water", "Nitrogen", "INCOMP::MEG-50%"])
+def test_properties_in_the_compiled_code(name):
+    scene = lubricated(medium(name), v=2.0 if name != "Nitrogen" else 30.0)
+    values = computed(solved(scene, *np.linspace(0.0, 2.0, 21)))
+    exact = CoolPropFluid(name, 1e5)
+    for quantity in ("k_m", "eta_m"):
+        assert values[quantity] == pytest.approx(exact.values(quantity, values["T_c"]), rel=BOUND)
+    assert values["t_film_shear"] == pytest.approx(values["eta_m"] * values["v"] / 2e-6, rel=1e-12)
+
+
+def test_energy_and_entropy_of_a_film_are_the_integrals_of_its_heat_capacity():
+    values = computed(solved(lubricated(medium("Nitrogen"), v=40.0), *np.linspace(0.0, 2.0, 21)))
+    fluid, d = CoolPropFluid("Nitrogen", 1e5), 2e-6
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    start = values["T_c"][0]
+    for T, U, S in zip(values["T_c"][1:], values["U_c"][1:], values["S_c"][1:], strict=True):
+        points = start + (T - start) * (nodes + 1) / 2
+        over_T = d * fluid.values("capacity_m", points)
+        assert pytest.approx((T - start) / 2 * weights @ over_T, rel=BOUND) == S
+        assert pytest.approx((T - start) / 2 * weights @ (over_T * points), rel=BOUND) == U
+    assert (values["U_c"][0], values["S_c"][0]) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_films_close_energy_and_entropy():
+    for capacity in (True, False):
+        books = audit(solved(lubricated(medium(), capacity=capacity), 0.0, 1.0, 5.0))
+        assert books.energy_error < 1e-9
+        assert books.entropy_error < 1e-9
+        assert books.violations == ()
+
+
+# -- runs that leave the range ----------------------------------------------------------------------------------------
+
+
+def test_a_run_that_leaves_the_range_goes_on_with_a_wider_one(monkeypatch):
+    model = Model(assemble(lubricated(medium("Nitrogen"), v=60.0)))
+    monkeypatch.setattr("surfacechem.integrate.compile_program", None)
+    monkeypatch.setattr("surfacechem.integrate.compile_function", None)
+    trajectory = model.solve(Run(times=np.linspace(0.0, 8.0, 9)))
+    assert trajectory.status == "finished"
+    values = computed(trajectory)
+    assert values["T_c"][-1] > 420.0
+    exact = CoolPropFluid("Nitrogen", 1e5).values("eta_m", values["T_c"])
+    assert values["eta_m"] == pytest.approx(exact, rel=BOUND)
+    again = model.solve(Run(times=np.linspace(0.0, 8.0, 9)))
+    assert np.array_equal(again.result.outputs, trajectory.result.outputs)
+
+
+def test_an_algebraic_temperature_beyond_the_first_range_is_found():
+    scene = lubricated(medium("Nitrogen", thickness=5e-4), v=500.0, capacity=False)
+    trajectory = solved(scene, 0.0, 1.0)
+    values = computed(trajectory)
+    assert values["T_c"][0] > 340.0
+    exact = CoolPropFluid("Nitrogen", 1e5)
+    for quantity in ("k_m", "eta_m"):
+        assert values[quantity] == pytest.approx(exact.values(quantity, values["T_c"]), rel=BOUND)
+
+
+def test_a_start_elsewhere_is_fitted_there():
+    model = Model(assemble(lubricated(medium("Nitrogen"))))
+    changes = {f"initial.{name}": 500.0 for name in ("T_1", "T_2", "T_c")}
+    values = computed(model.solve(Run(times=[0.0, 0.1]), changes))
+    assert values["eta_m"][0] == pytest.approx(CoolPropFluid("Nitrogen", 1e5).values("eta_m", np.array([500.0]))[0])
+
+
+def test_a_liquid_that_boils_ends_the_run():
+    trajectory = solved(lubricated(medium(), v=20.0), 0.0, 1.0, 5.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith("Water at 100000 Pa boils at T_c = 372.752 K")
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fluid", "p", "T", "message"),
+    [
+        ("Propyne", 5e5, 300.0, "Propyne at 500000 Pa: Viscosity model is not available for this fluid"),
+        ("Water", 1e5, 250.0, "Water at 100000 Pa has no properties at 250 K: CoolProp's range is 273.16 to 2000 K"),
+        ("Watr", 1e5, 300.0, "CoolProp knows no fluid 'Watr'. Did you mean 'Water'?"),
+    ],
+)
+def test_what_coolprop_has_not_is_refused_with_the_reason(fluid, p, T, message):
+    with pytest.raises(InputError, match="^" + message.replace("?", r"\?")):
+        assemble(lubricated(medium(fluid, p), T=T))
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (
+            Medium(None, {"eta_m": 0.1, "rho_m": 800.0, "cp_m": 2e3}, 1e-6),
+            "reads the thermal conductivity of the medium k_m",
+        ),
+        (Medium(None, {"eta_m": 0.1, "k_m": 0.1, "rho_m": 800.0}, 1e-6), "needs the density and the heat capacity"),
+        (Medium(CoolPropFluid("Water", 1e5), {}, None), "a film that stores heat needs a thickness"),
+    ],
+)
+def test_a_medium_that_lacks_what_is_asked_for(found, message):
+    scene = lubricated(found)
+    scene = dataclasses.replace(scene, loading={**scene.loading, "g_n": Hold(level=1e-6)})
+    with pytest.raises(InputError, match=message):
+        assemble(scene)
+
+
+TEXT = """
+bodies: {lower: {temperature: T_1, C: 500}, upper: {temperature: T_2, C: 500}}
+T_0: 300
+interface: {temperature: T_c, medium: {%s}, friction: [film-shear]}
+heat: [film: {between: [lower, upper], closure: medium}]
+loading: {v: 2, g_n: 1 um}
+initial: {T_1: 300, T_2: 300}
+run: {until: 1}
+"""
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("fluid: Watr, pressure: 1 atm", "case.yaml:4: interface.medium.fluid: CoolProp knows no fluid 'Watr'"),
+        ("fluid: Water", "case.yaml:4: interface.medium: the fluid needs a `pressure`"),
+        ("pressure: 1 atm", "case.yaml:4: interface.medium.pressure: `pressure` belongs to a fluid"),
+        ("conductivity: {vogel: {a: 1, b: 1, c: 1}}", "vogel is a law of the viscosity of the medium, not of the cond"),
+        ("viscosity: 3 m", "viscosity"),
+        ("viscosty: 3", "unknown key 'viscosty'. Did you mean 'viscosity'?"),
+    ],
+)
+def test_media_of_case_files_that_are_wrong(content, message):
+    with pytest.raises(InputError) as caught:
+        case.load_text(TEXT % content)
+    assert message in str(caught.value)
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_property_that_is_given_goes_before_that_of_the_fluid():
+    found = Medium(CoolPropFluid("Water", 1e5), {"eta_m": Vogel(a=6e-5, b=900.0, c=165.0)}, 2e-6)
+    values = computed(solved(lubricated(found, v=0.5), 0.0, 1.0))
+    assert values["eta_m"] == pytest.approx(6e-5 * np.exp(900.0 / (values["T_c"] - 165.0)), rel=1e-12)
+    assert values["k_m"] == pytest.approx(CoolPropFluid("Water", 1e5).values("k_m", values["T_c"]), rel=BOUND)
+
+
+def test_a_thick_gas_film_conducts_like_a_continuum():
+    gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
+    rarefied, film = (law(between=("lower", "upper")) for law in (RarefiedFilm, Film))
+    assert rarefied.conductance(d_m=1.0, **gas) == pytest.approx(film.conductance(k_m=gas["k_m"], d_m=1.0), rel=1e-6)
+
+
+def test_viscosity_laws_fall_with_temperature_and_rise_with_pressure():
+    roelands = Roelands(eta_0=0.04, Z=0.6, S_0=1.1)
+    assert roelands.value(T_c=350.0, p=0.0, T_0=313.0) < 0.04 < roelands.value(T_c=313.0, p=1e8, T_0=313.0)
+    slope = np.log(roelands.value(T_c=313.0, p=1e3, T_0=313.0) / 0.04) / 1e3
+    assert slope == pytest.approx(0.6 * (np.log(0.04) + 9.67) / 0.196e9, rel=1e-4)
+
+
+def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
+    found = Medium(None, {"eta_m": Vogel(a=6e-5, b=90.0, c=165.0), "k_m": 0.1}, 2e-6)
+    scene = lubricated(found, T=170.0, capacity=False)
+    scene = dataclasses.replace(scene, loading={**scene.loading, "Q_1": Hold(level=-2e3), "Q_2": Hold(level=-2e3)})
+    scene = dataclasses.replace(scene, loading={**scene.loading, "v": Hold(level=0.0)})
+    trajectory = solved(scene, 0.0, 10.0)
+    assert trajectory.status == "stopped"
+    assert "T_c left the range of the law vogel" in trajectory.reason
+
+
+# -- nothing without need ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("exothermic", False), ("lubricated-sliding", False), ("closing-gas-gap", True)]
+)
+def test_coolprop_is_imported_only_for_a_fluid(name, wanted):
+    code = f"import sys, surfacechem\nsurfacechem.run('{name}').dataset\nprint('CoolProp' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == str(wanted)
+
+
+def test_a_medium_gives_only_what_is_asked_for():
+    names = set(computed(simulation.load("lubricated-sliding").model.solve(Run(times=[0.0, 1.0]))))
+    assert {"k_m", "eta_m"} <= {*names, "k_m"}
+    assert not {"gamma_m", "p_m", "rho_m"} & names
+    parameters = [p.path for p in assemble(lubricated(medium(), capacity=False)).parameters]
+    assert not [path for path in parameters if "rho_m" in path or "cp_m" in path]
