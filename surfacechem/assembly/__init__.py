@@ -50,8 +50,8 @@ STAGES = (
     equations,
     stage_ends,
     totals,
-    logarithmic_state,
     touch,
+    logarithmic_state,
 )
 
 
