@@ -16,8 +16,9 @@ from surfacechem.expressions import Expression
 from surfacechem.fits import DEGREE, NoFitError, Piece, divided
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.refit import Fit, first_range
+from surfacechem.substances import Fluid
 from surfacechem.system import Margin
-from surfacechem.terms import Fluid, Load, Spec
+from surfacechem.terms import Load, Spec
 
 PATH = "interface.medium.fluid"
 
