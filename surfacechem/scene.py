@@ -6,19 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from surfacechem.errors import InputError, Place
-from surfacechem.terms import (
-    BodyEnergy,
-    Fluid,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    Potential,
-    Property,
-    RateLaw,
-    parameter,
-)
+from surfacechem.substances import Fluid, Property
+from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, parameter
 
 
 @dataclass(frozen=True)

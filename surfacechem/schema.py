@@ -18,19 +18,8 @@ from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Mounting
-from surfacechem.terms import (
-    BodyEnergy,
-    Factor,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    Potential,
-    Property,
-    RateLaw,
-    Spec,
-)
+from surfacechem.substances import Property
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
 
 Schema = dict[str, Any]
 

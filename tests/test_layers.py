@@ -13,7 +13,7 @@ import surfacechem.data
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
-    "contracts": ["terms", "scene"],
+    "contracts": ["terms", "substances", "scene"],
     "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "jumps", "events", "integrate"],
     "results": ["solution", "audit", "event_table", "detailedbalance"],
