@@ -1,7 +1,8 @@
 """Events: zeros of margins inside a step.
 
-Margins are examined at interior points of the step, since a high order steps over double crossings. The first zero is
-bracketed on the corrected polynomial, then the step is repeated onto it with the full order of the method.
+Margins are examined at interior points of the step, since a high order steps over double crossings; a lowest point
+between them is looked for where it may reach zero. The first zero is bracketed on the corrected polynomial, then the
+step is repeated onto it with the full order of the method.
 """
 
 from typing import Any
@@ -11,8 +12,12 @@ from surfacechem.solvers.native import (
     BASE,
     H_FACTORED,
     M_BEFORE,
+    M_EARLIER,
+    M_HIGH,
     M_LARGEST,
+    M_LOW,
     M_NOW,
+    M_PROBE,
     M_SIDE,
     M_SLOPE,
     MARGINS,
@@ -23,6 +28,7 @@ from surfacechem.solvers.native import (
     YDOT,
     Y,
     compiled,
+    copy,
     evaluate,
     set_inputs,
 )
@@ -30,80 +36,211 @@ from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
 
-POINTS = 16
+LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
+"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
+
+EDGE = 1e-6
+"""The slopes at both ends of a step are seen at this distance."""
+
 NOISE = 4e-15
-"""Relative to the largest value seen, a margin this small right after a start has not left zero."""
+"""Relative to the largest value seen, a margin this small is zero."""
+
+AT_START = -1.0
 
 
 @compiled
-def margins_inside(w: Any, h: float, x: float) -> None:
+def _margin_inside(w: Any, h: float, x: float, row: int) -> None:
     """Margins at the fraction x of the step, from the polynomial."""
     interpolate_rate(w, h, x)
     w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
     set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+    evaluate(w, MARGINS, w.margin[row].ctypes.data)
 
 
 @compiled
-def start_margins(w: Any) -> None:
-    """Sides of zero at a start or restart; a margin that has just fired, or is zero, has to leave zero first."""
+def _probe(w: Any, h: float, m: int, x: float) -> float:
+    _margin_inside(w, h, x, M_PROBE)
+    return float(w.margin[M_PROBE, m])
+
+
+@compiled
+def _noise(w: Any, m: int) -> float:
+    return float(NOISE * w.margin[M_LARGEST, m])
+
+
+@compiled
+def is_limit(kinds: Any, m: int) -> bool:
+    """Whether the run may not go on where this margin is below zero."""
+    return bool(kinds[m, 0] == 1 and kinds[m, 1] <= 0)
+
+
+@compiled
+def start_margins(w: Any, kinds: Any) -> None:
+    """Sides of zero at a start or restart."""
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
     set_inputs(w, w.vector[Y], w.vector[YDOT])
     evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+    copy(w.margin[M_NOW], w.margin[M_BEFORE])
     for m in range(w.margin.shape[1]):
         value = w.margin[M_NOW, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        if w.fired[m] != 0 or abs(value) <= NOISE * w.margin[M_LARGEST, m]:
-            w.margin[M_SIDE, m] = 0.0
+        if w.fired[m] != 0:
+            w.margin[M_SIDE, m] = LEAVING
+        elif abs(value) <= _noise(w, m):
+            w.margin[M_SIDE, m] = AT_ZERO if is_limit(kinds, m) else LEAVING
+        elif value > 0.0:
+            w.margin[M_SIDE, m] = 1.0
         else:
-            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
+            w.margin[M_SIDE, m] = BEYOND if is_limit(kinds, m) else -1.0
 
 
 @compiled
 def _crosses(side: float, value: float, direction: int) -> bool:
-    falling = side > 0.0 and value <= 0.0 and direction <= 0
-    rising = side < 0.0 and value >= 0.0 and direction >= 0
+    falling = side == 1.0 and value <= 0.0 and direction <= 0
+    rising = side == -1.0 and value >= 0.0 and direction >= 0
     return falling or rising
 
 
 @compiled
+def _falls_from_start(w: Any, m: int) -> bool:
+    """Whether a limit that started at zero or beyond is now found to have gone the wrong way."""
+    side, value = w.margin[M_SIDE, m], w.margin[M_NOW, m]
+    if side == AT_ZERO:
+        return bool(value < -_noise(w, m))
+    return bool(side == BEYOND and value < w.margin[M_BEFORE, m] - _noise(w, m))
+
+
+@compiled
 def _update_sides(w: Any) -> None:
+    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
     for m in range(w.margin.shape[1]):
-        value = w.margin[M_NOW, m]
-        w.margin[M_BEFORE, m] = value
+        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        if abs(value) > (NOISE * w.margin[M_LARGEST, m] if w.margin[M_SIDE, m] == 0.0 else 0.0):
+        moved = value - w.margin[M_BEFORE, m] if side == BEYOND else value
+        if abs(moved) > (0.0 if abs(side) == 1.0 else _noise(w, m)):
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
+        w.margin[M_BEFORE, m] = value
+
+
+@compiled
+def _may_reach(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> bool:
+    """Whether a smooth function of these values has a lowest point in between that may be zero."""
+    steepest = max((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
+    return at_b < at_a and at_b < at_c and at_b <= steepest * (c - a)
+
+
+@compiled
+def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> float:
+    """Lowest point of the parabola, or a point in the larger part where that is no progress."""
+    left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+    x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+    if a < x < c and abs(x - b) > 1e-2 * (c - a):
+        return x
+    return b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+
+
+@compiled
+def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bool) -> float:
+    """Where a margin is across zero, or touches it, around a lowest point near b; -1 where it is not."""
+    side = w.margin[M_SIDE, m]
+    at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
+    for _iteration in range(80):
+        if at_b <= 0.0:
+            return b
+        if c - a <= 1e-8 * c or not _may_reach(a, b, c, at_a, at_b, at_c):
+            break
+        x = _vertex(a, b, c, at_a, at_b, at_c)
+        at_x = side * _probe(w, h, m, x)
+        if at_x < at_b and x > b:
+            a, at_a, b, at_b = b, at_b, x, at_x
+        elif at_x < at_b:
+            c, at_c, b, at_b = b, at_b, x, at_x
+        elif x > b:
+            c, at_c = x, at_x
+        else:
+            a, at_a = x, at_x
+    return b if touches and at_b <= _noise(w, m) else -1.0
+
+
+@compiled
+def _dips(w: Any, h: float, kinds: Any, m: int, a: float, b: float, c: float) -> bool:
+    """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
+    side = w.margin[M_SIDE, m]
+    if not ((side == 1.0 and kinds[m, 1] <= 0) or (side == -1.0 and kinds[m, 1] >= 0)):
+        return False
+    values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
+    if not _may_reach(a, b, c, values[0], values[1], values[2]):
+        return False
+    x = _reaches(w, h, m, a, b, c, is_limit(kinds, m))
+    w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
+    return x > 0.0
+
+
+@compiled
+def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float) -> float:
+    """Mark the margins that reach zero up to x with their brackets; x if there are any, AT_START where a limit is
+    passed there, else 0.
+    """
+    found = 0.0
+    for m in range(kinds.shape[0]):
+        w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
+        falls = _falls_from_start(w, m)
+        if falls and before <= EDGE:
+            found = AT_START
+        elif falls:
+            w.margin[M_HIGH, m] = before
+        marked = (
+            falls
+            or _crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
+            or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
+        )
+        w.fired[m] = marked
+        if marked and found == 0.0:
+            found = x
+    return found
+
+
+@compiled
+def _mark_dips(w: Any, h: float, kinds: Any, before: float, x: float) -> None:
+    """Mark the margins whose lowest point lies in an interval at whose end others are across zero."""
+    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+    copy(w.margin[M_NOW], w.margin[M_BEFORE])
+    _margin_inside(w, h, x + EDGE, M_NOW)
+    for m in range(kinds.shape[0]):
+        if w.fired[m] == 0:
+            w.fired[m] = _dips(w, h, kinds, m, before, x, x + EDGE)
 
 
 @compiled
 def _scan(w: Any, h: float, kinds: Any) -> float:
-    """End of the first interval in which margins cross, marking them; 0 if there is none."""
-    any_crossing = False
-    for i in range(1, POINTS + 1):
-        x = i / POINTS
-        margins_inside(w, h, x)
-        for m in range(kinds.shape[0]):
-            crossing = _crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
-            w.fired[m] = crossing
-            any_crossing = any_crossing or crossing
-        if any_crossing:
-            return x
+    """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
+    there.
+    """
+    points = 4 * w.count[MEMBER] + 7
+    earlier, before = 0.0, 0.0
+    for i in range(points + 2):
+        x = EDGE if i == 0 else min(i / points, 1.0)
+        if i == points:
+            x = 1.0 - EDGE
+        _margin_inside(w, h, x, M_NOW)
+        found = _mark(w, h, kinds, earlier, before, x)
+        if found > 0.0:
+            _mark_dips(w, h, kinds, before, x)
+        if found != 0.0:
+            return found
         _update_sides(w)
+        earlier, before = before, x
     return 0.0
 
 
 @compiled
-def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
+def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
     """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method)."""
     side = w.margin[M_SIDE, m]
-    margins_inside(w, h, high)
-    value_high = w.margin[M_NOW, m]
-    margins_inside(w, h, low)
-    value_low = w.margin[M_NOW, m]
-    if value_low * side <= 0.0:
-        # The bracket starts where the margin fired before it had left zero.
-        return low
+    value_high, value_low = _probe(w, h, m, high), _probe(w, h, m, low)
+    if value_high * side > 0.0:
+        # It touches zero there.
+        return high
     kept = 0
     for iteration in range(100):
         if high - low <= 1e-13 * high or value_high == 0.0:
@@ -111,8 +248,7 @@ def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
         x = low + (high - low) * (value_low / (value_low - value_high))
         if not low < x < high or iteration % 8 == 7:
             x = 0.5 * (low + high)
-        margins_inside(w, h, x)
-        value = w.margin[M_NOW, m]
+        value = _probe(w, h, m, x)
         if value * side <= 0.0:
             high, value_high = x, value
             value_low *= 0.5 if kept == 1 else 1.0
@@ -128,14 +264,11 @@ def _bisect(w: Any, h: float, m: int, low: float, high: float) -> float:
 def _slope(w: Any, h: float, m: int, x: float) -> float:
     """Change of a margin per step, from the polynomial around x."""
     width = 1e-4 * x
-    margins_inside(w, h, x + width)
-    ahead = w.margin[M_NOW, m]
-    margins_inside(w, h, x - width)
-    return float((ahead - w.margin[M_NOW, m]) / (2.0 * width))
+    return float((_probe(w, h, m, x + width) - _probe(w, h, m, x - width)) / (2.0 * width))
 
 
 @compiled
-def step_onto(w: Any, size: float) -> bool:
+def _step_onto(w: Any, size: float) -> bool:
     """Repeat the step with another size, with the full order of the method."""
     w.clock[H_FACTORED] = 0.0
     if not factor_newton(w, size):
@@ -158,19 +291,19 @@ def _margins_at_end(w: Any, size: float) -> None:
 @compiled
 def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
-    step fails.
+    step fails. A margin that touches zero has no slope to refine with.
     """
     side = w.margin[M_SIDE, m]
     size = x * h
     store_polynomial(w, h, 0.0)
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     for attempt in range(12):
-        if not step_onto(w, size):
+        if not _step_onto(w, size):
             return 0.0
         _margins_at_end(w, size)
         value = w.margin[M_NOW, m]
         change = -value / slope * h if slope != 0.0 else 0.0
-        crossed = value * side <= 0.0
+        crossed = value * side <= 0.0 or slope == 0.0
         if crossed and (abs(change) <= resolution or value == 0.0 or attempt >= 6):
             return size
         if not crossed and abs(change) <= resolution:
@@ -187,27 +320,35 @@ def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
     for m in range(kinds.shape[0]):
         value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
         across = _crosses(w.margin[M_SIDE, m], value, kinds[m, 1])
-        close = slope != 0.0 and abs(value / slope) * h <= near
+        close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= _noise(w, m)
         w.fired[m] = across or (w.fired[m] != 0 and close)
+
+
+@compiled
+def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
+    """The marked margin that reaches zero first, and where; the slopes of all."""
+    first, earliest = -1, 2.0
+    for m in range(kinds.shape[0]):
+        w.margin[M_SLOPE, m] = 0.0
+        if w.fired[m] != 0:
+            x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
+            touches = _probe(w, h, m, x) * w.margin[M_SIDE, m] > 0.0
+            w.margin[M_SLOPE, m] = 0.0 if touches else _slope(w, h, m, max(x, 1e-12))
+            if x < earliest:
+                first, earliest = m, x
+    return first, earliest
 
 
 @compiled
 def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
-    repeated.
+    repeated, AT_START if a limit is passed at the start.
     """
     keep_polynomial(w)
     end = _scan(w, h, kinds)
-    if end == 0.0:
-        return h
-    first, earliest = -1, 2.0
-    for m in range(kinds.shape[0]):
-        w.margin[M_SLOPE, m] = 0.0
-        if w.fired[m] != 0:
-            x = _bisect(w, h, m, end - 1.0 / POINTS, end)
-            w.margin[M_SLOPE, m] = _slope(w, h, m, max(x, 1e-12))
-            if x < earliest:
-                first, earliest = m, x
+    if end <= 0.0:
+        return h if end == 0.0 else AT_START
+    first, earliest = _first(w, h, kinds)
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first])
     if size == 0.0:
         return 0.0

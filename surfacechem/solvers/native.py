@@ -40,9 +40,9 @@ ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORR
 """Rows of the vectors of length n."""
 Q, Q_TRIAL, Q_CORRECTION, Q_PROBE = range(4)
 """Rows of the vectors of length n_ledger."""
-M_NOW, M_SIDE, M_BEFORE, M_LARGEST, M_SLOPE = range(5)
-"""Rows of the vectors of length n_margins: value, side of zero it was last seen on, value before, largest
-size so far, its slope."""
+M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = range(9)
+"""Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
+largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero."""
 BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = range(10)
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
 t."""
@@ -241,6 +241,6 @@ def lay_out(code: Any, algebraic: Any, cursor: Any, n_parameters: int, n_ledger:
         _take(cursor, (8, n_ledger), np.float64),
         _take(cursor, (n, 9), np.float64),
         _take(cursor, (n_ledger, 9), np.float64),
-        _take(cursor, (5, n_margins), np.float64),
+        _take(cursor, (9, n_margins), np.float64),
         _take(cursor, (n_margins,), np.int64),
     )

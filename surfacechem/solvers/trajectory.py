@@ -6,7 +6,7 @@ import numpy as np
 
 from surfacechem.solvers.consistency import find_consistent
 from surfacechem.solvers.contract import Status
-from surfacechem.solvers.locate import find_event, start_margins
+from surfacechem.solvers.locate import AT_START, find_event, start_margins
 from surfacechem.solvers.native import (
     ATOL,
     BASE,
@@ -91,13 +91,13 @@ def _next_try(h: float, remaining: float) -> float:
 
 
 @compiled
-def _start(w: Any, times: Any, outputs: Any, steps: Any, counts: Any) -> int:
+def _start(w: Any, kinds: Any, times: Any, outputs: Any, steps: Any, counts: Any) -> int:
     """Begin anew at the current state, with the tables begun where it is the first one."""
     outcome = restart(w)
     if outcome != GOOD:
         return outcome
     if w.margin.shape[1] > 0:
-        start_margins(w)
+        start_margins(w, kinds)
         clear(w.fired)
     if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.clock[BASE]:
         copy(w.vector[Y], outputs[0])
@@ -134,7 +134,7 @@ def _run_segment(
     h, size_last, norm_last = 0.0, 0.0, 1.0
     while end - w.clock[BASE] - w.clock[TAU] > 0.0:
         if h == 0.0:
-            outcome = _start(w, times, outputs, steps, counts)
+            outcome = _start(w, kinds, times, outputs, steps, counts)
             if outcome != GOOD:
                 return outcome
             h, size_last, norm_last = first_size(w, end - w.clock[BASE]), 0.0, 1.0
@@ -146,6 +146,9 @@ def _run_segment(
         size = h
         if kinds.shape[0] > 0:
             size = find_event(w, h, kinds)
+        if size == AT_START:
+            _write_events(w, events, kinds, counts)
+            return EVENT
         if size == 0.0:
             h *= 0.25
             w.clock[H_FACTORED] = 0.0
@@ -197,7 +200,7 @@ def _run(
     counts[END] = FINISHED if status == GOOD else status
     _write_state(w, end, segments[-1] if status == GOOD else w.clock[BASE] + w.clock[TAU])
     if kinds.shape[0] > 0:
-        start_margins(w)
+        start_margins(w, kinds)
         copy(w.margin[M_NOW], end[end.shape[0] - kinds.shape[0] :])
     for i in range(COUNTERS):
         counts[FIRST_COUNTER + i] = w.count[i]
