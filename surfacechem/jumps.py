@@ -116,9 +116,7 @@ class Jumper:
     @cached_property
     def _margin_rates(self) -> Function:
         states, t = self.system.states, self.system.t
-        rates = [
-            sum((derivative(m, s.symbol) * s.dot for s in states), derivative(m, t)) for m in self._moving_margins
-        ]
+        rates = [sum((derivative(m, s.symbol) * s.dot for s in states), derivative(m, t)) for m in self._moving_margins]
         return compile_function(self.system.inputs, rates)
 
     def margin_rates(self, point: Point) -> Array:

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scenes import SITES, perfect_contact, varying
+from scenes import SITES, path, perfect_contact, varying
 
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
@@ -162,18 +162,23 @@ def cycles(top: float, count: int) -> Table:
 
 
 def pull_off(q: dict) -> tuple[Solved, list[float]]:
-    """Opening and closing, quasi-static; each fold lies in the middle of a ramp of its own. Returns w at the jumps."""
-    top, low = 1.05 * q["w_off"], min(0.5 * q["w_on"], 0.5 * q["w_off"])
-    back = min(2.0 * q["w_on"], top)
-    history = Table(times=[0.0, 1.0, 2.0, 3.0], values=[0.0, top, back, low])
-    solved = solve(zone(Mounting(k=q["k_eff"]), history), np.linspace(0.0, 3.0, 31))
+    """Opening and closing, quasi-static, between reservoirs; each fold has a ramp of its own. Returns w at the jumps."""
+    top, low = 1.05 * q["w_off"], 0.5 * min(q["w_on"], q["w_off"])
+    history = Table(times=[0.0, 1.0, 2.0, 3.0], values=[0.0, top, min(2.0 * q["w_on"], top), low])
+    scene = Scene(
+        COLD_BODIES,
+        Interface(None, [ExponentialCohesiveZone(**ZONE)]),
+        loading={"w_n": history},
+        initial={"g_n": 0.0},
+        normal=Mounting(k=q["k_eff"]),
+    )
+    solved = solve(Model(assemble(scene)), np.linspace(0.0, 3.0, 31))
     return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.jumps]
 
 
 def heating(energy) -> Solved:
     p = parameters("h_pulloff_heating")
-    q = {"w_off": 1.2e-7}
-    model = zone(Mounting(k=p["k_eff"]), cycles(1.3 * q["w_off"], 19), energy, p["C_tot"] / 2, p["T_i"])
+    model = zone(Mounting(k=p["k_eff"]), cycles(1.5e-7, 19), energy, p["C_tot"] / 2, p["T_i"])
     return solve(model, (0.0, 38.0))
 
 
@@ -206,14 +211,14 @@ def isentropic() -> Solved:
 
 
 def damage() -> Solved:
-    """Bonds that carry tension follow their equilibrium: they relax in 1e-13 of the time in which the gap opens."""
+    """Bonds that carry tension follow their equilibrium: they relax in 1e-10 of the time in which the gap opens."""
     p, exact = parameters("h_damage_equilibrium"), columns("h_damage_equilibrium")
     scene = Scene(
         COLD_BODIES,
         Interface(
             Hold(level=300.0),
             [BondSprings(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])],
-            reactions=[LinearAffinity(c_r=1e13 * SITES.density / p["K"])],
+            reactions=[LinearAffinity(c_r=1e10 * SITES.density / p["K"])],
             sites=SITES,
         ),
         loading={"g_n": Ramp(rate=exact["g"][-1])},
@@ -227,7 +232,7 @@ LONG_RANGE = {"flat": LennardJonesFlatFlat, "sphere": LennardJonesSpherePlane, "
 
 
 def long_range(kind: str, gaps: np.ndarray) -> Solved:
-    """The gap opens through the given values, from contact to far away; equal ratios take equal times."""
+    """The gap opens through the given values, one in a second, from contact to far away."""
     p = parameters("i_lj_flat_flat")
     sites = {"n_1": p["n1"], "n_2": p["n2"], "psi_0": p["psi0"], "g_0": p["g0"]}
     size = {} if kind == "flat" else {"R": p["R"], "area": 1e-16}
@@ -278,8 +283,6 @@ def penalty() -> Model:
 def light_interface(C_c: float) -> Scene:
     """An interface between reservoirs whose bonds take capacity away; nothing but its temperature moves."""
     p = parameters("x13_negative_capacity_growth")
-    from scenes import path
-
     return Scene(
         COLD_BODIES,
         Interface("T_c", [BondEnergy(K_2=p["K2"]), InterfaceCapacity(C_c=C_c)]),
