@@ -1,13 +1,31 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
+from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity, NormalStiffness, TangentialStiffness
-from surfacechem.laws.factors import Activated, Exponential, Linear, LinearInTemperature, Polynomial, Power
-from surfacechem.laws.friction import Coulomb, Viscous
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.contact import (
+    BondSprings,
+    ConstantInterfaceCapacity,
+    InterfaceCapacity,
+    NormalStiffness,
+    Penalty,
+    TangentialStiffness,
+)
+from surfacechem.laws.factors import (
+    Activated,
+    Exponential,
+    Linear,
+    LinearInTemperature,
+    Polynomial,
+    Power,
+    Proportional,
+)
+from surfacechem.laws.friction import Coulomb, MohrCoulomb, Viscous
 from surfacechem.laws.heat import Conductance
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.longrange import VanDerWaalsFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import Varying, parameter  # noqa: F401 - scenes may define laws
 
@@ -159,7 +177,32 @@ def sliding() -> Scene:
     return perfect_contact([], frictions=[Coulomb(mu=0.3)], C_1=2000.0, C_2=2000.0, loading=loading)
 
 
+def adhesive() -> Scene:
+    """A cohesive zone that weakens with temperature and with the loss of its bonds, in a long range."""
+    strength = varying(4e5, Proportional(of="phi"), Power(exponent=-1.0))
+    potentials = [
+        ExponentialCohesiveZone(t_max=strength, g_0=varying(1e-6, LinearInTemperature(slope=1e-3)), E_n=1e12),
+        XuNeedleman(Phi_n=0.3, g_0=1e-6, g_t0=2e-6, q=0.8, r=0.2),
+        AdhesionIntensity(C_N=1e12, C_T=5e11, w=0.2, E_n=1e13),
+        VanDerWaalsFlatFlat(A_H=1e-19, D_0=1e-7),
+        VanDerWaalsSpherePlane(A_H=1e-19, R=1e-6, area=1e-12),
+        BondSprings(E_b=1e11, E_n=1e12),
+        Penalty(E_n=varying(1e12, Power(exponent=-1.0))),
+        InterfaceCapacity(C_c=5.0),
+    ]
+    interface = Interface("T_c", potentials, [MohrCoulomb(mu=0.3, t_n_max=1e7)], [AdhesionLoss(b=2.0)], SITES)
+    heat = [path("interface", "lower", 900.0), path("upper", "interface", 300.0)]
+    loading = {
+        "g_n": Ramp(start=1e-6, rate=5e-7),
+        "g_t": Ramp(start=1e-7, rate=1e-6),
+        "v": Hold(level=0.2),
+    }
+    initial = {"T_1": 300.0, "T_2": 310.0, "T_c": 320.0, "phi": 0.4}
+    return Scene(bodies(), interface, heat, loading, None, 300.0, initial)
+
+
 ALL = [
+    adhesive,
     coupled,
     no_medium,
     algebraic,

@@ -12,11 +12,12 @@ from scenes import bodies, path, perfect_contact, varying
 
 from surfacechem.laws.bonding import BondEnergy, LinearEnthalpy
 from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.factors import Exponential, Power
 from surfacechem.laws.friction import Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
-from surfacechem.laws.loading import Hold
+from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene, Sites
 
@@ -248,6 +249,27 @@ def rate_proportional_to_temperature(name: str) -> Table:
     return adiabatic(name, Arrhenius(A=p["k0"], b=1.0))
 
 
+def isentropic_cooling(name: str) -> Table:
+    p, columns = read(name)
+    zone = ExponentialCohesiveZone(t_max=varying(p["t0"], Power(exponent=-1.0)), g_0=p["g0"], E_n=0.0)
+    loading = {"g_n": Ramp(start=p["g_i"], rate=p["g0"])}
+    C = p["C_tot"] / 2
+    scene = perfect_contact([zone], T=p["T_i"], T_0=p["T0"], C_1=C, C_2=C, loading=loading)
+    exact = {"T": columns["T"], "t_n": columns["t_n"]}
+    return Table(name, scene, columns["g"] / p["g0"], exact, floors={"t_n": 1e-6})
+
+
+def closing_film(name: str) -> Table:
+    """Up to 1e-10 of the closing time before its end; beyond, rounding of t moves the gap."""
+    p, columns = read(name)
+    rows = columns["one_minus_t_over_tc"] > 0.9e-10
+    loading = {"v": Hold(level=p["v"]), "g_n": Ramp(start=p["g_i"], rate=-p["a"])}
+    C = p["C_tot"] / 2
+    frictions = [Viscous(eta=p["eta"])]
+    scene = perfect_contact([], T=p["T0"], T_0=p["T0"], C_1=C, C_2=C, frictions=frictions, loading=loading)
+    return Table(name, scene, columns["t"][rows], {"T": columns["T"][rows]}, 1e-6)
+
+
 def makers() -> dict[str, Callable[[], Table]]:
     """Every table by name, made when asked for."""
     by_file = {
@@ -264,6 +286,8 @@ def makers() -> dict[str, Callable[[], Table]]:
         "f_dry_friction_with": friction_with_loss,
         "k_adiabatic": adiabatic_arrhenius,
         "k_coupled": rate_proportional_to_temperature,
+        "h_isentropic": isentropic_cooling,
+        "x05": closing_film,
     }
     result: dict[str, Callable[[], Table]] = {}
     for file in sorted(FOLDER.glob("*.json")):

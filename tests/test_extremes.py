@@ -57,6 +57,28 @@ def test_a_capacity_must_be_positive(regime, C_c, K_2, phi, verdict):
             run(scene, 1.0)
 
 
+def medium_rows():
+    data = json.loads((tables.FOLDER / "x13_negative_capacity_growth.json").read_text())
+    return [pytest.param(*map(float, row), id=row[0][:6] + row[0][-3:]) for row in data["rows"]]
+
+
+@pytest.mark.parametrize(("C_c", "C_eff", "growth"), medium_rows())
+def test_a_medium_without_capacity_of_its_own_is_refused_not_integrated(C_c, C_eff, growth):
+    """Between bodies held at 300 K a small deviation of the medium decays with its capacity, or must not start."""
+    potentials = [BondEnergy(K_2=240.0)] + ([InterfaceCapacity(C_c=C_c)] if C_c else [])
+    heat = [path("interface", "lower", 500.0), path("interface", "upper", 300.0)]
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+    loading = {"phi": Hold(level=0.0)}
+    scene = Scene(pair, Interface("T_c", potentials), heat, loading, None, 300.0, {"T_c": 300.003})
+    if C_eff > 0:
+        times = np.linspace(0.0, -2.0 / growth, 5)
+        T = Model(assemble(scene)).solve(Run(times=times)).result.y
+        assert T[0] - 300.0 == pytest.approx(0.003 * math.exp(-2.0), rel=1e-4)
+    else:
+        with pytest.raises(InputError, match="at the start the heat capacity at T_c was lost"):
+            run(scene, 1.0)
+
+
 @pytest.mark.parametrize(("energy", "end"), [(Quadratic, 300.0), (Constant, 600.0)])
 def test_cooling_stops_where_the_temperature_reaches_zero(energy, end):
     loading = {"Q_1": Hold(level=-30.0), "Q_2": Hold(level=-20.0)}

@@ -35,8 +35,8 @@ class ExponentialCohesiveZone(Potential):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         u = g_n / self.g_0
-        tension = -self.t_max * self.g_0 * math.e * _decaying(u, 1, 1)
-        return where(g_n > 0, tension, self.E_n * g_n**2 / 2 - self.t_max * self.g_0 * math.e)
+        falling, touching = decay(u), math.e * self.t_max * self.g_0
+        return where(g_n > 0, -touching * (falling + u * falling), self.E_n * g_n**2 / 2 - touching)
 
 
 class XuNeedleman(Potential):

@@ -40,7 +40,7 @@ class LennardJonesFlatFlat(InteractingSites):
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (1 / 360, 8), (-1 / 6, 2))
+        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8), (-6, 2))
 
 
 class LennardJonesSpherePlane(InteractingSites):
@@ -65,7 +65,7 @@ class LennardJonesSpherePlane(InteractingSites):
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        near, far = (_repelling(gap / self.g_0, (1 / 2520, 7), (-1 / 6, 1)) for gap in (g_n, g_n + 2 * self.R))
+        near, far = (_repelling(gap / self.g_0, (2520, 7), (-6, 1)) for gap in (g_n, g_n + 2 * self.R))
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
 
 
@@ -92,7 +92,7 @@ class LennardJonesDerjaguin(InteractingSites):
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        shape = _repelling(g_n / self.g_0, (1 / 2520, 7), (-1 / 6, 1))
+        shape = _repelling(g_n / self.g_0, (2520, 7), (-6, 1))
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
 
 
@@ -204,11 +204,11 @@ def _outside(g_n: Expression) -> Expression:
     return g_n if is_symbolic(g_n) else max(g_n, 0.0)
 
 
-def _repelling(x: Expression, *terms: tuple[float, int]) -> Expression:
-    """Sum of c x^-n, continued by its parabola below WALL, where nothing comes but trial states of a solver."""
+def _repelling(x: Expression, *terms: tuple[int, int]) -> Expression:
+    """Sum of x^-n / d, continued by its parabola below WALL, where nothing comes but trial states of a solver."""
     level, slope, curvature = (
-        sum(c * math.prod(-n - i for i in range(order)) * WALL ** (-n - order) for c, n in terms) for order in range(3)
+        sum(math.prod(-n - i for i in range(order)) * WALL ** (-n - order) / d for d, n in terms) for order in range(3)
     )
     inside, beyond = x if is_symbolic(x) else max(x, WALL), x - WALL
-    powers = sum(c * inside**-n for c, n in terms)
+    powers = sum(inside**-n / d for d, n in terms)
     return where(x > WALL, powers, level + beyond * (slope + beyond * curvature / 2))

@@ -23,7 +23,7 @@ class BondSpringsInEquilibrium(Reference):
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c with :math:`E_n=\phi E_b` and eq. e:Psi_bt, at zero chemical
     potential.
 
-    >>> bonds = BondSpringsInEquilibrium(E_b=1e16, K_0=0.2, rate=1e-9)
+    >>> bonds = BondSpringsInEquilibrium(E_b=1e16, K_0=0.2, g_dot=1e-9)
     >>> f"{bonds.peak_gap:.9e} {bonds.strength:.9e} {bonds.work_of_separation}"
     '3.651483717e-09 2.434322478e+07 0.1'
     """
@@ -33,7 +33,7 @@ class BondSpringsInEquilibrium(Reference):
     E_b: float = parameter("Pa/m", "stiffness of complete bonding", above=0)
     K_0: float = parameter("J/m^2", "bond energy density", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
-    rate: float = parameter("m/s", "opening speed", at_least=0)
+    g_dot: float = parameter("m/s", "opening speed", at_least=0)
 
     @property
     def failure_gap(self) -> float:
@@ -56,7 +56,7 @@ class BondSpringsInEquilibrium(Reference):
         return 0.5 * self.K_0
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        g = self.g_i + self.rate * t
+        g = self.g_i + self.g_dot * t
         ratio = np.minimum(g / self.failure_gap, 1.0)
         phi = (1.0 - ratio) * (1.0 + ratio)
         return {"g_n": g, "phi": phi, "t_n": phi * self.E_b * g}

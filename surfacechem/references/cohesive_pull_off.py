@@ -28,7 +28,7 @@ class CohesivePullOff(Reference):
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, with an elastic body.
 
-    >>> bodies = CohesivePullOff(t_max=1e6, g_0=1e-8, k=1e13, rate=1e-8)
+    >>> bodies = CohesivePullOff(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8)
     >>> f"{bodies.opening.g:.9e} {bodies.opening.w:.9e} {bodies.opening.release:.9e} {bodies.closing.release:.9e}"
     '1.111832559e-08 1.105377225e-07 3.054240033e-02 1.000742319e-02'
     """
@@ -39,7 +39,7 @@ class CohesivePullOff(Reference):
     g_0: float = parameter("m", "gap at the strength", above=0)
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
-    rate: float = parameter("m/s", "speed of the far field", at_least=0)
+    w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
 
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
@@ -73,7 +73,7 @@ class CohesivePullOff(Reference):
         return self.bodies
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        w = self.w_i + self.rate * t
+        w = self.w_i + self.w_dot * t
         if self.stable:
             g, heat = self.bodies.gap(w, 0.0, math.inf), np.zeros_like(w)
         else:
@@ -81,4 +81,4 @@ class CohesivePullOff(Reference):
             closed = self.bodies.gap(np.minimum(w, fold.w), 0.0, fold.g)
             g = np.where(open_, self.bodies.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
             heat = np.where(open_, fold.release, 0.0)
-        return {"w": w, "g_n": g, "t_n": self.bodies.traction(g), "heat": heat}
+        return {"w_n": w, "g_n": g, "t_n": self.bodies.traction(g), "heat": heat}

@@ -23,7 +23,7 @@ class CohesivePullOffHeating(CohesivePullOff):
 
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, and the quadratic energy.
 
-    >>> bodies = CohesivePullOffHeating(t_max=1e6, g_0=1e-8, k=1e13, rate=1e-8, C=2e-4, T_0=300.0, T_i=310.0)
+    >>> bodies = CohesivePullOffHeating(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8, C=2e-4, T_0=300.0, T_i=310.0)
     >>> f"{bodies.solution(20.0)['T']:.9f}"
     '433.274971584'
     """

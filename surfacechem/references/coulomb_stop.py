@@ -54,7 +54,7 @@ class CoulombStop(Reference):
         heat = self.mu * self.p * slip
         return {
             "v": v,
-            "slip": slip,
+            "u_t": slip,
             "heat": heat,
             "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
         }

@@ -30,10 +30,10 @@ class ElasticContact(Reference):
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     E_n: float = parameter("Pa/m", "contact stiffness", above=0)
     w_i: float = parameter("m", "initial far-field displacement")
-    rate: float = parameter("m/s", "speed of the far field", default=0.0)
+    w_dot: float = parameter("m/s", "speed of the far field", default=0.0)
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        w = self.w_i + self.rate * t
+        w = self.w_i + self.w_dot * t
         g, delta = self.k / (self.k + self.E_n) * w, self.E_n / (self.k + self.E_n) * w
-        energies = {"U_bulk": 0.5 * self.k * delta**2, "U_contact": 0.5 * self.E_n * g**2}
-        return {"w": w, "g_n": g, "t_n": self.E_n * g, **energies}
+        energies = {"E_spring_n": 0.5 * self.k * delta**2, "U_contact": 0.5 * self.E_n * g**2}
+        return {"w_n": w, "g_n": g, "t_n": self.E_n * g, **energies}

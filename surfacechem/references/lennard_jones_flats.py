@@ -50,7 +50,7 @@ class LennardJonesFlats(Reference):
     psi_0: float = parameter("J", "interaction energy of a pair", above=0)
     g_0: float = parameter("m", "range of the interaction", above=0)
     g_i: float = parameter("m", "initial gap", above=0)
-    rate: float = parameter("m/s", "opening speed", default=0.0)
+    g_dot: float = parameter("m/s", "opening speed", default=0.0)
 
     @property
     def A(self) -> float:
@@ -60,7 +60,7 @@ class LennardJonesFlats(Reference):
     @property
     def end_time(self) -> float:
         """Time [s] at which flats that approach meet."""
-        return -self.g_i / self.rate if self.rate < 0.0 else math.inf
+        return -self.g_i / self.g_dot if self.g_dot < 0.0 else math.inf
 
     @property
     def equilibrium_gap(self) -> float:
@@ -101,7 +101,7 @@ class LennardJonesFlats(Reference):
         return self._snap(y, k)
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        g = self.g_i + self.rate * t
+        g = self.g_i + self.g_dot * t
         return {"g_n": g, "W": self.energy(g), "t_n": self.traction(g)}
 
     def energy(self, g: Array) -> Array:

@@ -91,7 +91,7 @@ class OverdampedPullOff(Reference):
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         low, high = np.full_like(t, self.g_i), np.full_like(t, self.end_gap)
         g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self._x_gap)), t, low, high)
-        return {"g_n": g, "t_n": self.bodies.traction(g), "g_n_dot": self._force(g - self._x_gap) / self.c}
+        return {"g_n": g, "t_n": self.bodies.traction(g), "v_n": self._force(g - self._x_gap) / self.c}
 
     @property
     def _x_gap(self) -> float:

@@ -93,5 +93,6 @@ class StickSlip(Reference):
         held = np.where(since < 0.0, 0.0, self.slip_distance)
         rest = 2.0 * self.t_k - self.t_s + self.k * self.V * (within - self.slip_time)
         slip = cycle * self.slip_distance + np.where(slips, slip, held)
-        t_t = np.where(slips, self.t_k + above, np.where(since < 0.0, self.k * self.V * t, rest))
-        return {"v": np.where(slips, v, 0.0), "slip": slip, "t_t": t_t, "heat": self.t_k * slip}
+        spring = np.where(slips, self.t_k + above, np.where(since < 0.0, self.k * self.V * t, rest))
+        tractions = {"t_t": np.where(slips, self.t_k, spring), "spring_traction": spring}
+        return {"v": np.where(slips, v, 0.0), "u_t": slip, **tractions, "heat": self.t_k * slip}

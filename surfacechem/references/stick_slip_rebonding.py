@@ -116,7 +116,7 @@ class StickSlipRebonding(Reference):
         return Cycle(start, x * self.tau, phi, limit, Slip(self.m, self.k, self.V, drop))
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        values = np.zeros((5, len(t)))
+        values = np.zeros((6, len(t)))
         begin, slipped, last = 0.0, 0.0, float(np.max(t, initial=0.0))
         for cycle in islice(self.cycles(), CYCLES):
             inside = (t >= begin) & (t < begin + cycle.duration)
@@ -126,12 +126,13 @@ class StickSlipRebonding(Reference):
                 break
         else:
             raise InputError(f"{self.name}: more than {CYCLES} cycles until t = {last!r} s.")
-        return dict(zip(("phi", "v", "slip", "t_t", "heat"), values, strict=True))
+        return dict(zip(("phi", "v", "u_t", "t_t", "spring_traction", "heat"), values, strict=True))
 
     def _within(self, cycle: Cycle, t: Array, slipped: float) -> Array:
         sticks = t < cycle.stick_time
         slip, v, above = cycle.slip.motion(np.where(sticks, 0.0, t - cycle.stick_time))
         phi = np.where(sticks, -np.expm1(-t / self.tau), 0.0)
-        t_t = np.where(sticks, cycle.start + self.k * self.V * t, self.p * self.mu_k + above)
+        spring = np.where(sticks, cycle.start + self.k * self.V * t, self.p * self.mu_k + above)
+        t_t = np.where(sticks, spring, self.p * self.mu_k)
         slip = slipped + slip
-        return np.array([phi, v, slip, t_t, self.p * self.mu_k * slip])
+        return np.array([phi, v, slip, t_t, spring, self.p * self.mu_k * slip])
