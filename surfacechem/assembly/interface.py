@@ -9,9 +9,9 @@ import symengine
 
 from surfacechem.assembly.build import NOTHING, Bond, Build
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Margin, State
+from surfacechem.system import Margin, State, Transition
 from surfacechem.terms import Load, Spec
 
 LOADABLE = ("phi", "g_n", "g_t", "v", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c", "w_n", "w_t", "F_n", "F_t", "u_t")
@@ -137,7 +137,22 @@ def free_energy(build: Build) -> None:
             "the interface's potential depends on temperature, but the interface has none. "
             "Give `interface.temperature` a name."
         )
+    _sides_of_touch(build)
     _tractions(build)
+
+
+def _sides_of_touch(build: Build) -> None:
+    """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
+    g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
+    conditions = {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
+    psi = symengine.sympify(build.psi).xreplace(conditions)
+    if "g_n" not in build.gap_rates or not depends(psi, side):
+        return
+    build.psi = psi
+    build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
+    for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
+        margin = where(value * side > 0, value * g, 1)
+        build.transitions.append(Transition(name, margin, reason, {side: symengine.Integer(-value)}))
 
 
 def _known(build: Build) -> set[Any]:
