@@ -137,7 +137,7 @@ class _Books:
         y = self.trajectory.result.outputs
         residuals = np.zeros((len(y), 1 + len(accounts)))
         for k, (j, name) in enumerate(accounts):
-            bonds = y[:, states.index(name)]
+            bonds = y[:, states.index(name)] if name in states else self.column(name)
             residuals[:, k] = np.abs(bonds - bonds[:1] - self.ledger[:, j])
         return np.asarray(residuals.max(axis=1))
 

@@ -261,12 +261,12 @@ class Model:
         return "failed", f"{REASONS[result.status]} at {where}"
 
     def _closest_margin(self, result: Result) -> str | None:
-        """Reason of the margin that has all but closed where a run could not go on."""
+        """Reason of the margin that has closed, or all but closed, where a run could not go on."""
         if result.steps is None or len(result.steps.t) < 2 or self.program.margins is None:
             return None
         first = self._margins(result, 0)
         last = self._margins(result, -1)
-        shrink = [abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
+        shrink = [0.0 if b < 0 else abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
         order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
         return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 

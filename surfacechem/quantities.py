@@ -46,6 +46,7 @@ VARIABLES = _table(
     ("T_from", "K", "temperature of the first end of a heat path"),
     ("T_to", "K", "temperature of the second end of a heat path"),
     ("phi", "1", "bonding state: bonded sites per reference site", r"\phi", "e:phi_def"),
+    ("ln_phi", "1", "logarithm of the bonding state", r"\ln\phi"),
     ("g_n", "m", "normal gap", "g_n"),
     ("g_t", "m", "elastic tangential gap", "g_t"),
     ("u_t", "m", "tangential displacement of body 2 relative to body 1", "u_t"),

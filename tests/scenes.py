@@ -1,11 +1,12 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonds import ReversibleBell
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import (
-    BondSprings,
+    BondStiffness,
     ConstantInterfaceCapacity,
     InterfaceCapacity,
     NormalStiffness,
@@ -171,6 +172,32 @@ def cure() -> Scene:
     return perfect_contact([LinearEnthalpy(H_r=300.0)], [reaction], T=320.0, energy=Constant)
 
 
+def loaded_bonds() -> Scene:
+    """Elastic bonds across an opening gap: their force speeds up rupture, their energy cools what they stretch."""
+    potentials = [LatticeGas(epsilon=3e-20), BondSprings(k_b=varying(1e-3, LinearInTemperature(slope=-1e-3)))]
+    interface = Interface(
+        "T_c",
+        [*potentials, InterfaceCapacity(C_c=3.0)],
+        reactions=[ReversibleBell(k_off=2.0, x_off=4e-10)],
+        sites=SITES,
+    )
+    heat = [path("lower", "interface", 100.0), path("interface", "upper", 70.0)]
+    initial = {"T_1": 300.0, "T_2": 305.0, "T_c": 310.0, "phi": 0.6}
+    return Scene(bodies(), interface, heat, {"g_n": Ramp(start=2e-9, rate=1e-9)}, None, 300.0, initial)
+
+
+def shared_load() -> Scene:
+    """A contact under tension whose bonds form and break at rates of their own."""
+    interface = Interface(
+        "T",
+        [LatticeGas(epsilon=3e-20), NormalStiffness(E_n=1e15)],
+        reactions=[ReversibleBell(k_off=2.0, x_off=4e-10)],
+        sites=SITES,
+    )
+    loading = {"g_n": Ramp(start=1e-9, rate=1e-10)}
+    return Scene(bodies("T", "T"), interface, (), loading, None, 300.0, {"T": 300.0, "phi": 0.6})
+
+
 def sliding() -> Scene:
     """Dry sliding that reverses."""
     loading = {"v": Harmonic(amplitude=0.02, frequency=1.0), "p": Hold(level=1e5)}
@@ -186,7 +213,7 @@ def adhesive() -> Scene:
         AdhesionIntensity(C_N=1e12, C_T=5e11, w=0.2, E_n=1e13),
         VanDerWaalsFlatFlat(A_H=1e-19, D_0=1e-7),
         VanDerWaalsSpherePlane(A_H=1e-19, R=1e-6, area=1e-12),
-        BondSprings(E_b=1e11, E_n=1e12),
+        BondStiffness(E_b=1e11, E_n=1e12),
         Penalty(E_n=varying(1e12, Power(exponent=-1.0))),
         InterfaceCapacity(C_c=5.0),
     ]
@@ -212,5 +239,7 @@ ALL = [
     stretched,
     prescribed_bonding,
     cure,
+    loaded_bonds,
+    shared_load,
     sliding,
 ]

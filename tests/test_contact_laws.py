@@ -21,7 +21,7 @@ from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import BondSprings, Penalty
+from surfacechem.laws.contact import BondStiffness, Penalty
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import (
@@ -107,7 +107,7 @@ def test_penalty_bears_pressure_only():
 
 
 def test_bonds_weaken_in_tension_and_not_in_compression():
-    energy = symbolic(BondSprings(E_b=1e12, E_n=3e12))
+    energy = symbolic(BondStiffness(E_b=1e12, E_n=3e12))
     traction, affinity = derivative(energy, g), derivative(energy, phi)
     assert at(traction, g_n=1e-6, phi=0.25) == 2.5e5
     assert at(traction, g_n=-1e-6, phi=0.25) == -3e6
@@ -118,7 +118,7 @@ def test_bond_springs_in_chemical_equilibrium():
     """Against the exact table; the traction along equilibrium has its peak at sqrt(2K/3E) and does the work K/2."""
     columns, rows, expect = read("h_damage_equilibrium")
     E, K = 1e16, 0.2
-    energy = symbolic(BondSprings(E_b=E, E_n=E)) + BondEnergy(K_0=K).energy(phi=phi, T_c=T, T_0=T_0)
+    energy = symbolic(BondStiffness(E_b=E, E_n=E)) + BondEnergy(K_0=K).energy(phi=phi, T_c=T, T_0=T_0)
     for x, bonds, t in rows:
         if bonds > 0:
             assert at(derivative(energy, phi), g_n=x, phi=bonds, T_c=300, T_0=300) == pytest.approx(0, abs=1e-15)

@@ -13,6 +13,7 @@ from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
+from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
 from surfacechem.assembly.slip import tangential_gap, tangential_motion
@@ -21,7 +22,7 @@ from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
-from surfacechem.system import START, System
+from surfacechem.system import START, Role, System
 from surfacechem.terms import Spec
 
 __all__ = ["LOADABLE", "assemble"]
@@ -47,6 +48,7 @@ STAGES = (
     equations,
     stage_ends,
     totals,
+    logarithmic_state,
     touch,
 )
 
@@ -69,7 +71,7 @@ def assemble(scene: Scene) -> System:
         rows={state.name: build.rows[state.name] for state in build.states},
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
-        roles=tuple(build.variables.roles),
+        roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
         ranges=tuple(build.ranges),
         pairs=tuple(build.pairs),
         regime=regime(build),
@@ -81,6 +83,12 @@ def assemble(scene: Scene) -> System:
         fit=build.fit() if build.fit else None,
         warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
     )
+
+
+def _is_there(build: Build, role: Role) -> bool:
+    """Whether a derived variable was derived: one that nobody reads is not there."""
+    name = role.variable
+    return role.role != "derived" or build.variables.was_read(name) or any(item.name == name for item in build.named)
 
 
 def _refuse_idle_initial_values(build: Build) -> None:

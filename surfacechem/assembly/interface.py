@@ -8,6 +8,7 @@ from typing import Any
 import symengine
 
 from surfacechem.assembly.build import NOTHING, Bond, Build
+from surfacechem.assembly.logarithms import initial_bonding
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
@@ -99,12 +100,13 @@ def _derived_phi(build: Build) -> Expression:
 def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> None:
     name = quantity.name
     symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
-    initial = build.initial(name)
+    initial = initial_bonding(build, name)
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.")
     build.variables.define(name, lambda: symbol, "evolved", "bonding")
     build.bonding[name] = Bond(symbol, dot, density)
-    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", Spec("1", f"initial {name}"), initial)
+    start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
+    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
     build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
     _bounds(build, name, symbol, limit)
 
@@ -152,7 +154,7 @@ def _sides_of_touch(build: Build) -> None:
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
         margin = where(value * side > 0, value * g, 1)
-        build.transitions.append(Transition(name, margin, reason, {side: symengine.Integer(-value)}))
+        build.transitions.append(Transition(name, margin, reason, {side: symengine.Integer(-value)}, settles=True))
 
 
 def _known(build: Build) -> set[Any]:

@@ -264,7 +264,7 @@ class SceneReader:
     def _initial(self, interface: Interface, loading: Mapping[str, Load]) -> dict[str, float]:
         evolving = [name for name in self.nodes if name not in loading]
         if interface.limits or any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
-            evolving.append("phi")
+            evolving += ["phi", "ln_phi"]
         if any(key in self.top for key in ("mechanics", "programme")) or {"F_n", "F_t", "u_t"} & set(loading):
             evolving += [name for name in MOVING if name not in loading]
         tree = self.top.get("initial")
@@ -289,7 +289,7 @@ class SceneReader:
         return f"nothing that evolves is called '{name}'.{suggestion(name, evolving)}"
 
     def _initial_value(self, name: str, tree: Tree, interface: Interface) -> float:
-        if name in MOVING:
+        if name in (*MOVING, "ln_phi"):
             return number(tree, self.units[name], name)
         if name != "phi":
             return number(tree, "K", name, TEMPERATURE)

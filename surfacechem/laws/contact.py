@@ -83,7 +83,7 @@ class Penalty(Potential):
         return where(g_n < 0, self.E_n * g_n**2 / 2, 0)
 
 
-class BondSprings(Potential):
+class BondStiffness(Potential):
     r"""Springs that bonds are: they carry tension in proportion to the bonding state; contact carries compression.
 
     .. math:: \Psi = \tfrac12 \phi E_b \langle g_n \rangle^2 + \tfrac12 E_n \langle -g_n \rangle^2
@@ -93,7 +93,7 @@ class BondSprings(Potential):
     traction at :math:`\sqrt{2K/3E_b}`, work of separation K/2.
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c with :math:`E_n = \phi E_b`. Any g_n.
 
-    >>> springs = BondSprings(E_b=1e12, E_n=4e12)
+    >>> springs = BondStiffness(E_b=1e12, E_n=4e12)
     >>> springs.energy(g_n=1e-6, phi=0.5), springs.energy(g_n=-1e-6, phi=0.5)
     (0.25, 2.0)
     """
