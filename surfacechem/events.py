@@ -120,7 +120,8 @@ class Hybrid:
         )
         result = self.method.solve(part)
         self._absolute(result, start, times, end)
-        self.parts.append(result)
+        if result.t > start.t:  # else its length is below the rounding of time
+            self.parts.append(result)
         if len(result.margins):
             self.largest = np.maximum(self.largest, np.abs(result.margins))
         return result

@@ -108,6 +108,12 @@ def log(x: Expression) -> Expression:
     return _engine(x).log(x)
 
 
+LARGE_EXPONENT = 200.0
+"""Exponent above which arsinh(x exp(exponent)) is taken by its logarithm."""
+
+TINY = 1e-300
+"""Magnitudes below this count as this in a logarithm."""
+
 FRACTION_FLOOR = 1e-300
 """Fractions below this count as this in a logarithm, as Cantera does for vanished species."""
 
@@ -137,6 +143,22 @@ def log_sum(logarithms: Iterable[Expression]) -> Expression:
 def sqrt(x: Expression) -> Expression:
     """Square root."""
     return _engine(x).sqrt(x)
+
+
+def asinh_exp(x: Expression, exponent: Expression) -> Expression:
+    """arsinh(x exp(exponent)); for large exponents by its logarithm, so that none overflows."""
+    if not is_symbolic(x, exponent):
+        if x == 0:
+            return 0.0
+        if exponent < LARGE_EXPONENT:
+            return math.asinh(x * math.exp(exponent))
+        return math.copysign(math.log(2 * abs(x)) + exponent, x)
+    import symengine
+
+    plain = symengine.asinh(x * exp(exponent))
+    size = absolute(x)
+    far = sign(x) * (log(where(size > TINY, size, TINY + 0 * size)) + math.log(2) + exponent)
+    return symengine.Piecewise((plain, exponent < LARGE_EXPONENT), (far, True))
 
 
 def sin(x: Expression) -> Expression:

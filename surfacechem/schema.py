@@ -172,7 +172,9 @@ def _initial() -> Schema:
     coverages = {"type": "object", "additionalProperties": _ref("quantity"), "description": "by species"}
     logarithm = _quantity("logarithm of the bonding state, instead of phi: for survival far below 1e-16")
     properties = {"phi": _quantity("bonding state"), "ln_phi": logarithm, "coverages": coverages}
-    properties |= {name: _quantity(f"{VARIABLES[name].long_name} [{VARIABLES[name].unit}]") for name in MOVING}
+    properties |= {
+        name: _quantity(f"{VARIABLES[name].long_name} [{VARIABLES[name].unit}]") for name in (*MOVING, "theta")
+    }
     return _object(properties, patterns={NODE.pattern: _quantity("temperature [K]")})
 
 

@@ -250,10 +250,16 @@ class Friction(Law):
     formula = "traction"
     breaks_bonds: ClassVar[bool] = False
     """Whether bonds break as sliding starts."""
+    internal: ClassVar[Mapping[str, str]] = {}
+    """Variables of its own that the law evolves, as logarithms, and what each is the logarithm of."""
 
     traction: ClassVar[Callable[..., Expression]]
     limit: ClassVar[Callable[..., Expression]]
     """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
+    transverse: ClassVar[Callable[..., Expression]]
+    """Traction across v, along the interface [Pa]; absent where a law has none."""
+    evolution: ClassVar[Callable[..., Mapping[str, Expression]]]
+    """Rates of the law's own variables [1/s]; absent where it has none."""
 
     @property
     def has_limit(self) -> bool:

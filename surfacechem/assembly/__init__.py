@@ -17,6 +17,7 @@ from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
 from surfacechem.assembly.slip import tangential_gap, tangential_motion
+from surfacechem.assembly.softening import softening_mode
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch
@@ -35,6 +36,7 @@ STAGES = (
     normal_gap,
     tangential_gap,
     bonded_mode,
+    softening_mode,
     medium,
     free_energy,
     force,
@@ -94,6 +96,7 @@ def _is_there(build: Build, role: Role) -> bool:
 def _refuse_idle_initial_values(build: Build) -> None:
     """An initial value belongs to something that evolves."""
     states = {state.name for state in build.states}
+    states |= {name for law in build.interface.frictions for name in law.internal.values()}
     for name in build.scene.initial:
         if name in states:
             continue

@@ -9,6 +9,7 @@ import symengine
 from surfacechem import balances
 from surfacechem.assembly.build import Bond, Build
 from surfacechem.assembly.pairs import departure, opposed, own_departure
+from surfacechem.assembly.softening import softening
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account
@@ -32,6 +33,7 @@ def reactions(build: Build) -> None:
         for x, n in nu.items():
             change[x] += n * rate
         own_departure(build, label, law, affinity)
+        softening(build, law)
     for pair in pairs:
         departure(build, pair, mu)
     for name, bond in build.bonding.items():

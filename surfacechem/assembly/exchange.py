@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import symengine
 
 from surfacechem.assembly.build import NOTHING, Build
+from surfacechem.assembly.memory import memory
 from surfacechem.assembly.slip import stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
 from surfacechem.system import Margin
-from surfacechem.terms import HeatTransfer
+from surfacechem.terms import Friction, HeatTransfer
 
 
 def friction(build: Build) -> None:
@@ -22,11 +23,12 @@ def friction(build: Build) -> None:
     for law in build.interface.frictions:
         label = build.label(law)
         bound = build.variables.bind(law, f"interface.friction.{law.name()}")
+        memory(build, law, bound)
         traction = build.variables.call(bound, bound.statement)
         build.law_margins(law, {})
         traction = build.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
         v = build.variables.get("v", law)
-        power = build.stretch * traction * v
+        power = build.stretch * traction * v + _across(build, law, bound, label)
         build.frictions.add(label)
         build.dissipation[label] = power
         if build.slip is None:
@@ -35,6 +37,17 @@ def friction(build: Build) -> None:
         else:
             build.sliding_tractions.append(build.stretch * traction)
             stick_limit(build, law, bound)
+
+
+def _across(build: Build, law: Friction, bound: Friction, label: str) -> Expression:
+    """Power of the traction across v, where the law has one."""
+    if not hasattr(bound, "transverse"):
+        return symengine.Integer(0)
+    if build.slip is not None:
+        raise InputError("a law with two directions needs both velocities prescribed, `v` and `v_2`.", law.place)
+    traction = build.variables.call(bound, bound.transverse)
+    quantity = Quantity(f"t_2_{label}", "Pa", f"tangential traction of {law.title} across v")
+    return build.stretch * build.name(quantity, traction) * build.variables.get("v_2", law)
 
 
 def _reversal(build: Build) -> None:

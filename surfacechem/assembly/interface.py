@@ -15,7 +15,25 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State, Transition
 from surfacechem.terms import Load, Spec
 
-LOADABLE = ("phi", "g_n", "g_t", "v", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c", "w_n", "w_t", "F_n", "F_t", "u_t")
+LOADABLE = (
+    "phi",
+    "g_n",
+    "g_t",
+    "v",
+    "v_2",
+    "p",
+    "t_n",
+    "f",
+    "J_c",
+    "Q_1",
+    "Q_2",
+    "Q_c",
+    "w_n",
+    "w_t",
+    "F_n",
+    "F_t",
+    "u_t",
+)
 """Variables that a case may prescribe, beside the temperatures."""
 
 TRACTIONS = (

@@ -267,6 +267,7 @@ class SceneReader:
             evolving += ["phi", "ln_phi"]
         if moves or "programme" in self.top or {"F_n", "F_t", "u_t"} & set(loading):
             evolving += [name for name in MOVING if name not in loading]
+        evolving += [name for law in interface.frictions for name in law.internal.values()]
         tree = self.top.get("initial")
         fields = mapping(tree)
         for name, child in fields.items():
@@ -289,7 +290,7 @@ class SceneReader:
         return f"nothing that evolves is called '{name}'.{suggestion(name, evolving)}"
 
     def _initial_value(self, name: str, tree: Tree, interface: Interface) -> float:
-        if name in (*MOVING, "ln_phi"):
+        if name in (*MOVING, "ln_phi", "theta"):
             return number(tree, self.units[name], name)
         if name != "phi":
             return number(tree, "K", name, TEMPERATURE)

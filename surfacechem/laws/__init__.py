@@ -23,8 +23,8 @@ from surfacechem.terms import (
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
     Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange", "films"),
-    RateLaw: ("kinetics", "bonds", "adhesion"),
-    Friction: ("friction", "films"),
+    RateLaw: ("kinetics", "bonds", "adhesion", "softening"),
+    Friction: ("friction", "films", "rate_and_state", "anisotropic"),
     HeatTransfer: ("heat", "contact_conductance", "gap_conductance", "films"),
     Limit: ("limits",),
     Property: ("media",),
@@ -37,7 +37,8 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
 def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
     module = importlib.import_module(f"{__name__}.{family}")
     for value in vars(module).values():
-        if inspect.isclass(value) and issubclass(value, contract) and value.__module__ == module.__name__:
+        own = inspect.isclass(value) and value.__module__ == module.__name__
+        if own and issubclass(value, contract) and not inspect.isabstract(value):
             yield value
 
 

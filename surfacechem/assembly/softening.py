@@ -1,0 +1,61 @@
+"""Gradual debonding: the mode in which bonds break along an envelope, entered as it is reached, left on unloading."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.mounting import far_field, held
+from surfacechem.expressions import Expression, absolute, derivative, where
+from surfacechem.quantities import VARIABLES
+from surfacechem.system import Transition
+from surfacechem.terms import RateLaw
+
+
+def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:
+    """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
+    mount = held(build, "n")
+    if mount is None or not mount.quasi_static or "g_n" not in build.gap_rates:
+        return []
+    g, k = symengine.Symbol("g_n"), far_field(build, mount).k
+    slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
+    margin = where(mode > 0, (k + slope) / (k + absolute(slope)), 1)
+    lost, none = -symengine.Integer(1), symengine.Integer(0)
+    reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
+    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True)]
+
+
+def softening_mode(build: Build) -> None:
+    """The mode, and the velocity that drives the break, for the laws that read them."""
+    if not any(hasattr(law, "envelope") for law in build.interface.reactions):
+        return
+    mode = build.mode("debonding", 0.0, {-1.0: "has lost its bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"})
+    build.variables.define("softening", lambda: (mode + mode**2) / 2, "mode", "interface.bonding")
+    if not build.variables.has("v_n"):
+        build.variables.define("v_n", partial(_velocity, build), "derived", "rate of the normal gap")
+
+
+def _velocity(build: Build) -> Expression:
+    rate = build.gap_rates["g_n"] if "g_n" in build.gap_rates else build.rate_of("g_n")
+    return build.name(VARIABLES["v_n"], rate)
+
+
+def softening(build: Build, law: RateLaw) -> None:
+    """What starts and what ends the loss of bonds along the envelope of a bound law."""
+    if not hasattr(law, "envelope"):
+        return
+    mode = next(item.symbol for item in build.modes if item.name == "debonding")
+    phi, g_n, v_n = (build.variables.get(name, law) for name in ("phi", "g_n", "v_n"))
+    left = build.variables.call(law, law.envelope)
+    peak = law.peak()  # type: ignore[attr-defined]
+    none, one = symengine.Integer(0), symengine.Integer(1)
+    lost = {mode: -one}
+    build.transitions += [
+        Transition("soften", where(mode**2 > 0, 1, left - phi), "bonds begin to break as the gap opens", {mode: one}),
+        *_tear(build, mode, phi, left),
+        Transition("part", where(mode > 0, left, 1), "the last bonds break", lost, {phi: none}, settles=True),
+        Transition("unload", where(mode > 0, v_n, 1), "bonds stop breaking as the gap closes", {mode: none}),
+        Transition("rejoin", where(mode < 0, g_n - peak, 1), "the gap is closed enough to bond", {mode: none}),
+    ]
