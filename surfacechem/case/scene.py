@@ -76,7 +76,7 @@ class SceneReader:
             loading=loading,
             surroundings=surroundings,
             T_0=self._reference_temperature(),
-            initial=self._initial(interface, loading),
+            initial=self._initial(interface, loading, moves=bool(normal or tangential)),
             normal=normal,
             tangential=tangential,
             programme=read_programme(self.top.get("programme"), self.units),
@@ -261,11 +261,11 @@ class SceneReader:
     def _reference_temperature(self) -> float | None:
         return number(self.top["T_0"], "K", "T_0", TEMPERATURE) if "T_0" in self.top else None
 
-    def _initial(self, interface: Interface, loading: Mapping[str, Load]) -> dict[str, float]:
+    def _initial(self, interface: Interface, loading: Mapping[str, Load], moves: bool) -> dict[str, float]:
         evolving = [name for name in self.nodes if name not in loading]
         if interface.limits or any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
             evolving += ["phi", "ln_phi"]
-        if any(key in self.top for key in ("mechanics", "programme")) or {"F_n", "F_t", "u_t"} & set(loading):
+        if moves or "programme" in self.top or {"F_n", "F_t", "u_t"} & set(loading):
             evolving += [name for name in MOVING if name not in loading]
         evolving += [name for law in interface.frictions for name in law.internal.values()]
         tree = self.top.get("initial")

@@ -1,0 +1,149 @@
+"""What a scene says of itself at the start, by the names that exact solutions use for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.integrate import Trajectory
+from surfacechem.references._energy import ConstantCapacity, QuadraticEnergy
+from surfacechem.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class Start:
+    """What a scene says of itself at the start, by the names that exact solutions use."""
+
+    def __init__(self, run: Trajectory, scene: Scene) -> None:
+        self.run, self.scene = run, scene
+        system = run.model.system
+        self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
+        self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
+        self.named = dict(zip((item.name for item in system.outputs), run.outputs[0], strict=True))
+        rates = run.rates[0]
+        self.rates = {state.name: float(rate) for state, rate in zip(system.states, rates, strict=True)}
+
+    def find(self, name: str) -> float | None:
+        """The value of a parameter of an exact solution, or None."""
+        try:
+            return float(RULES[name](self)) if name in RULES else self._plain(name)
+        except KeyError:
+            return None
+
+    def _plain(self, name: str) -> float:
+        variable = name.removesuffix("_i")
+        for source, key in ((self.parameters, name), *((s, n) for n in (name, variable) for s in self._values())):
+            if key in source:
+                return float(source[key])
+        return self.at(f".{name}")
+
+    def _values(self) -> tuple[Mapping[str, float], Mapping[str, float]]:
+        return self.initial, self.named
+
+    def at(self, ending: str) -> float:
+        """The one parameter whose path ends like this; KeyError if there is none, or there are several."""
+        found = [value for path, value in self.run.values.items() if path.endswith(ending)]
+        if len(found) != 1:
+            raise KeyError(ending)
+        return found[0]
+
+    def ramp(self, variable: str) -> float:
+        """The rate at which a variable is driven."""
+        return self.at(f"loading.{variable}.ramp.rate")
+
+    def held_at(self, parameter: str) -> float:
+        """A parameter of the mounting; of the normal gap if both directions are mounted."""
+        paths = [f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential")]
+        return next(self.run.values[path] for path in (*paths, paths[0]) if path in self.run.values)
+
+    def sliding(self) -> float:
+        """Traction of dry sliding."""
+        return self.at(".mu") * self.named["p"]
+
+    def sticking(self) -> float:
+        """Traction that sticking bears."""
+        values = self.run.values
+        return max(self.at(".mu"), next((values[p] for p in values if p.endswith(".mu_s")), 0.0)) * self.named["p"]
+
+    def heated(self, heat: Array) -> Array:
+        """The one temperature of the scene once its bodies have taken up a heat."""
+        energies = {body.energy.name() for body in self.scene.bodies if body.energy is not None}
+        model = {"quadratic": QuadraticEnergy(), "constant": ConstantCapacity()}[",".join(energies)]
+        T = self.temperature()
+        return T + model.rise(heat, self.capacity(), self.parameters.get("T_0", T), T)
+
+    def temperature(self) -> float:
+        """The one temperature of the scene."""
+        names = [state.name for state in self.run.model.system.states if state.quantity.unit == "K"]
+        return self.initial[names[0]] if names else self.named["T_c"]
+
+    def capacity(self) -> float:
+        """Sum of all capacities at T_0."""
+        return sum(value for name, value in self.parameters.items() if name in ("C_1", "C_2", "C_c"))
+
+    def friction(self, temperature: float | None = None) -> float:
+        """Power of all friction, at the start or with every temperature set to one value."""
+        system = self.run.model.system
+        names = [account.quantity.name for account in system.ledger]
+        laws = [name[2:] for name in names if name.startswith("W_") and f"heat_{name[2:]}" in names]
+        values = self.named if temperature is None else self._at(temperature)
+        return float(sum(values[f"D_{law}"] for law in laws))
+
+    def _at(self, temperature: float) -> dict[str, float]:
+        model, result = self.run.model, self.run.result
+        y = np.array([[v if name == "phi" else temperature for name, v in self.initial.items()]])
+        values = model.evaluate(result, result.times[:1], y, np.zeros_like(y))[0]
+        return dict(zip((item.name for item in model.system.outputs), values, strict=True))
+
+    def supplied(self) -> float:
+        """External heat into all members."""
+        return float(sum(self.named.get(name, 0.0) for name in ("Q_1", "Q_2", "Q_c")))
+
+    def conductance(self, chosen: Callable[[tuple[str, str]], bool]) -> float:
+        """Sum of the conductances of the chosen heat paths."""
+        laws = [law for law in self.scene.heat if chosen(law.between)]
+        if not laws:
+            raise KeyError("no such heat path")
+        return sum(self.run.values[f"{law.path}.h"] for law in laws)
+
+    def into(self, k: int) -> float:
+        """Sum of the conductances between the interface and body k."""
+        return self.conductance(lambda ends: set(ends) == {"interface", self.scene.bodies[k - 1].name})
+
+
+RULES: dict[str, Callable[[Start], float]] = {
+    "C": lambda s: s.capacity(),
+    "n_c": lambda s: s.parameters["N_c"],
+    "K_c": lambda s: s.parameters["K_0"],
+    "T": lambda s: s.temperature(),
+    "T_i": lambda s: s.temperature(),
+    "tau": lambda s: (s.parameters.get("phi_eq", 1.0) - s.initial["phi"]) / s.rates["phi"],
+    "k_i": lambda s: s.rates["phi"] / (1 - s.initial["phi"]),
+    "D": lambda s: s.friction(),
+    "D_0": lambda s: s.friction(s.parameters["T_0"]) + s.supplied(),
+    "Q": lambda s: -s.supplied(),
+    "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
+    "h": lambda s: s.conductance(lambda ends: True),
+    "H": lambda s: s.conductance(lambda ends: True),
+    "h_1": lambda s: s.into(1),
+    "h_2": lambda s: s.into(2),
+    "k": lambda s: s.held_at("k"),
+    "m": lambda s: s.held_at("m"),
+    "c": lambda s: sum(s.run.values.get(f"mechanics.normal.{name}", 0.0) for name in ("c_b", "c_g")),
+    "V": lambda s: s.ramp("w_t"),
+    "w_i": lambda s: s.named["w_n"],
+    "w_dot": lambda s: s.ramp("w_n"),
+    "g_dot": lambda s: s.ramp("g_n"),
+    "a": lambda s: -s.ramp("g_n"),
+    "g_i": lambda s: s.initial["g_n"] if "g_n" in s.initial else s.named["g_n"],
+    "mu": lambda s: s.at(".mu"),
+    "mu_k": lambda s: s.at(".mu"),
+    "t_k": lambda s: s.sliding(),
+    "t_s": lambda s: s.sticking(),
+    "t_n": lambda s: s.at(".t_max"),
+    "T_a": lambda s: s.named["T_a"] if "T_a" in s.named else s.named["T_2"] if "T_2" in s.named else s.named["T_1"],
+}
+"""Parameters of exact solutions that are not parameters of the scene under the same name."""
