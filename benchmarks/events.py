@@ -148,7 +148,7 @@ def slide_error() -> Callable[[np.ndarray], float]:
 
 def rupture_batch(rtol: float, runs: int, threads: int) -> np.ndarray:
     """Times of rupture of randomised clusters, NaN where none was found."""
-    parameters = RUPTURE * np.random.default_rng(0).uniform(0.7, 1.3, (runs, 1, 4))
+    parameters = RUPTURE * np.random.default_rng(0).uniform(0.85, 1.15, (runs, 1, 4))
     y0 = np.tile(RUPTURE_START, (runs, 1))
     atol = 0.01 * rtol
     stop = [Margin.stop()]
