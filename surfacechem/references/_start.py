@@ -61,12 +61,13 @@ class Start:
 
     def sliding(self) -> float:
         """Traction of dry sliding."""
-        return self.at(".mu") * self.named["p"]
+        return float(self.at(".mu") * self.named["p"])
 
     def sticking(self) -> float:
         """Traction that sticking bears."""
         values = self.run.values
-        return max(self.at(".mu"), next((values[p] for p in values if p.endswith(".mu_s")), 0.0)) * self.named["p"]
+        static = next((values[p] for p in values if p.endswith(".mu_s")), 0.0)
+        return float(max(self.at(".mu"), static) * self.named["p"])
 
     def heated(self, heat: Array) -> Array:
         """The one temperature of the scene once its bodies have taken up a heat."""
