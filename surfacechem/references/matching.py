@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ PROBES = 7
 def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
     reference = match(references.get(name), options, Start(run, scene))
-    exact = _renamed(reference.solution(run.result.times), run)
+    exact = renamed(reference.solution(run.result.times), run)
     _check_start(exact, run)
     _check(reference, run)
     return exact
@@ -58,9 +59,18 @@ class Start:
         system = run.model.system
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
         self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
-        self.named = dict(zip((item.name for item in system.outputs), run.outputs[0], strict=True))
-        rates = run.rates[0]
-        self.rates = {state.name: float(rate) for state, rate in zip(system.states, rates, strict=True)}
+
+    @cached_property
+    def named(self) -> dict[str, float]:
+        """Named quantities."""
+        names = (item.name for item in self.run.model.system.outputs)
+        return dict(zip(names, self.run.outputs[0], strict=True))
+
+    @cached_property
+    def rates(self) -> dict[str, float]:
+        """Rates of the states."""
+        states = self.run.model.system.states
+        return {state.name: float(rate) for state, rate in zip(states, self.run.rates[0], strict=True)}
 
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
@@ -70,10 +80,10 @@ class Start:
             return None
 
     def _plain(self, name: str) -> float:
-        for source in (self.parameters, self.initial, self.named):
+        for source in (self.parameters, self.initial):
             if name in source:
                 return float(source[name])
-        return self.initial[name.removesuffix("_i")]
+        return float(self.named[name] if name in self.named else self.initial[name.removesuffix("_i")])
 
     def temperature(self) -> float:
         """The one temperature of the scene."""
@@ -117,6 +127,8 @@ class Start:
 RULES: dict[str, Callable[[Start], float]] = {
     "C": lambda s: s.capacity(),
     "n_c": lambda s: s.parameters["N_c"],
+    "n_1": lambda s: s.parameters.get("N_1", s.parameters["N_c"]),
+    "n_2": lambda s: s.parameters.get("N_2", s.parameters["N_c"]),
     "K_c": lambda s: s.parameters["K_0"],
     "T": lambda s: s.temperature(),
     "T_i": lambda s: s.temperature(),
@@ -125,7 +137,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "D": lambda s: s.friction(),
     "D_0": lambda s: s.friction(s.parameters["T_0"]) + s.supplied(),
     "Q": lambda s: -s.supplied(),
-    "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
+    "delta_T": lambda s: s.parameters["H_r"] / s.capacity() if s.capacity() else 0.0,
     "h": lambda s: s.conductance(lambda ends: True),
     "H": lambda s: s.conductance(lambda ends: True),
     "h_1": lambda s: s.into(1),
@@ -135,7 +147,7 @@ RULES: dict[str, Callable[[Start], float]] = {
 """Parameters of exact solutions that are not parameters of the scene under the same name."""
 
 
-def _renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
+def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Exact values under the names of the scene; those it does not have are left out."""
     system = run.model.system
     known = [state.name for state in system.states] + [item.name for item in system.outputs]
@@ -184,7 +196,7 @@ def _along(reference: Reference, run: Trajectory, t: Array) -> tuple[Array, Arra
     """Exact states and their rates, by central differences; InputError where the solution leaves a state open."""
     step = 1e-4 * t
     times = np.concatenate([t - 2 * step, t - step, t, t + step, t + 2 * step])
-    exact = _renamed(reference.solution(times), run)
+    exact = renamed(reference.solution(times), run)
     names = [state.name for state in run.model.system.states]
     missing = [name for name in names if name not in exact]
     if missing:
