@@ -3,7 +3,7 @@
 >>> solver("radua")
 Traceback (most recent call last):
     ...
-ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cvode, ida, lsoda, radau, scipy-radau.
+ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, ida, lsoda, radau, scipy-radau.
 """
 
 import difflib
@@ -18,6 +18,7 @@ _FACTORIES = {
     "scipy-radau": ("scipy_methods", "radau"),
     "cvode": ("sundials", "CVODESolver"),
     "ida": ("sundials", "IDASolver"),
+    "cantera": ("cantera_network", "CanteraSolver"),
 }
 
 names = tuple(_FACTORIES)
