@@ -7,7 +7,7 @@ inside the last step come from the integrator's own polynomial, whose derivative
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Self
 
 import cantera
 import numpy as np
@@ -43,20 +43,23 @@ def contents(reactions: Sequence[str] = ("bond",)) -> Any:
     return cantera.Interface(yaml=text, name="interface")
 
 
-class HeldReactor(cantera.ExtensibleReactor):  # type: ignore[misc]
+class BackOffError(Exception):
+    """There are no rates here, but a shorter step may end where there are."""
+
+
+class HeldReactor(cantera.ExtensibleReactor):
     """A reactor whose state and rates are not Cantera's. The only place that knows how Cantera calls its hooks.
 
-    Its variables, their number and their rates are what a subclass states. Once a rate has raised, every further one
-    raises the same, since Cantera repeats a failed evaluation with ever smaller steps.
+    Its variables, their number and their rates are what a subclass states. Once they have raised anything but
+    BackOffError, they raise it for good, since Cantera repeats a failed evaluation with ever smaller steps.
     """
 
     names: tuple[str, ...]
     error: Exception | None = None
 
-    def __new__(cls, surface: Any, *_: Any) -> HeldReactor:
+    def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
         """Keep the surface itself: a clone would have lost what Python knows of it."""
-        made: HeldReactor = super().__new__(cls, surface, clone=False)
-        return made
+        return super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
 
     def start(self) -> Array:
         """Present values of the variables."""
@@ -85,10 +88,12 @@ class HeldReactor(cantera.ExtensibleReactor):  # type: ignore[misc]
 
     def replace_eval(self, t: float, lhs: Any, rhs: Any) -> None:
         if self.error is not None:
-            raise self.error
+            raise self.error.with_traceback(None)
         try:
             lhs[:] = 1.0
             rhs[:] = self.rates(t)
+        except BackOffError:
+            raise
         except Exception as error:
             self.error = error
             raise
