@@ -14,8 +14,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.integrate import Model, Run
 from surfacechem.reactor import coupling
 from surfacechem.solvers.contract import Array
-from surfacechem.solvers.reduced import Reduced
-from surfacechem.solvers.stepping import View
+from surfacechem.solvers.evaluation import Evaluation
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""
@@ -46,18 +45,16 @@ class EmbeddedScene:
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)
         except InputError as error:
             raise case.located(error) from None
-        self.view = View(self.problem, self.problem.parameters[0], self.problem.y0)
+        self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
         self.begin_piece(0.0, DIFFERENCE)
-        self._reduced = Reduced(self.view)
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self._position = {parameter.path: j for j, parameter in enumerate(system.parameters)}
-        self.states = tuple(
-            state.name for state, algebraic in zip(system.states, self._reduced.mask, strict=True) if not algebraic
-        )
+        self.states = tuple(system.states[j].name for j in self.evaluation.free)
 
     def start(self) -> Array:
         """Initial values of the variables."""
-        return self._reduced.start(self.problem.y0, np.zeros(self.problem.program.n_ledger))
+        ledger = np.zeros(self.problem.program.n_ledger)
+        return np.concatenate((self.problem.y0[self.evaluation.free], ledger))
 
     @property
     def accounts(self) -> tuple[str, ...]:
@@ -74,30 +71,29 @@ class EmbeddedScene:
 
     def give(self, path: str, value: float) -> None:
         """Set a parameter of the present piece of time."""
-        self.view.parameters[self._position[path]] = value
+        self.evaluation.parameters[self._position[path]] = value
 
     def rates(self, t: float, x: Array) -> Array:
         """Time derivatives of the variables; EndError where there are none, or a limit of the scene is passed."""
-        n = len(self.states)
-        y, ydot = self.view.complete(t, x[:n])
-        if not np.all(np.isfinite(ydot)):
+        evaluation = self.evaluation
+        if not evaluation.put(t, x[: len(self.states)]):
             raise EndError("no state satisfies the equations")
-        closed = self._terminal & ~(self.view.margins(t, y, ydot) >= 0)
+        closed = self._terminal & ~(evaluation.margins() >= 0)
         if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
-        return np.concatenate((ydot[~self._reduced.mask], self.view.ledger_rates(t, y, ydot)))
+        return evaluation.rates()
 
     def quantity(self, name: str, t: float, x: Array) -> float:
         """A state or a named quantity in SI units."""
-        y, ydot = self.view.complete(t, x[: len(self.states)])
-        system = self.model.system
-        found = dict(zip((state.name for state in system.states), y, strict=True))
+        evaluation, system = self.evaluation, self.model.system
+        evaluation.put(t, x[: len(self.states)])
+        found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
         if name in found:
             return float(found[name])
         names = [item.name for item in system.outputs]
         if name not in names:
             raise InputError(f"the scene has no quantity '{name}'.{suggestion(name, [*found, *names])}")
-        return float(self.model.output_function(self.view.inputs(t, y, ydot))[names.index(name)])
+        return float(self.model.output_function(evaluation.inputs)[names.index(name)])
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -108,4 +104,4 @@ class EmbeddedScene:
         """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
         run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
         table = self.model.problem(run, self.values).parameters
-        self.view.parameters = table[bisect_right(self.breakpoints, t)].copy()
+        self.evaluation.parameters[:] = table[bisect_right(self.breakpoints, t)]

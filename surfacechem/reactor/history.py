@@ -25,10 +25,10 @@ class History:
         """Keep variables at a time; a time that is there already is kept as it is."""
         if self.times and t <= self.times[-1]:
             return
-        view, n = self.scene.view, len(self.scene.states)
-        y, ydot = view.complete(t, x[:n])
+        evaluation, n = self.scene.evaluation, len(self.scene.states)
+        evaluation.put(t, x[:n])
         self.times.append(t)
-        self.rows.append((y, ydot, x[n:].copy(), view.parameters.copy()))
+        self.rows.append((evaluation.y.copy(), evaluation.ydot.copy(), x[n:].copy(), evaluation.parameters.copy()))
 
     def solution(self, stop: str, seconds: float, *, alone: bool) -> Solution:
         """The recorded states as a run, ended by ``stop`` where that is not empty.

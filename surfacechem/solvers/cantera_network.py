@@ -13,6 +13,7 @@ import cantera
 import numpy as np
 
 from surfacechem.solvers.contract import Array
+from surfacechem.solvers.evaluation import Evaluation
 from surfacechem.solvers.reduced import Reduced
 from surfacechem.solvers.stepping import Method, StepError, SteppingSolver, View
 
@@ -108,10 +109,11 @@ class HeldReactor(cantera.ExtensibleReactor):
 class _SystemReactor(HeldReactor):
     """The equations of a stretch, in units of their tolerances."""
 
-    def __init__(self, surface: Any, system: Reduced, x: Array) -> None:
+    def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
-        self.system = system
-        self.unit = np.maximum(system.atol, SMALLEST)
+        self.view = view
+        self.evaluation = Evaluation(view.problem.program, view.guess, view.parameters)
+        self.unit = np.maximum(Reduced(view).atol, SMALLEST)
         self.scaled = x / self.unit
         self.names = tuple(f"x{i}" for i in range(len(x)))
 
@@ -122,13 +124,16 @@ class _SystemReactor(HeldReactor):
         self.scaled = x
 
     def rates(self, t: float) -> Array:
-        return self.system.rates(t, self.scaled * self.unit) / self.unit
+        self.view.residuals += 1
+        n = len(self.evaluation.free)
+        if not self.evaluation.put(t, self.scaled[:n] * self.unit[:n]):
+            raise BackOffError("no consistent state")
+        return np.asarray(self.evaluation.rates() / self.unit)
 
 
 class _Stretch(Method):
     def __init__(self, view: View, t: float, y: Array, ledger: Array) -> None:
-        system = Reduced(view)
-        self.reactor = _SystemReactor(contents(), system, system.start(y, ledger))
+        self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y, ledger))
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
         self.net.initial_time = t
