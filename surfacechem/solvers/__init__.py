@@ -23,6 +23,9 @@ _FACTORIES = {
 
 names = tuple(_FACTORIES)
 
+ASKING = ("cantera",)
+"""Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
+
 
 def solver(name: str) -> Solver:
     """The solver of this name; 'radau' is our own and the default."""

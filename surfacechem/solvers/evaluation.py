@@ -45,6 +45,7 @@ class Evaluation:
         self.y[self.free] = differential
         self.y[self._algebraic] = self._guess
         self.ydot[:] = 0.0
+        self.program.filled(self.inputs)
         self._search(*self._arguments)
         found = bool(self._outcome[0] == 0)
         if found:

@@ -278,6 +278,10 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     )
     if len(table) not in (1, len(ends)):
         raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
+    if program.filler is not None:
+        rows = np.broadcast_to(table[:, 0], (len(ends), program.n_parameters))
+        filled = program.filled(np.concatenate([ends, rows], axis=1))
+        table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), 10), np.int64)
     none, nothing, kinds = np.zeros(0), _no_rows(len(ends)), _kinds(())
     stepper.run_batch()(
