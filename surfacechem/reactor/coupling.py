@@ -24,7 +24,7 @@ STAND_IN = """
 phases:
 - {name: body, thermo: ideal-gas, species: [nitrogen], state: {T: 300 K, P: 1 atm}}
 species:
-- {name: nitrogen, composition: {N: 2}, thermo: {model: constant-cp}, equation-of-state: ideal-gas}
+- {name: nitrogen, composition: {N: 2}, thermo: {model: constant-cp}}
 """
 """What a reservoir is made of that stands for a body; nothing of it matters but its temperature."""
 
