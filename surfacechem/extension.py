@@ -9,7 +9,7 @@ of this package (``type: Bell`` and so on), in every Cantera script. What a rate
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from typing import Any, ClassVar
 
@@ -17,7 +17,7 @@ import cantera
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.mechanism.fields import converted
-from surfacechem.mechanism.keys import COVERAGE, RATE_CONSTANT, REACTION
+from surfacechem.mechanism.keys import REACTION
 from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rates import KILO, CoverageTerm, InterfaceArrhenius
@@ -53,7 +53,7 @@ class Surroundings(cantera.ExtensibleRateData):
         if not self.names:
             self.names = [surface.species(k).name for k in range(surface.n_species)]
         coverages = getattr(surface, "coverages", None)  # a clone is no Interface; it has lost its load too
-        self.coverages = dict(zip(self.names, coverages, strict=True)) if coverages is not None else {}
+        self.coverages = dict(zip(self.names, coverages.tolist(), strict=True)) if coverages is not None else {}
         # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
         self.surface = weakref.ref(surface) if hasattr(surface, "__weakref__") else None
         return True
@@ -90,9 +90,9 @@ class LoadedRate(cantera.ExtensibleRate):
     def _read(self, node: Any, units: Any) -> InterfaceArrhenius:
         equation = str(node.get("equation", ""))
         own = self.law.own_keys()
-        _check_keys(node, {*REACTION, *own}, f"a rate of type {self.kind}")
+        _check_keys(node, {*REACTION, *self.law.keys, *own}, f"a rate of type {self.kind}")
         constant = node.get("rate-constant")
-        _check_all(constant, RATE_CONSTANT, "rate-constant")
+        _check_all(constant, self.law.keys["rate-constant"], "rate-constant")
         coverage = node.get("coverage-dependencies") or {}
         values: dict[str, Any] = {
             "A": float(constant.convert_rate_coeff("A", units)),
@@ -174,17 +174,17 @@ def _check_keys(node: Any, known: Any, title: str) -> None:
             raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), known)}")
 
 
-def _check_all(node: Any, keys: frozenset[str], title: str) -> None:
+def _check_all(node: Any, keys: Collection[str], title: str) -> None:
     """Raise InputError unless a mapping has these keys and no other, as Cantera's own rates have."""
     if not isinstance(node, Mapping):
         raise InputError(f"{title} must be a mapping with {', '.join(sorted(keys))}.")
     _check_keys(node, keys, title)
-    for key in sorted(keys - set(node)):
+    for key in sorted(set(keys) - set(node)):
         raise InputError(f"{title}: {key} is missing.")
 
 
 def _coverage_term(units: Any, name: str, entry: Any) -> CoverageTerm:
-    _check_all(entry, COVERAGE, f"coverage-dependencies: {name}")
+    _check_all(entry, InterfaceArrhenius.keys["coverage-dependencies"], f"coverage-dependencies: {name}")
     energies = entry["E"]
     listed = energies if isinstance(energies, list | tuple) else [energies]
     E = tuple(_number(units, "E", energy, "J/mol") for energy in listed)

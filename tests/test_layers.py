@@ -31,7 +31,18 @@ FLOORS = {
         "mechanismsheet",
         "rateplots",
     ],
-    "doors": ["case.*", "schema", "simulation", "extension", "reactor.*", "rerun", "guard", "cli", "__init__", "__main__"],
+    "doors": [
+        "case.*",
+        "schema",
+        "simulation",
+        "extension",
+        "reactor.*",
+        "rerun",
+        "guard",
+        "cli",
+        "__init__",
+        "__main__",
+    ],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*", "media.*"]
