@@ -146,6 +146,7 @@ class Model:
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
         values |= {f"initial.{state.name}": state.initial for state in self.system.states}
         fixed = {parameter.path for parameter in self.system.parameters if not parameter.changeable}
+        fixed |= set(self.system.outside.engine.gives) if self.system.outside else set()
         specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
         for path, value in (changes or {}).items():
             if path not in values or path in fixed:
