@@ -8,6 +8,7 @@ of this package (``type: Bell`` and so on), in every Cantera script. What a rate
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
@@ -16,11 +17,13 @@ from typing import Any, ClassVar
 import cantera
 
 from surfacechem.errors import InputError, suggestion
+from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.fields import converted
 from surfacechem.mechanism.keys import REACTION
 from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rates import KILO, CoverageTerm, InterfaceArrhenius
+from surfacechem.mechanism.source import sides
 from surfacechem.quantities import VARIABLES
 from surfacechem.terms import Spec
 
@@ -28,6 +31,12 @@ __all__ = ["LoadedInterface"]
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""
+
+LARGEST = 700.0
+"""Affinity over k_B T above which its exponential counts as this one's."""
+
+FLOOR = 1e-100
+"""Coverages below this count as this where mass action has to be divided out."""
 
 
 class LoadedInterface(cantera.Interface):
@@ -101,7 +110,12 @@ class LoadedRate(cantera.ExtensibleRate):
             "coverage": tuple(_coverage_term(node.units, name, item) for name, item in sorted(coverage.items())),
         }
         values |= self._own(node, own)
-        return self.law(number="R", equation=equation, orders={}, products={}, change={}, species=(), **values)
+        reactants, products, reversible = sides(equation)
+        orders = reactants | {str(name): float(order) for name, order in (node.get("orders") or {}).items()}
+        change = {name: products.get(name, 0.0) - reactants.get(name, 0.0) for name in (*reactants, *products)}
+        structure = {"equation": equation, "orders": orders, "products": products, "change": change}
+        values |= {"number": "R", "species": (), "reversible": reversible, **structure}
+        return self.law(**values)
 
     def _own(self, node: Any, own: Mapping[str, str]) -> dict[str, Any]:
         """Parameters of the load's factor."""
@@ -153,9 +167,10 @@ class LoadedRate(cantera.ExtensibleRate):
     def eval(self, data: Any) -> float:
         """Rate coefficient in kmol, m and s."""
         assert self.bound is not None
-        values: dict[str, Any] = {"T_c": data.T}
+        values: dict[str, Any] = {"T_c": data.T, **data.coverages}
         for name in self.bound.own_reads():
-            values[name] = data.coverages[name] if name in data.coverages else self._load(data, name)
+            if name not in values:
+                values[name] = self._load(data, name)
         return float(self.bound.coefficient(values, 0.0))
 
     def _load(self, data: Surroundings, name: str) -> float:
@@ -166,6 +181,31 @@ class LoadedRate(cantera.ExtensibleRate):
         if found is None:
             raise AttributeError(f"{name} has no value for any of {', '.join(self.species)}.")
         return float(value[found])
+
+
+class ByAffinity(Surroundings):
+    """What rates by affinity read: the chemical potentials over R T too."""
+
+    def update(self, surface: Any) -> bool:
+        """Take over the state."""
+        super().update(surface)
+        potentials = surface.chemical_potentials / (cantera.gas_constant * self.T)
+        self.potentials = dict(zip(self.names, potentials.tolist(), strict=True))
+        return True
+
+
+class AffinityRate(LoadedRate):
+    """A rate by affinity as the coefficient of mass action that gives the same net rate."""
+
+    def eval(self, data: Any) -> float:
+        """Rate coefficient in kmol, m and s."""
+        law = self.bound
+        assert isinstance(law, AffinityReaction)
+        x = sum(nu * data.potentials[name] for name, nu in law.change.items())
+        ratio = law.drive(x) / math.expm1(min(x, LARGEST)) if x else 1.0
+        for name, order in law.orders.items():
+            ratio /= max(data.coverages[name], FLOOR) ** order
+        return float(super().eval(data) * ratio)
 
 
 def _check_keys(node: Any, known: Any, title: str) -> None:
@@ -208,6 +248,8 @@ def _number(units: Any, key: str, value: Any, unit: str) -> float:
 def _put(node: Any, key: str, value: float, spec: Spec) -> None:
     if spec.unit == "1":
         node[key] = value
+    elif spec.unit == "J/mol":
+        node.set_activation_energy(key, value * KILO, "J/kmol")
     elif spec.unit == "J":
         node.set_activation_energy(key, value * MOLECULAR, "J/kmol")
     else:
@@ -219,8 +261,9 @@ def _register() -> None:
     for kind, law in kinds().items():
         if law.native:
             continue
-        made = type(law.__name__, (LoadedRate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
-        globals()[law.__name__] = cantera.extension(name=kind, data=Surroundings)(made)
+        rate, data = (AffinityRate, ByAffinity) if issubclass(law, AffinityReaction) else (LoadedRate, Surroundings)
+        made = type(law.__name__, (rate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
+        globals()[law.__name__] = cantera.extension(name=kind, data=data)(made)
 
 
 _register()

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from mechanisms import KMOL, call, values
 from surfacechem.extension import LoadedInterface
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.kinds import kinds
 from surfacechem.quantities import BOLTZMANN
 
@@ -38,12 +39,18 @@ OWN = {
     "two-pathway": "x-slip: 0.2 nm, x-catch: 1.7 nm, catch-ratio: 80",
     "Dudko-Hummer-Szabo": "x-beta: 0.31 nm, barrier: 50 kJ/mol, nu: 0.5",
     "gap-attachment": "stiffness: 1e-3 N/m, rest-length: 5 nm",
+    "Kamal-Sourour": "A-2: 3e4 1/s, E-2: 12 kJ/mol, m: 0.5, n: 1.5",
+    "linear-affinity": "",
+    "exponential-affinity": "",
 }
+ONE_TO_ONE = ("Kamal-Sourour",)
+"""For one species that turns into another."""
+BOTH_WAYS = ("linear-affinity", "exponential-affinity")
 LOADED = sorted(kind.removeprefix("interface-") for kind, law in kinds().items() if not law.native)
 
 
 def entry(kind, equation="AB(s) => A(s) + B(s)", constant="A: 2.5e3, b: 0.4, Ea: 20.0", more=""):
-    own = "".join(f"  {item.strip()}\n" for item in OWN[kind].split(","))
+    own = "".join(f"  {item.strip()}\n" for item in OWN[kind].split(",") if item)
     return f"- equation: {equation}\n  type: {kind}\n  rate-constant: {{{constant}}}\n{own}{more}"
 
 
@@ -52,7 +59,13 @@ def all_types():
     coverage = "  coverage-dependencies:\n    AB(s): {a: 0.1, m: 0.5, E: [3, 2 kcal/mol]}\n"
     coverage += "    A(s): {a: 0, m: 0, E: 1 kJ/mol}\n"
     lines = []
-    for kind in LOADED:
+    for kind in ONE_TO_ONE:
+        lines.append(entry(kind, "A(s) => B(s)", more="  duplicate: true\n"))
+        lines.append(entry(kind, "A(s) <=> B(s)", more="  duplicate: true\n"))
+    for kind in BOTH_WAYS:
+        lines.append(entry(kind, "A(s) <=> B(s)", more="  duplicate: true\n"))
+        lines.append(entry(kind, "A(s) + B(s) <=> AB(s)", "A: 3e9 m^2/mol/s, b: 1, Ea: 1", "  duplicate: true\n"))
+    for kind in (kind for kind in LOADED if kind not in ONE_TO_ONE + BOTH_WAYS):
         lines.append(entry(kind, more="  duplicate: true\n"))
         lines.append(entry(kind, "A(s) + B(s) <=> AB(s)", "A: 3e9 m^2/mol/s, b: 0, Ea: 1", "  duplicate: true\n"))
         lines.append(entry(kind, more=coverage + "  duplicate: true\n"))
@@ -84,10 +97,17 @@ def test_same_rates_as_in_a_scene(both, T, f, g_n, weights):
     surface.TP = T, ct.one_atm
     surface.coverages = weights
     point = values(mechanism, T, surface.coverages.tolist()) | {"f": f, "g_n": g_n}
-    forward = np.array([call(law.forward, point) for law in mechanism.reactions])
-    reverse = np.array([call(law.reverse, point) for law in mechanism.reactions])
-    np.testing.assert_allclose(surface.forward_rates_of_progress * KMOL, forward, rtol=1e-12)
-    np.testing.assert_allclose(surface.reverse_rates_of_progress * KMOL, reverse, rtol=1e-12)
+    net, found = surface.net_rates_of_progress * KMOL, surface.forward_rates_of_progress * KMOL
+    back = surface.reverse_rates_of_progress * KMOL
+    mu = dict(zip(surface.species_names, surface.chemical_potentials / KMOL, strict=True))
+    for i, law in enumerate(mechanism.reactions):
+        if isinstance(law, AffinityReaction):
+            change = {name: law.change.get(mechanism.species[name], 0) for name in mu}
+            point["mu"] = sum(nu * mu[name] for name, nu in change.items())
+            assert net[i] == pytest.approx(call(law.rate, point), rel=1e-12, abs=1e-12 * found[i])
+        else:
+            assert found[i] == pytest.approx(call(law.forward, point), rel=1e-12)
+            assert back[i] == pytest.approx(call(law.reverse, point), rel=1e-12)
 
 
 EMULATION = """

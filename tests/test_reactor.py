@@ -291,6 +291,29 @@ def test_a_wall_with_a_history_of_its_own(warm):
         net.advance(1.0)
 
 
+PULLED = """
+bodies:
+  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+  upper: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+interface:
+  temperature: T
+  sites: 1e16
+  potential: [penalty: {E_n: 1 MPa/um}]
+  limits: [tensile-strength: {t_max: 1 MPa}]
+loading: {g_n: {ramp: {rate: 1 um/s}}}
+T_0: 300
+initial: {T: 300 K, phi: 1}
+run: {until: 2 s}
+"""
+
+
+def test_a_scene_that_jumps(tmp_path):
+    path = tmp_path / "pulled.yaml"
+    path.write_text(PULLED)
+    with pytest.raises(InputError, match=r"the scene jumps \(.*\), which a reactor network does not follow"):
+        InterfaceReactor(path)
+
+
 def test_area_is_positive():
     with pytest.raises(InputError, match="area = 0 is outside its range"):
         InterfaceReactor("exothermic", area=0)

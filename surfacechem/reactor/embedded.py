@@ -15,6 +15,7 @@ from surfacechem.integrate import Model, Run
 from surfacechem.reactor import coupling
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.evaluation import Evaluation
+from surfacechem.system import System
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""
@@ -26,6 +27,12 @@ DIFFERENCE = 1e-7
 
 class EndError(Exception):
     """The scene does not go on at a state, with the reason in words."""
+
+
+def _refuse_jumps(system: System) -> None:
+    if system.transitions:
+        reasons = "; ".join(dict.fromkeys(item.reason for item in system.transitions))
+        raise InputError(f"the scene jumps ({reasons}), which a reactor network does not follow. Run the case alone.")
 
 
 class EmbeddedScene:
@@ -40,6 +47,7 @@ class EmbeddedScene:
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             system, self.reactions = coupling.with_multipliers(assemble(scene))
+            _refuse_jumps(system)
             self.model = Model(system)
             self.values = self.model.values()
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)

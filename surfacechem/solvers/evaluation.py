@@ -10,6 +10,7 @@ import numpy as np
 from surfacechem.compile import Function, Program
 from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array
+from surfacechem.solvers.radau import END, search_arguments
 
 CODE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -32,10 +33,10 @@ class Evaluation:
         self.free = np.flatnonzero(~program.algebraic_mask)
         self._algebraic = np.flatnonzero(program.algebraic_mask)
         self._guess = y[self._algebraic]
-        self._outcome = np.zeros(1, np.int64)
-        self._search = stepper.make_consistent()
-        rows = (self.inputs[:1], self.y[None], self.ydot[None], self.parameters[None], self._outcome)
-        self._arguments = (program.addresses, program.algebraic_mask, *rows)
+        self._counts = np.zeros((1, 10), np.int64)
+        self._search = stepper.run_batch()
+        ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
+        self._arguments = search_arguments(program, ends, table, self._counts)
         self._ledger = _Code(program.ledger, self.inputs)
         self._margins = _Code(program.margins, self.inputs)
 
@@ -45,9 +46,10 @@ class Evaluation:
         self.y[self.free] = differential
         self.y[self._algebraic] = self._guess
         self.ydot[:] = 0.0
+        self._counts[:] = 0
         self.program.filled(self.inputs)
         self._search(*self._arguments)
-        found = bool(self._outcome[0] == 0)
+        found = bool(self._counts[0, END] == 0)
         if found:
             self._guess = self.y[self._algebraic]
         return found
