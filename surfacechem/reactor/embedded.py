@@ -25,6 +25,10 @@ DIFFERENCE = 1e-7
 """Cantera's integrator differentiates by steps of about this size, which bounds must not take for the solution."""
 
 
+WIDER = 5
+"""How often the range of a fluid's properties is doubled and more."""
+
+
 class EndError(Exception):
     """The scene does not go on at a state, with the reason in words."""
 
@@ -33,6 +37,18 @@ def _refuse_jumps(system: System) -> None:
     if system.transitions:
         reasons = "; ".join(dict.fromkeys(item.reason for item in system.transitions))
         raise InputError(f"the scene jumps ({reasons}), which a reactor network does not follow. Run the case alone.")
+
+
+def _widest(system: System, values: dict[str, float]) -> dict[str, float]:
+    """The values with the properties of a fluid for as many temperatures as there are, since a network runs once."""
+    fit = system.fit
+    if fit is None:
+        return values
+    values = fit.started(values)
+    for _ in range(WIDER):
+        wider = fit.wider(values, np.array([values[end] for end in fit.bounds]))
+        values = wider or values
+    return values
 
 
 class EmbeddedScene:
@@ -49,7 +65,7 @@ class EmbeddedScene:
             system, self.reactions = coupling.with_multipliers(assemble(scene))
             _refuse_jumps(system)
             self.model = Model(system)
-            self.values = self.model.values()
+            self.values = _widest(system, self.model.values())
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)
         except InputError as error:
             raise case.located(error) from None
