@@ -1,5 +1,6 @@
 """The interface as a reactor: what a run computes, in a Cantera network."""
 
+import gc
 import math
 
 import cantera as ct
@@ -35,7 +36,15 @@ def compare(solution, dataset, tolerance=LOOSE):
 
 
 @pytest.mark.parametrize(
-    "name", ["exothermic", "dna-adhesive", "three-temperatures-no-capacity", "no-medium", "weakening-friction"]
+    "name",
+    [
+        "exothermic",
+        "dna-adhesive",
+        "three-temperatures-no-capacity",
+        "no-medium",
+        "weakening-friction",
+        "lubricated-sliding",
+    ],
 )
 def test_same_trajectory_as_a_run(name):
     solution = surfacechem.run(name)
@@ -101,6 +110,21 @@ def test_the_end_of_a_scene_is_found_and_said():
 def test_an_error_inside_stops_at_once_with_its_message(monkeypatch):
     interface, net = network("exothermic")
     net.advance(0.1)
+    before = interface.evaluations
+
+    def broken(t, x):
+        raise ZeroDivisionError("the real message")
+
+    monkeypatch.setattr(interface.scene, "rates", broken)
+    with pytest.raises(ZeroDivisionError, match="the real message"):
+        net.advance(1.0)
+    assert interface.evaluations - before < 20
+
+
+def test_an_error_that_a_neighbour_meets_first(warm, monkeypatch):
+    gas = stirred(350.0)
+    interface, net = network(warm, bodies={"upper": gas}, others=[gas])
+    net.advance(0.01)
     before = interface.evaluations
 
     def broken(t, x):
@@ -284,6 +308,14 @@ def test_walls_that_would_not_be_felt(warm):
         InterfaceReactor("three-temperatures-no-capacity").body("interface")
 
 
+def test_walls_come_before_the_network_runs(warm):
+    interface, net = network(warm)
+    assert interface.body("lower") is interface.body("lower")
+    net.advance(1e-3)
+    with pytest.raises(InputError, match="a wall on interface comes too late"):
+        interface.body("interface")
+
+
 def test_a_wall_with_a_history_of_its_own(warm):
     interface, net = network(warm)
     ct.Wall(interface.body("lower"), stirred(300.0), Q=lambda t: 5.0 + t)
@@ -317,3 +349,15 @@ def test_a_scene_that_jumps(tmp_path):
 def test_area_is_positive():
     with pytest.raises(InputError, match="area = 0 is outside its range"):
         InterfaceReactor("exothermic", area=0)
+
+
+def test_what_cantera_holds_stays_alive():
+    """Cantera's part is made before the reactor is, and must not be collected in between."""
+    threshold = gc.get_threshold()
+    gc.set_threshold(50)
+    try:
+        interfaces = [network("exothermic")[0] for _ in range(3)]
+        gc.collect()
+        assert [interface.phase.multiplier(0) for interface in interfaces] == [1.0] * 3
+    finally:
+        gc.set_threshold(*threshold)

@@ -69,7 +69,7 @@ class InterfaceReactor(HeldReactor):
         overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
     ) -> None:
-        super().__init__(self.phase, name=name)  # Cantera's own part was made in __new__
+        super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
         if not area > 0:
             raise InputError(f"area = {area} is outside its range: > 0.")
         self.area, self.bodies = float(area), dict(bodies or {})
@@ -100,12 +100,14 @@ class InterfaceReactor(HeldReactor):
 
     def _connect(self, reactor: Any, account: int) -> None:
         """What must be given to the body to keep the reactor's temperature, the reactor loses."""
-        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self._rates(t)[account]))
+        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
 
     def body(self, name: str) -> Any:
         """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat."""
         case = self.scene.case
         if name not in self.ports:
+            if self.evaluations:
+                raise InputError(f"a wall on {name} comes too late: put it there before the network runs.")
             node = node_of(case.scene, name)
             if node not in self.scene.states:
                 raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
@@ -155,7 +157,7 @@ class InterfaceReactor(HeldReactor):
         for port in self.ports.values():
             self.scene.give(f"loading.{port.heat_name}.level", port.heat() / self.area)
         for i, label in enumerate(self.scene.reactions):
-            self.scene.give(f"multiplier.{label}", self.phase.multiplier(i))
+            self.scene.give(f"multiplier.{label}", self.surface.multiplier(i))
 
     def _check_piece(self, t: float) -> None:
         breakpoints = self.scene.breakpoints

@@ -6,7 +6,7 @@ inside the last step come from the integrator's own polynomial, whose derivative
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Self
 
 import cantera
@@ -55,12 +55,15 @@ class HeldReactor(cantera.ExtensibleReactor):
     BackOffError, they raise it for good, since Cantera repeats a failed evaluation with ever smaller steps.
     """
 
+    surface: Any
     names: tuple[str, ...]
     error: Exception | None = None
 
     def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
-        """Keep the surface itself: a clone would have lost what Python knows of it."""
-        return super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
+        """Keep the surface itself, which Cantera does not: a clone would have lost what Python knows of it."""
+        made = super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
+        made.surface = surface
+        return made
 
     def start(self) -> Array:
         """Present values of the variables."""
@@ -72,6 +75,22 @@ class HeldReactor(cantera.ExtensibleReactor):
     def rates(self, t: float) -> Array:
         """Time derivatives of the variables at time t [s], for the values last put."""
         raise NotImplementedError
+
+    def attempt(self, evaluate: Callable[[], Array]) -> Array:
+        """What Cantera asks for; an error is raised again whenever it asks for more."""
+        if self.error is not None:
+            raise self._failure(self.error)
+        try:
+            return evaluate()
+        except BackOffError:
+            raise
+        except Exception as error:
+            self.error = error
+            raise self._failure(error) from None
+
+    def _failure(self, error: Exception) -> Exception:
+        """What Cantera is told: a new exception each time, whose traceback holds nothing."""
+        return cantera.CanteraError(f"{type(error).__name__}: {error}")
 
     # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------
 
@@ -88,16 +107,8 @@ class HeldReactor(cantera.ExtensibleReactor):
         """Nothing of the contents is read by others."""
 
     def replace_eval(self, t: float, lhs: Any, rhs: Any) -> None:
-        if self.error is not None:
-            raise self.error.with_traceback(None)
-        try:
-            lhs[:] = 1.0
-            rhs[:] = self.rates(t)
-        except BackOffError:
-            raise
-        except Exception as error:
-            self.error = error
-            raise
+        lhs[:] = 1.0
+        rhs[:] = self.attempt(lambda: self.rates(t))
 
     def replace_component_name(self, i: int) -> str:
         return self.names[i]
