@@ -34,7 +34,19 @@ FLOORS = {
         "mechanismsheet",
         "rateplots",
     ],
-    "doors": ["case.*", "schema", "sweeping", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
+    "doors": [
+        "case.*",
+        "schema",
+        "sweeping",
+        "simulation",
+        "extension",
+        "reactor.*",
+        "rerun",
+        "guard",
+        "cli",
+        "__init__",
+        "__main__",
+    ],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*", "media.*"]

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from surfacechem import data, document, overrides
+from surfacechem import data, document, overrides, solvers
 from surfacechem.assembly import assemble
 from surfacechem.case.fields import mapping, text
 from surfacechem.case.run import Reference, Run, read_reference, read_run
@@ -132,7 +132,8 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         if key not in top:
             raise tree.error(f"the case needs `{key}`, for example `{example}`.")
     places = dict(tree.places())
-    reader = SceneReader(Source(top, source.base, source.mechanism_text))
+    run = read_run(top["run"])
+    reader = SceneReader(Source(top, source.base, source.mechanism_text, run.solver in solvers.ASKING))
     titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
     return Case(
         name=name,
@@ -140,7 +141,7 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         source=titles.get("source", ""),
         description=titles.get("description", ""),
         scene=reader.scene(),
-        run=read_run(top["run"]),
+        run=run,
         reference=read_reference(top["reference"]) if "reference" in top else None,
         sweep=read_sweep(top["sweep"]) if "sweep" in top else None,
         text=content,

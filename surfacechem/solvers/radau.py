@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -289,6 +290,18 @@ class Consistent:
     valid: NDArray[np.bool_]
 
 
+def search_arguments(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> tuple[Any, ...]:
+    """Arguments of the compiled loop that make rows [t | y | ydot] consistent where they stand.
+
+    ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, 10] gets the outcomes under END.
+    """
+    none, nothing = np.zeros(0), _no_rows(len(ends))
+    return (
+        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(program.n), _kinds(()),
+        ends, table, none, none, ends, counts, nothing, nothing, nothing,
+    )  # fmt: skip
+
+
 def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, parameters: ArrayLike) -> Consistent:
     """Keep the differential variables; find their derivatives and the algebraic variables.
 
@@ -306,11 +319,11 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     )
     if len(table) not in (1, len(ends)):
         raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
+    if program.filler is not None:
+        rows = np.broadcast_to(table[:, 0], (len(ends), program.n_parameters))
+        filled = program.filled(np.concatenate([ends, rows], axis=1))
+        table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), 10), np.int64)
-    none, nothing, kinds = np.zeros(0), _no_rows(len(ends)), _kinds(())
-    stepper.run_batch()(
-        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(n), kinds, ends, table,
-        none, none, ends, counts, nothing, nothing, nothing,
-    )  # fmt: skip
+    stepper.run_batch()(*search_arguments(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)

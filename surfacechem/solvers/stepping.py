@@ -42,7 +42,7 @@ class View:
     jacobians: int = 0
 
     def inputs(self, t: float, y: Array, ydot: Array) -> Array:
-        return np.concatenate(([t], y, ydot, self.parameters))
+        return self.problem.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, differential: Array) -> tuple[Array, Array]:
         """State and derivative with the algebraic variables found from the equations."""
