@@ -118,6 +118,8 @@ class Start:
 RULES: dict[str, Callable[[Start], float]] = {
     "C": lambda s: s.capacity(),
     "n_c": lambda s: s.parameters["N_c"],
+    "n_1": lambda s: s.parameters.get("N_1", s.parameters["N_c"]),
+    "n_2": lambda s: s.parameters.get("N_2", s.parameters["N_c"]),
     "K_c": lambda s: s.parameters["K_0"],
     "T": lambda s: s.temperature(),
     "T_i": lambda s: s.temperature(),
@@ -126,7 +128,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "D": lambda s: s.friction(),
     "D_0": lambda s: s.friction(s.parameters["T_0"]) + s.supplied(),
     "Q": lambda s: -s.supplied(),
-    "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
+    "delta_T": lambda s: s.parameters["H_r"] / s.capacity() if s.capacity() else 0.0,
     "h": lambda s: s.conductance(lambda ends: True),
     "H": lambda s: s.conductance(lambda ends: True),
     "h_1": lambda s: s.into(1),
