@@ -217,7 +217,7 @@ class Model:
             values = wider
             result, jumps, ended = self._integrate(method, self.problem(run, values))
         seconds = time.perf_counter() - start
-        status, reason = ended or self._verdict(result, values)
+        status, reason = ended or self.verdict(result, values)
         return Trajectory(self, run, result, values, status, reason, seconds, jumps)
 
     def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
@@ -242,7 +242,8 @@ class Model:
         outputs = [item.name for item in self.system.outputs]
         return self.evaluate(result, t, y, ydot)[:, outputs.index(temperature)]
 
-    def _verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+    def verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+        """How a run ended, and why, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
             return "finished", f"reached the end at {where}"

@@ -93,7 +93,7 @@ RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_err
 
 def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None) -> Figure:
     """A figure of a run, from its dataset or its netCDF file; ``variables`` instead of the usual choice."""
-    dataset = _opened(data)
+    dataset = opened(data)
     panels = _chosen(dataset, variables) if variables else _usual(dataset)
     balances = not variables and any(name in dataset for name in RESIDUALS)
     rows = len(panels) + balances
@@ -108,7 +108,7 @@ def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = 
         if balances:
             _draw_balances(axes[-1], dataset)
         _time_axis(axes, dataset)
-        _headings(plot, axes[0], dataset)
+        headings(plot, axes[0], dataset)
     return plot
 
 
@@ -119,7 +119,8 @@ def save(plot: Figure, target: Any, kind: str) -> None:
         plot.savefig(target, format=kind, dpi=160, metadata=metadata)
 
 
-def _opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+    """A dataset, read from its netCDF file if need be."""
     if isinstance(data, xarray.Dataset):
         return data
     try:
@@ -145,12 +146,12 @@ def _usual(dataset: xarray.Dataset) -> list[Panel]:
         names = [n for n in _curves(dataset) if _unit(dataset, n) == unit and re.fullmatch(pattern, n)]
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [n for n in names if n in ("q_1", "q_2")]
-        if any(_varies(dataset[n].values) for n in names):
+        if any(varies(dataset[n].values) for n in names):
             panels.append(Panel(title, unit, tuple(names)))
     return panels
 
 
-def _varies(values: Array) -> bool:
+def varies(values: Array) -> bool:
     """Whether a curve is more than a constant with rounding."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2:
@@ -187,7 +188,7 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> None:
     ax.set_ylabel(f"{panel.title} [{unit}]" if panel.title else f"[{unit}]")
     ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
     _margins(ax, dataset, panel.names)
-    _legend(ax)
+    legend(ax)
 
 
 def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
@@ -207,12 +208,13 @@ def _margins(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
     """A curve that is constant up to rounding is drawn as a line, not as noise blown up to the panel's height."""
     values = np.concatenate([dataset[name].values for name in names])
     values = values[np.isfinite(values)]
-    if len(values) and not _varies(values):
+    if len(values) and not varies(values):
         middle = float(values.mean())
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
 
 
-def _legend(ax: Axes) -> None:
+def legend(ax: Axes) -> None:
+    """The legend beside the axes."""
     _, labels = ax.get_legend_handles_labels()
     if labels:
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
@@ -232,7 +234,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, LEAST), max(high, 1e-12))
     ax.set_ylabel("Balance residual [1]")
-    _legend(ax)
+    legend(ax)
 
 
 def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
@@ -259,16 +261,22 @@ def logarithmic(times: Array) -> bool:
     return bool(np.mean(after > 0.1 * after[-1]) < 0.6)
 
 
-def _headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+    """Title, how it ended, error and solver."""
     attributes = dataset.attrs
     plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
     facts = [str(attributes.get("reason", ""))]
     if "error" in attributes:
-        source = "exact solution" if any(str(n).endswith("_exact") for n in dataset) else "estimate"
+        exact = str(attributes.get("error_source", "")).startswith("exact") or any(map(_is_exact, dataset))
+        source = "exact solution" if exact else "estimate"
         facts.append(f"error {attributes['error']:.1e} ({source})")
     if "solver" in attributes:
         facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
     ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
+
+
+def _is_exact(name: object) -> bool:
+    return str(name).endswith("_exact")
 
 
 def symbol(name: str) -> str:

@@ -16,10 +16,13 @@ FLOORS = {
     "contracts": ["terms", "substances", "scene"],
     "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "jumps", "events", "integrate"],
-    "results": ["solution", "audit", "event_table", "detailedbalance"],
+    "results": ["accuracy", "solution", "audit", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
-        "sweep",
+        "spectrum",
+        "sweeps",
+        "sweep_dataset",
+        "sweep_plots",
         "precision",
         "stability",
         "check",
@@ -31,7 +34,7 @@ FLOORS = {
         "mechanismsheet",
         "rateplots",
     ],
-    "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
+    "doors": ["case.*", "schema", "sweeping", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*", "media.*"]

@@ -18,6 +18,7 @@ from surfacechem.assembly import assemble
 from surfacechem.case.fields import mapping, text
 from surfacechem.case.run import Reference, Run, read_reference, read_run
 from surfacechem.case.scene import SceneReader, Source
+from surfacechem.case.sweep import Section, read_sweep
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.scene import Scene
@@ -27,7 +28,7 @@ __all__ = ["TOP_KEYS", "Case", "Reference", "Run", "load", "load_text", "names"]
 
 TOP_KEYS = (
     *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
-    *("mechanics", "loading", "programme", "initial", "run", "reference"),
+    *("mechanics", "loading", "programme", "initial", "run", "reference", "sweep"),
 )
 
 SECTIONS = (
@@ -35,6 +36,7 @@ SECTIONS = (
     (r"initial (\w+) =", r"initial.\1"),
     (r"nothing evolves or prescribes \w+: give ([\w-]+) a heat capacity", r"bodies.\1"),
     (r".*interface's potential", "interface"),
+    (r"(a sweep|sweep:|.* never reaches|.* is no ramp|runs until)", "sweep"),
 )
 """What messages of the assembly speak of, as a path in the case."""
 
@@ -52,6 +54,7 @@ class Case:
     scene: Scene
     run: Run
     reference: Reference | None
+    sweep: Section | None
     text: str
     mechanism_text: str | None
     places: Mapping[str, Place]
@@ -139,6 +142,7 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         scene=reader.scene(),
         run=read_run(top["run"]),
         reference=read_reference(top["reference"]) if "reference" in top else None,
+        sweep=read_sweep(top["sweep"]) if "sweep" in top else None,
         text=content,
         mechanism_text=reader.mechanism.text if reader.mechanism else None,
         places=places,
