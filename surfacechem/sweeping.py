@@ -13,7 +13,8 @@ from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
 from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model
-from surfacechem.references.matching import Start, exact_values, match, renamed
+from surfacechem.references._start import Start
+from surfacechem.references.matching import exact_values, match, renamed
 from surfacechem.spectrum import Statistics
 from surfacechem.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
 from surfacechem.sweeps import Plan, Sweep, prepared
