@@ -59,6 +59,10 @@ class Start:
             raise KeyError(ending)
         return found[0]
 
+    def has(self, section: str) -> bool:
+        """Whether a section of the case gives any parameter."""
+        return any(path.startswith(f"{section}.") for path in self.run.values)
+
     def ramp(self, variable: str) -> float:
         """The rate at which a variable is driven."""
         return self.at(f"loading.{variable}.ramp.rate")
@@ -143,7 +147,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "h_1": lambda s: s.into(1),
     "h_2": lambda s: s.into(2),
     "k": lambda s: s.held_at("k"),
-    "m": lambda s: s.held_at("m"),
+    "m": lambda s: s.held_at("m") if s.has("mechanics") else s.parameters["m"],
     "c": lambda s: sum(s.run.values.get(f"mechanics.normal.{name}", 0.0) for name in ("c_b", "c_g")),
     "V": lambda s: s.ramp("w_t"),
     "w_i": lambda s: s.named["w_n"],
@@ -155,7 +159,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "mu_k": lambda s: s.at(".mu"),
     "t_k": lambda s: s.sliding(),
     "t_s": lambda s: s.sticking(),
-    "t_n": lambda s: s.at(".t_max"),
+    "t_n": lambda s: s.named["t_n"] if s.has("loading.t_n") else s.at(".t_max"),
     "T_a": lambda s: s.named["T_a"] if "T_a" in s.named else s.named["T_2"] if "T_2" in s.named else s.named["T_1"],
 }
 """Parameters of exact solutions that are not parameters of the scene under the same name."""
