@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -38,10 +39,11 @@ class Start:
 
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
-        try:
-            return float(RULES[name](self)) if name in RULES else self._plain(name)
-        except KeyError:
-            return None
+        for rule in (RULES.get(name), lambda start: start._plain(name)):
+            with suppress(KeyError):
+                if rule is not None:
+                    return float(rule(self))
+        return None
 
     def _plain(self, name: str) -> float:
         for source in (self.parameters, self.initial):
@@ -70,7 +72,14 @@ class Start:
     def held_at(self, parameter: str) -> float:
         """A parameter of the mounting; of the normal gap if both directions are mounted."""
         paths = [f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential")]
-        return next(self.run.values[path] for path in (*paths, paths[0]) if path in self.run.values)
+        return self.run.values[next((path for path in paths if path in self.run.values), paths[0])]
+
+    def damping(self) -> float:
+        """Dampers of the normal gap."""
+        found = [self.run.values.get(f"mechanics.normal.{name}") for name in ("c_b", "c_g")]
+        if found == [None, None]:
+            raise KeyError("no damper")
+        return sum(value or 0.0 for value in found)
 
     def sliding(self) -> float:
         """Traction of dry sliding."""
@@ -147,8 +156,8 @@ RULES: dict[str, Callable[[Start], float]] = {
     "h_1": lambda s: s.into(1),
     "h_2": lambda s: s.into(2),
     "k": lambda s: s.held_at("k"),
-    "m": lambda s: s.held_at("m") if s.has("mechanics") else s.parameters["m"],
-    "c": lambda s: sum(s.run.values.get(f"mechanics.normal.{name}", 0.0) for name in ("c_b", "c_g")),
+    "m": lambda s: s.held_at("m"),
+    "c": lambda s: s.damping(),
     "V": lambda s: s.ramp("w_t"),
     "w_i": lambda s: s.named["w_n"],
     "w_dot": lambda s: s.ramp("w_n"),
