@@ -1,4 +1,4 @@
-"""Scenes of moving gaps: one for each mounting, each kind of sticking and sliding, each thermal regime, in its modes."""
+"""Scenes of moving gaps: one for each mounting, each kind of sticking and sliding, each regime, in its modes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -162,7 +162,7 @@ def cycles(top: float, count: int) -> Table:
 
 
 def pull_off(q: dict) -> tuple[Solved, list[float]]:
-    """Opening and closing, quasi-static, between reservoirs; each fold has a ramp of its own. Returns w at the jumps."""
+    """Opening and closing, quasi-static, between reservoirs, a ramp for each fold; returns w at the jumps."""
     top, low = 1.05 * q["w_off"], 0.5 * min(q["w_on"], q["w_off"])
     history = Table(times=[0.0, 1.0, 2.0, 3.0], values=[0.0, top, min(2.0 * q["w_on"], top), low])
     scene = Scene(
