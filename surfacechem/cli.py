@@ -259,9 +259,12 @@ def plot(
     variables: Annotated[
         str | None, typer.Option("--variables", help="Variables to plot, with commas between.")
     ] = None,
+    against: Annotated[
+        str | None, typer.Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
+    ] = None,
     changes: Changes = None,
 ) -> None:
-    """Plot a dataset or a case over time."""
+    """Plot a dataset or a case over time, or over one of its variables."""
     is_file = source.endswith((".nc", ".nc4", ".cdf"))
     target = output or Path(f"{Path(source).stem}.png")
     kind = _format(target)
@@ -273,7 +276,7 @@ def plot(
     refuse_unwritable(target)
     solution = None if is_file else _solved_case(source, changes)
     chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
-    figure = plots.figure(solution.dataset if solution else Path(source), chosen)
+    figure = plots.figure(solution.dataset if solution else Path(source), chosen, against)
     with replacing(target) as temporary:
         plots.save(figure, temporary, kind)
     typer.echo(str(target))

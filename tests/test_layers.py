@@ -25,6 +25,8 @@ FLOORS = {
         "check",
         "listing",
         "plots",
+        "panels",
+        "marks",
         "printing",
         "report",
         "ratecurves",

@@ -45,7 +45,7 @@ class Start:
 
     def at(self, ending: str) -> float:
         """The one parameter whose path ends like this; KeyError if there is none, or there are several."""
-        found = [value for path, value in self.run.values.items() if path.endswith(ending)]
+        found = [float(value) for path, value in self.run.values.items() if path.endswith(ending)]
         if len(found) != 1:
             raise KeyError(ending)
         return found[0]
@@ -56,17 +56,18 @@ class Start:
 
     def held_at(self, parameter: str) -> float:
         """A parameter of the mounting; of the normal gap if both directions are mounted."""
-        paths = [f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential")]
-        return next(self.run.values[path] for path in (*paths, paths[0]) if path in self.run.values)
+        normal, tangential = (f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential"))
+        values = self.run.values
+        return float(values[normal] if normal in values else values[tangential])
 
     def sliding(self) -> float:
         """Traction of dry sliding."""
-        return self.at(".mu") * self.named["p"]
+        return float(self.at(".mu") * self.named["p"])
 
     def sticking(self) -> float:
         """Traction that sticking bears."""
-        values = self.run.values
-        return max(self.at(".mu"), next((values[p] for p in values if p.endswith(".mu_s")), 0.0)) * self.named["p"]
+        static = [value for path, value in self.run.values.items() if path.endswith(".mu_s")]
+        return float(max(self.at(".mu"), *static) * self.named["p"]) if static else self.sliding()
 
     def heated(self, heat: Array) -> Array:
         """The one temperature of the scene once its bodies have taken up a heat."""
