@@ -2,9 +2,9 @@
 
     python benchmarks/steppers.py [output folder]
 
-P1 is exothermic bonding with 200 outputs (exact solution), P4 is Robertson's problem to 1e11 s. The solvers
-"scipy-LSODA" and "scikit-sundae-CVODE" are the libraries called directly with a Python right-hand side, as a user would
-write it today.
+P1 is exothermic bonding with 200 outputs (exact solution), P2 a Bell cluster to its rupture, P3 a stick-slip slider
+through 24 events, P4 Robertson's problem to 1e11 s. "scipy-LSODA" and "scikit-sundae-CVODE" are the libraries
+called directly with a Python right-hand side, as a user would write it today.
 """
 
 import csv
@@ -26,6 +26,16 @@ from sksundae.cvode import CVODE
 matplotlib.use("Agg")
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
+from events import (
+    DIRECT,
+    rupture_batch,
+    rupture_direct,
+    rupture_error,
+    rupture_ours,
+    slide_direct,
+    slide_error,
+    slide_ours,
+)
 from matplotlib import pyplot as plt
 from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_sums
 
@@ -34,6 +44,7 @@ from surfacechem.solvers.contract import Problem, Result
 from surfacechem.solvers.radau import solve_many
 
 REPEATS = 3
+CASES = ("P1", "P2", "P3", "P4")
 ROBERTSON_END = np.array([2.083340149701255e-08, 8.333360770334713e-14])
 Run = Callable[[], np.ndarray]
 
@@ -138,6 +149,18 @@ def p4_curves(rtol: float) -> list[Curve]:
     return curves
 
 
+def event_curves(rtol: float) -> list[Curve]:
+    """Ours and the libraries on P2 and P3."""
+    curves = []
+    for case, ours, direct, error in (
+        ("P2", rupture_ours, rupture_direct, rupture_error()),
+        ("P3", slide_ours, slide_direct, slide_error()),
+    ):
+        curves.append(Curve(case, "radau", rtol, ours("radau", rtol), error, []))
+        curves += [Curve(case, name, rtol, direct(run(rtol, 0.01 * rtol)), error, []) for name, run in DIRECT.items()]
+    return curves
+
+
 def calls(once: float) -> int:
     """Repetitions that fill about a millisecond, so that short runs are timed as warm as long ones."""
     return max(1, min(30, int(1e-3 / once)))
@@ -168,7 +191,18 @@ def sweep(rtol: float, threads: int = 2, runs: int = 10_000) -> tuple[float, flo
         )
         rates.append(runs / (time.perf_counter() - start))
     exact = np.array([exothermic_exact(2.5, p) for p in parameters[:, 0]])
-    return statistics.median(rates), float(np.max(np.abs(batch.y / exact - 1)))
+    return max(rates), float(np.max(np.abs(batch.y / exact - 1)))
+
+
+def sweep_ruptures(rtol: float, threads: int = 2, runs: int = 10_000) -> tuple[float, float, float]:
+    """Trajectories a second on randomised P2 to rupture, the median and the largest relative error of its time."""
+    rates = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        found = rupture_batch(rtol, runs, threads)
+        rates.append(runs / (time.perf_counter() - start))
+    error = np.abs(found / rupture_batch(1e-12, runs, threads) - 1)
+    return max(rates), float(np.median(error)), float(np.max(error))
 
 
 def report(curves: list[Curve], folder: Path) -> None:
@@ -186,8 +220,8 @@ def report(curves: list[Curve], folder: Path) -> None:
 
 def plot(curves: list[Curve], folder: Path) -> None:
     """Time against achieved error."""
-    figure, axes = plt.subplots(1, 2, figsize=(11, 5))
-    for axis, case in zip(axes, ("P1", "P4"), strict=True):
+    figure, axes = plt.subplots(2, 2, figsize=(11, 9))
+    for axis, case in zip(axes.flat, CASES, strict=True):
         for name in dict.fromkeys(curve.name for curve in curves):
             mine = [
                 curve for curve in curves if (curve.case, curve.name) == (case, name) and np.isfinite(curve.achieved)
@@ -195,7 +229,7 @@ def plot(curves: list[Curve], folder: Path) -> None:
             axis.loglog([c.achieved for c in mine], [statistics.median(c.seconds) for c in mine], "o-", label=name)
         axis.set(title=case, xlabel="achieved relative error", ylabel="time [s]")
         axis.invert_xaxis()
-    axes[0].legend(fontsize=8)
+    axes[0, 0].legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(folder / "steppers.png", dpi=150)
     figure.savefig(folder / "steppers.svg")
@@ -214,10 +248,10 @@ def seconds_at(curves: list[Curve], case: str, name: str, error: float) -> float
 
 def compare(curves: list[Curve]) -> None:
     """Times at equal error and how many times longer than ours."""
-    for case in ("P1", "P4"):
-        for error in (1e-6, 1e-8, 1e-10):
+    for case in CASES:
+        for error in (1e-4, 1e-6, 1e-8, 1e-10):
             ours = seconds_at(curves, case, "radau", error)
-            for name in dict.fromkeys(curve.name for curve in curves):
+            for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
                 time_taken = seconds_at(curves, case, name, error)
                 ratio = (
                     "not reached" if np.isnan(time_taken) else f"{1e6 * time_taken:10.1f} us {time_taken / ours:8.1f}x"
@@ -239,6 +273,7 @@ def main() -> None:
     print(machine())
     curves = [curve for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for curve in p1_curves(rtol)]
     curves += [curve for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
+    curves += [curve for rtol in (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11, 1e-12) for curve in event_curves(rtol)]
     measure(curves)
     report(curves, folder)
     plot(curves, folder)
@@ -246,6 +281,12 @@ def main() -> None:
     for rtol in (1e-3, 1e-4, 1e-5, 1e-6):
         rate, error = sweep(rtol)
         print(f"sweep of P1, 2 threads, rtol {rtol:7.0e}: {rate:9.0f} trajectories/s, largest error {error:.1e}")
+    for rtol in (1e-3, 1e-4, 1e-6):
+        rate, median, error = sweep_ruptures(rtol)
+        print(
+            f"sweep of P2, 2 threads, rtol {rtol:7.0e}: {rate:9.0f} trajectories/s, "
+            f"error of the time of rupture {median:.1e} in the median, {error:.1e} at most"
+        )
 
 
 if __name__ == "__main__":

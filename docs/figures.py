@@ -12,7 +12,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from mkdocs.structure.files import File, Files
 
 import surfacechem
-from surfacechem import plots
+from surfacechem import plots, sweep_plots
 
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 
@@ -144,6 +144,11 @@ def _temperatures(ax: Any, run: Any, *names: str) -> None:
     ax.legend()
 
 
+def force_spectrum() -> Figure:
+    """Rupture forces over six decades of loading rate on the exact lines."""
+    return sweep_plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "accuracy.svg": accuracy,
     "signs.svg": signs,
@@ -151,4 +156,5 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "closing-gap.svg": closing_gap,
     "oil-film.svg": oil_film,
     "dna-adhesive.svg": adhesive,
+    "force-spectrum.svg": force_spectrum,
 }

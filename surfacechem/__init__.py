@@ -6,7 +6,8 @@
 'finished'
 
 ``load`` reads a case and returns a :class:`~surfacechem.simulation.Simulation`, which compiles once and runs with any
-values of its parameters; ``run`` does both. Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
+values of its parameters; ``run`` does both, and ``sweep`` runs many at once. Theory: Sauer, Duong & Mandadapu (2021),
+doi 10.1177/10812865211032723.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surfacechem.simulation import Simulation, load, run
+    from surfacechem.simulation import Simulation, load, run, sweep
 
-__all__ = ["Simulation", "load", "run"]
+__all__ = ["Simulation", "load", "run", "sweep"]
 
 
 def __getattr__(name: str) -> Any:

@@ -6,7 +6,7 @@ import os
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperGroup
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from surfacechem.integrate import Run
     from surfacechem.simulation import Simulation
     from surfacechem.solution import Solution
+
+S = TypeVar("S")
 
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 """Exit code of each way in which a run ends."""
@@ -127,7 +129,7 @@ def _settings(simulation: Simulation, solver: str | None, rtol: float | None) ->
     return replace(simulation.case.run, **given)  # type: ignore[arg-type]
 
 
-def _solved(run: Callable[[], Solution], quiet: bool) -> Solution:
+def _solved(run: Callable[[], S], quiet: bool) -> S:
     """The solution, its dataset's columns and audit included, so that what follows only writes."""
     from surfacechem.solvers import stepper
 
@@ -149,6 +151,41 @@ def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
         typer.echo(f"surfacechem: warning: {warning}", err=True)
     if code:
         raise typer.Exit(code)
+
+
+@app.command(epilog=EXIT_CODES)
+def sweep(
+    case: CaseName,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>-sweep.nc if not given.")
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."
+        ),
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
+    ] = None,
+    changes: Changes = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a case over values of its parameters and write one dataset."""
+    from surfacechem.overrides import assignments
+    from surfacechem.report import sweep_summary
+    from surfacechem.simulation import load
+
+    simulation = load(case, changes or ())
+    target = output or Path(f"{simulation.case.name}-sweep.nc")
+    refuse_unwritable(target)
+    values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
+    solution = _solved(lambda: simulation.sweep(values, end), quiet)
+    solution.write(target)
+    if not quiet:
+        typer.echo(sweep_summary(solution, target))
+    if STATUS[solution.status]:
+        raise typer.Exit(STATUS[solution.status])
 
 
 @app.command(epilog=EXIT_CODES)
@@ -264,19 +301,21 @@ def plot(
     ] = None,
     changes: Changes = None,
 ) -> None:
-    """Plot a dataset or a case over time, or over one of its variables."""
+    """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
     is_file = source.endswith((".nc", ".nc4", ".cdf"))
     target = output or Path(f"{Path(source).stem}.png")
     kind = _format(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    from surfacechem import plots
+    from surfacechem import plots, sweep_plots
     from surfacechem.solution import replacing
 
     refuse_unwritable(target)
     solution = None if is_file else _solved_case(source, changes)
     chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
-    figure = plots.figure(solution.dataset if solution else Path(source), chosen, against)
+    dataset = solution.dataset if solution else plots.opened(Path(source))
+    swept = "sweep" in dataset.attrs
+    figure = sweep_plots.figure(dataset, chosen) if swept else plots.figure(dataset, chosen, against)
     with replacing(target) as temporary:
         plots.save(figure, temporary, kind)
     typer.echo(str(target))

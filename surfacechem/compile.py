@@ -6,7 +6,7 @@ raw pointer by the stepper and as a vectorised function from Python.
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -39,6 +39,22 @@ class Function:
 
 
 @dataclass(frozen=True)
+class Filler:
+    """Fills parameters of inputs with what something outside says of the values that it reads there."""
+
+    reads: Function
+    positions: NDArray[np.int64]
+    """Of the parameters in the inputs."""
+    evaluate: Callable[[Sequence[float]], Sequence[float]]
+
+    def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The inputs, one row or many, filled in place."""
+        for row in inputs.reshape(-1, inputs.shape[-1]):
+            row[self.positions] = self.evaluate(self.reads(row).tolist())
+        return inputs
+
+
+@dataclass(frozen=True)
 class Program:
     """A fully implicit system G(t, y, ydot; p) = 0, linear in ydot, with its exact derivatives, ledger and margins."""
 
@@ -55,6 +71,11 @@ class Program:
     """Functions whose zeros are events."""
     algebraic: tuple[bool, ...]
     """Per state: no equation contains its derivative."""
+    filler: Filler | None = None
+
+    def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The inputs, one row or many, with the parameters that come from outside."""
+        return self.filler(inputs) if self.filler else inputs
 
     @cached_property
     def addresses(self) -> NDArray[np.int64]:
@@ -87,6 +108,7 @@ def compile_program(
     residual: Sequence[Any],
     ledger: Sequence[Any] = (),
     margins: Sequence[Any] = (),
+    filler: Filler | None = None,
 ) -> Program:
     """Compile a system with the Jacobians differentiated from its residual."""
     if not len(states) == len(derivatives) == len(residual):
@@ -105,4 +127,5 @@ def compile_program(
         ledger=compile_function(inputs, ledger) if ledger else None,
         margins=compile_function(inputs, margins) if margins else None,
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::n]) for j in range(n)),
+        filler=filler,
     )

@@ -6,9 +6,10 @@ reaches zero the stretch ends, the jump is made, and the next one starts from th
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -24,14 +25,29 @@ Array = NDArray[np.float64]
 NOISE = 1e-13
 """Margins below this part of the largest seen count as zero."""
 
-PROBE = 1e-9
-"""Part of a stretch over which a margin at zero is followed to see which way it goes."""
+REACHED = 1e-14
+"""Part of the time of a run within which a stretch has reached its end."""
 
 LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
 
 AT_ONCE = 100
 """Transitions at one moment above which they are chatter."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch as it was solved, in its own time and with its own ledger."""
+
+    result: Result
+    start: Point
+    end: float
+    """Time reached [s]."""
+    status: Status
+    times: Array
+    """Output times reached [s]."""
+    booked: Array
+    """Ledger at its start."""
 
 
 @dataclass
@@ -45,13 +61,14 @@ class Hybrid:
     first: int
     """Index of the first transition among the margins of the problem."""
     deadline: float | None = None
-    parts: list[Result] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     largest: Array = field(default_factory=lambda: np.zeros(0))
     booked: Array = field(default_factory=lambda: np.zeros(0))
-    """Ledger at the start of the present stretch."""
-    lasted: float = 0.0
-    """Length of the last stretch [s]."""
+    """Ledger now."""
+    steps: int = 0
+    written: int = 0
+    """Number of outputs written."""
     status: Status = Status.FINISHED
     reason: str = ""
 
@@ -71,27 +88,28 @@ class Hybrid:
         for start, end, row in zip(problem.segments, problem.segments[1:], problem.parameters, strict=False):
             parameters = row.copy()
             parameters[self.jumper.mode_columns] = modes
-            point = self._segment(Point(float(start), y, np.zeros(len(y)), parameters), float(end))
-            if point is None:
+            point = Point(float(start), y, np.zeros(len(y)), parameters)
+            ended = self._segment(self.jumper.polished(point), float(end))
+            if ended is None:
                 break
-            y, modes = point.y, point.parameters[self.jumper.mode_columns]
+            y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
         return self._merged()
 
     def _segment(self, point: Point, end: float) -> Point | None:
         """From a point to the end of its segment; None where the run ends before."""
         while point.t < end:
-            started = self._settled(point, end)
+            started = self._settled(point)
             if started is None:
                 return None
-            result = self._stretch(started, end)
-            if result is None:
+            part = self._stretch(started, end)
+            if part is None:
                 return None
-            point = Point(result.t, result.y, result.ydot, started.parameters)
-            if result.status is Status.FINISHED:
+            point = Point(part.end, part.result.y, part.result.ydot, started.parameters)
+            if part.status is Status.FINISHED:
                 return point
-            index = self._transition(result, point)
+            index = self._transition(part, point)
             if index is None:
-                self.status = result.status
+                self.status = part.status
                 return None
             jumped = self._jump(index, point)
             if jumped is None:
@@ -99,64 +117,55 @@ class Hybrid:
             point = jumped
         return point
 
-    def _stretch(self, start: Point, end: float) -> Result | None:
-        problem, used = self.problem, sum(part.counters.steps for part in self.parts)
+    def _stretch(self, start: Point, end: float) -> Part | None:
+        problem = self.problem
         seconds = None if self.deadline is None else self.deadline - time.monotonic()
-        if used >= problem.max_steps or (seconds is not None and seconds <= 0):
-            self.status = Status.MAX_STEPS if used >= problem.max_steps else Status.STOPPED
+        if self.steps >= problem.max_steps or (seconds is not None and seconds <= 0):
+            self.status = Status.MAX_STEPS if self.steps >= problem.max_steps else Status.STOPPED
             return None
-        reached = self.parts[-1].t if self.parts else -np.inf
-        times = problem.times[(problem.times > reached) & (problem.times <= end)]
+        last = int(np.searchsorted(problem.times, end, side="right"))
+        times = problem.times[self.written : last]
         local = start.parameters.copy()
         local[self.clock] = start.t
-        part = replace(
+        part = _with(
             problem,
             y0=start.y,
-            times=np.minimum(times - start.t, end - start.t),
+            times=np.clip(times - start.t, 0.0, end - start.t),
             segments=np.array([0.0, end - start.t]),
             parameters=local[None],
-            max_steps=problem.max_steps - used,
+            max_steps=problem.max_steps - self.steps,
             max_seconds=seconds,
         )
-        result = self.method.solve(part)
-        self._absolute(result, start, times, end)
-        if result.t > start.t:  # else its length is below the rounding of time
-            self.parts.append(result)
+        return self._keep(self.method.solve(part), start, times, end)
+
+    def _keep(self, result: Result, start: Point, times: Array, end: float) -> Part:
+        """The stretch with its times as those of the run, and the ledger up to its end."""
+        reached, status = min(start.t + result.t, end), result.status
+        if status is Status.FINISHED or (status in LOST and end - reached <= REACHED * end):
+            # Where a gap closes at the very end, the last of its digits are rounding of the time.
+            reached, status = end, Status.FINISHED
+        part = Part(result, start, reached, status, times[: len(result.times)], self.booked)
+        self.parts.append(part)
+        self.booked = self.booked + result.ledger
+        self.steps += result.counters.steps
+        self.written += len(result.times)
         if len(result.margins):
             self.largest = np.maximum(self.largest, np.abs(result.margins))
-        return result
+        return part
 
-    def _absolute(self, result: Result, start: Point, times: Array, end: float) -> None:
-        """Times and ledger of a stretch as those of the whole run."""
-        result.problem = replace(
-            result.problem,
-            times=times,
-            segments=np.array([start.t, end]),
-            parameters=start.parameters[None],
-        )
-        self.lasted = result.t
-        result.t = end if result.status is Status.FINISHED else min(start.t + result.t, end)
-        result.times = times[: len(result.times)]
-        result.ledger = result.ledger + self.booked
-        result.ledger_outputs = result.ledger_outputs + self.booked
-        result.events = replace(result.events, t=result.events.t + start.t, ledger=result.events.ledger + self.booked)
-        if result.steps is not None:
-            result.steps = replace(result.steps, t=result.steps.t + start.t, ledger=result.steps.ledger + self.booked)
-        self.booked = result.ledger
-
-    def _transition(self, result: Result, point: Point) -> int | None:
+    def _transition(self, part: Part, point: Point) -> int | None:
         """The transition at which a stretch has ended, if any."""
-        if result.status is Status.EVENT:
-            index = int(result.events.index[-1]) - self.first
+        if part.status is Status.EVENT:
+            index = int(part.result.events.index[-1]) - self.first
             return index if index >= 0 else None
-        return self.jumper.lost_equilibrium(point, self.problem.rtol) if result.status in LOST else None
+        return self.jumper.lost_equilibrium(point, self.problem.rtol) if part.status in LOST else None
 
     # -- what happens at one moment -------------------------------------------------------------------------------
 
-    def _settled(self, point: Point, end: float) -> Point | None:
+    def _settled(self, point: Point) -> Point | None:
         """The point after all transitions that are due at its own time."""
         for _ in range(AT_ONCE):
-            due = self._due(point, end)
+            due = self._due(point)
             if due is None:
                 return point
             jumped = self._jump(due, point)
@@ -169,35 +178,28 @@ class Hybrid:
         )
         return None
 
-    def _due(self, point: Point, end: float) -> int | None:
+    def _due(self, point: Point) -> int | None:
         """The transition whose margin is closed, or is zero and closing."""
-        now = self._margins(point)
+        if self.jumper.margins_read_rates:
+            point = self._consistent(point)
+        margins = self.problem.program.margins
+        assert margins is not None
+        now = margins(point.inputs())
         self.largest = np.maximum(self.largest, np.abs(now))
         small = NOISE * self.largest
-        closed = now < -small
-        if np.any(np.abs(now) <= small):
-            later = self._margins(self._later(point, PROBE * (end - point.t)))
-            closed |= (np.abs(now) <= small) & (later < now - small)
-        due = np.nonzero(closed[self.first :])[0]
-        return int(due[0]) if len(due) else None
+        closed = now[self.first :] < -small[self.first :]
+        zero = np.abs(now[self.first :]) <= small[self.first :]
+        if zero.any():
+            closed |= zero & (self.jumper.margin_rates(self._consistent(point)) < 0)
+        return int(closed.argmax()) if closed.any() else None
 
     def _consistent(self, point: Point) -> Point:
         found = consistent(self.problem.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
         return Point(point.t, found.y, found.ydot, point.parameters)
 
-    def _later(self, point: Point, dt: float) -> Point:
-        now = self._consistent(point)
-        return self._consistent(Point(point.t + dt, now.y + dt * now.ydot, now.ydot, point.parameters))
-
-    def _margins(self, point: Point) -> Array:
-        margins = self.problem.program.margins
-        assert margins is not None
-        return margins(self._consistent(point).inputs())
-
     def _jump(self, index: int, point: Point) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
-        jump = replace(self.jumper.make(index, point), since=self.lasted)
-        self.lasted = 0.0
+        jump = self.jumper.make(index, point, self._since(point.t))
         self.jumps.append(jump)
         if jump.stops:
             self.status, self.reason = (
@@ -211,6 +213,12 @@ class Hybrid:
             [self._booking(account.law, account.kind, account.quantity.name, jump) for account in self.system.ledger]
         )
         return jump.after
+
+    def _since(self, t: float) -> float:
+        """Time since the transition before, or the start; the length of the stretch between is sharper than t."""
+        before = self.jumps[-1].t if self.jumps else float(self.problem.segments[0])
+        part = self.parts[-1] if self.parts else None
+        return part.result.t if part is not None and part.start.t == before and part.end == t else t - before
 
     def _booking(self, law: str, kind: str, name: str, jump: Jump) -> float:
         """What a jump adds to an account of the ledger."""
@@ -231,31 +239,40 @@ class Hybrid:
 
     def _merged(self) -> Result:
         parts, problem = self.parts, self.problem
-        last = parts[-1] if parts else None
-        starts = [part.problem.segments[0] for part in parts]
-        merged = replace(
+        last = parts[-1].result if parts else None
+        merged = _with(
             problem,
-            segments=np.array([*starts, problem.segments[-1]]) if parts else problem.segments,
-            parameters=np.concatenate([part.problem.parameters for part in parts]) if parts else problem.parameters,
+            segments=np.array([*(part.start.t for part in parts), problem.segments[-1]]) if parts else problem.segments,
+            parameters=np.array([part.start.parameters for part in parts]) if parts else problem.parameters,
         )
         n, q = problem.program.n, problem.program.n_ledger
+        ended = self.jumps[-1].t if self.reason and self.jumps else None
+        reached = parts[-1].end if parts else float(problem.segments[0])
         return Result(
             problem=merged,
             status=self.status,
-            t=self.jumps[-1].t if self.reason and self.jumps else (last.t if last else float(problem.segments[0])),
+            t=reached if ended is None else ended,
             y=last.y if last else problem.y0,
             ydot=last.ydot if last else np.zeros(n),
             ledger=self.booked,
             margins=last.margins if last else np.zeros(0),
             times=_joined([part.times for part in parts], 0),
-            outputs=_joined([part.outputs for part in parts], n),
-            ledger_outputs=_joined([part.ledger_outputs for part in parts], q),
+            outputs=_joined([part.result.outputs for part in parts], n),
+            ledger_outputs=_joined([part.result.ledger_outputs + part.booked for part in parts], q),
             events=_events(parts, n, q),
-            counters=Counters(*(int(sum(c)) for c in zip(*(part.counters for part in parts), strict=True)))
+            counters=Counters(*(int(sum(c)) for c in zip(*(part.result.counters for part in parts), strict=True)))
             if parts
             else Counters(),
             steps=_steps(parts) if problem.record_steps and parts else None,
         )
+
+
+def _with(problem: Problem, **changes: object) -> Problem:
+    """The problem over a stretch; what was checked of the whole run is not checked again."""
+    changed = copy.copy(problem)
+    for name, value in changes.items():
+        object.__setattr__(changed, name, value)
+    return changed
 
 
 def _joined(blocks: Sequence[Array], width: int) -> Array:
@@ -264,21 +281,23 @@ def _joined(blocks: Sequence[Array], width: int) -> Array:
     return np.empty((0, width)) if width else np.empty(0)
 
 
-def _events(parts: Sequence[Result], n: int, q: int) -> Events:
-    found = [part.events for part in parts]
-    columns = [
-        _joined([getattr(e, name) for e in found], width)
-        for name, width in (("t", 0), ("y", n), ("ydot", n), ("ledger", q))
-    ]
-    index = np.concatenate([e.index for e in found]) if found else np.empty(0, np.int64)
-    return Events(*columns, index=index)
+def _events(parts: Sequence[Part], n: int, q: int) -> Events:
+    found = [(part, part.result.events) for part in parts if len(part.result.events.t)]
+    return Events(
+        _joined([part.start.t + events.t for part, events in found], 0),
+        _joined([events.y for _, events in found], n),
+        _joined([events.ydot for _, events in found], n),
+        _joined([part.booked + events.ledger for part, events in found], q),
+        index=np.concatenate([events.index for _, events in found]) if found else np.empty(0, np.int64),
+    )
 
 
-def _steps(parts: Sequence[Result]) -> Points:
+def _steps(parts: Sequence[Part]) -> Points:
     """All steps; the start of a stretch, which is the end of the one before in other modes, only once."""
-    rows = [part.steps for part in parts if part.steps is not None]
-    columns = [
-        np.concatenate([getattr(points, name)[0 if k == 0 else 1 :] for k, points in enumerate(rows)])
-        for name in ("t", "y", "ydot", "ledger")
-    ]
-    return Points(*columns)
+    found = [(part, part.result.steps, int(k > 0)) for k, part in enumerate(parts) if part.result.steps is not None]
+    return Points(
+        np.concatenate([part.start.t + steps.t[skip:] for part, steps, skip in found]),
+        np.concatenate([steps.y[skip:] for _, steps, skip in found]),
+        np.concatenate([steps.ydot[skip:] for _, steps, skip in found]),
+        np.concatenate([part.booked + steps.ledger[skip:] for part, steps, skip in found]),
+    )

@@ -7,15 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile import Function, Program, compile_function, compile_program
+from surfacechem.compile import Filler, Function, Program, compile_function, compile_program
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper, Point
-from surfacechem.solvers import solver
+from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.system import System
@@ -123,17 +124,29 @@ class Model:
             system.local(list(system.rows.values())),
             system.local([account.rate for account in system.ledger]),
             system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
+            filler=self._filler(inputs),
         )
         self.jumper = Jumper(system) if system.transitions else None
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs)
         self.compile_seconds = time.perf_counter() - start
 
+    def _filler(self, inputs: list[Any]) -> Filler | None:
+        outside = self.system.outside
+        if outside is None:
+            return None
+        first = 1 + 2 * len(self.system.states)
+        paths = [parameter.path for parameter in self.system.parameters]
+        positions = np.array([first + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
+        reads = compile_function(inputs, [self.system.expand(expression) for expression in outside.reads])
+        return Filler(reads, positions, outside.engine)
+
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
         values |= {f"initial.{state.name}": state.initial for state in self.system.states}
         fixed = {parameter.path for parameter in self.system.parameters if not parameter.changeable}
+        fixed |= set(self.system.outside.engine.gives) if self.system.outside else set()
         specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
         for path, value in (changes or {}).items():
             if path not in values or path in fixed:
@@ -207,6 +220,11 @@ class Model:
 
     def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
         method = solver(run.solver)
+        if self.program.filler is not None and run.solver not in ASKING:
+            raise InputError(
+                f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
+                f"`solver: {ASKING[0]}` under `run`."
+            )
         fit = self.system.fit
         values = fit.started(values) if fit else values
         problem = self.problem(run, values)
@@ -217,7 +235,7 @@ class Model:
             values = wider
             result, jumps, ended = self._integrate(method, self.problem(run, values))
         seconds = time.perf_counter() - start
-        status, reason = ended or self._verdict(result, values)
+        status, reason = ended or self.verdict(result, values)
         return Trajectory(self, run, result, values, status, reason, seconds, jumps)
 
     def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
@@ -242,7 +260,8 @@ class Model:
         outputs = [item.name for item in self.system.outputs]
         return self.evaluate(result, t, y, ydot)[:, outputs.index(temperature)]
 
-    def _verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+    def verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+        """How a run ended, and why, in words."""
         where = f"t = {result.t:.9g} s"
         if result.status is Status.FINISHED:
             return "finished", f"reached the end at {where}"
@@ -283,4 +302,6 @@ class Model:
         problem = result.problem
         segment = np.searchsorted(problem.segments[1:-1], t, side="left")
         inputs = np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
-        return self.output_function(inputs) if len(t) else np.empty((0, self.output_function.n_out))
+        return (
+            self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))
+        )

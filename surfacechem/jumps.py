@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
-from surfacechem.expressions import derivative
+from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Equilibrium, System, Transition
 
 Array = NDArray[np.float64]
@@ -28,6 +28,10 @@ ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
 
 NEWTON = 60
+POLISH = 3
+DRIFTED = 1e-3
+"""Largest relative drift of a gap from its equilibrium that is corrected without a search."""
+
 FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
@@ -97,16 +101,40 @@ class Jumper:
         ]
 
     @cached_property
+    def _moving_margins(self) -> list[Expression]:
+        return [self.system.expand(item.margin) for item in self.system.transitions]
+
+    @cached_property
+    def margins_read_rates(self) -> bool:
+        """Whether margins depend on rates, or on variables that have to be found with them."""
+        rates = {state.dot for state in self.system.states}
+        others = [self.system.expand(margin.expression) for margin in self.system.margins]
+        return any(state.algebraic for state in self.system.states) or any(
+            item.free_symbols & rates for item in [*self._moving_margins, *others]
+        )
+
+    @cached_property
+    def _margin_rates(self) -> Function:
+        states, t = self.system.states, self.system.t
+        rates = [sum((derivative(m, s.symbol) * s.dot for s in states), derivative(m, t)) for m in self._moving_margins]
+        return compile_function(self.system.inputs, rates)
+
+    def margin_rates(self, point: Point) -> Array:
+        """Time derivatives of the margins of the transitions at a consistent point."""
+        return self._margin_rates(point.inputs())
+
+    @cached_property
     def _books(self) -> Function:
         """Total energy and entropy."""
         totals = [self.system.find(name).expression for name in ("E_total", "S_total")]
         return compile_function(self.system.inputs, [self.system.expand(item) for item in totals])
 
     def _sink_function(self, kind: str) -> Function:
+        """Total energy; then temperature, share, energy and capacity of each sink."""
         if kind not in self._sink_functions:
             sinks = self.system.sinks[kind]
             columns = [item for s in sinks for item in (s.T, s.share, s.energy, derivative(s.energy, s.T))]
-            expressions = [self.system.expand(item) for item in columns]
+            expressions = [self.system.expand(item) for item in (self.system.find("E_total").expression, *columns)]
             self._sink_functions[kind] = compile_function(self.system.inputs, expressions)
         return self._sink_functions[kind]
 
@@ -177,8 +205,28 @@ class Jumper:
             point = found
         return point
 
-    def make(self, index: int, before: Point) -> Jump:
-        """Carry out a transition."""
+    @cached_property
+    def _tangents(self) -> Function:
+        """Driving traction and its slope, for each quasi-static gap."""
+        symbols = {state.name: state.symbol for state in self.system.states}
+        residuals = [(self.system.expand(e.residual), symbols[e.state]) for e in self.system.equilibria]
+        return compile_function(self.system.inputs, [x for r, g in residuals for x in (r, derivative(r, g))])
+
+    def polished(self, point: Point) -> Point:
+        """The point without the drift that integration has left in its quasi-static gaps."""
+        if not self.system.equilibria:
+            return point
+        y = point.y.copy()
+        columns = [self.states.index(e.state) for e in self.system.equilibria]
+        for _ in range(POLISH):
+            values = self._tangents(replace(point, y=y).inputs())
+            residual, slope = values[::2], values[1::2]
+            change = np.where(slope < 0, -residual / np.where(slope < 0, slope, -1.0), 0.0)
+            y[columns] += np.where(np.abs(change) <= DRIFTED * np.abs(y[columns]), change, 0.0)
+        return replace(point, y=y)
+
+    def make(self, index: int, before: Point, since: float) -> Jump:
+        """Carry out a transition; ``since`` is the time since the one before [s]."""
         item = self.system.transitions[index]
         values = self._maps[index](before.inputs())
         n = len(before.y)
@@ -198,10 +246,10 @@ class Jumper:
                 after = after and self._next_equilibrium(after, e, item.sinks, energy, direction)
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
-            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE)
+            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since)
         final, released, out, taken = heated
         return self._judged(
-            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, heat_out=out, entropy_out=taken),
+            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, out, taken),
             float(entropy),
         )
 
@@ -218,38 +266,35 @@ class Jumper:
         heated, released = self._temperatures(rows, kind, energy)
         if not np.all(np.isfinite(heated)):
             return None
-        n = len(point.y)
-        sinks = self._sink_function(kind)(rows)[0].reshape(-1, 4)
-        out = [
-            (s, float(row[1] * released[0]), float(row[0]))
-            for s, row in zip(self.system.sinks[kind], sinks, strict=True)
-        ]
-        passed = [(heat, T) for s, heat, T in out if s.prescribed]
-        final = Point(point.t, heated[0, 1 : 1 + n], point.ydot, point.parameters)
-        return final, float(released[0]), sum(heat for heat, _ in passed), sum(heat / T for heat, T in passed)
+        heat, entropy, total = 0.0, 0.0, float(released[0])
+        if any(s.prescribed for s in self.system.sinks[kind]):
+            values = self._sink_function(kind)(rows)[0, 1:].reshape(-1, 4)
+            for s, (T, share, _, _) in zip(self.system.sinks[kind], values.tolist(), strict=True):
+                heat += share * total if s.prescribed else 0.0
+                entropy += share * total / T if s.prescribed else 0.0
+        return Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters), total, heat, entropy
 
     def _temperatures(self, rows: Array, kind: str, energy: float) -> tuple[Array, Array]:
         """Inputs with the temperatures that take up what is missing from the energy, and the energy released."""
+        sinks, function = self.system.sinks[kind], self._sink_function(kind)
+        free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(sinks) if not s.prescribed]
+        values = function(rows)
+        released = energy - values[:, 0]
+        now = values[:, 1:].reshape(len(rows), -1, 4)
+        target = now[:, :, 2] + now[:, :, 1] * released[:, None]
         rows = rows.copy()
-        released = energy - np.atleast_2d(self._books(rows))[:, 0]
-        function, sinks = self._sink_function(kind), self.system.sinks[kind]
-        start = np.atleast_2d(function(rows)).reshape(len(rows), -1, 4)
-        target = start[:, :, 2] + start[:, :, 1] * released[:, None]
-        columns = [None if s.prescribed else 1 + self.states.index(s.node) for s in sinks]
-        for _ in range(NEWTON):
-            now = np.atleast_2d(function(rows)).reshape(len(rows), -1, 4)
-            change = (target - now[:, :, 2]) / now[:, :, 3]
+        for _ in range(NEWTON if free else 0):
             done = True
-            for j, column in enumerate(columns):
-                if column is None:
-                    continue
+            for j, column in free:
                 T = rows[:, column]
-                moved = T + change[:, j]
+                change = (target[:, j] - now[:, j, 2]) / now[:, j, 3]
+                moved = T + change
+                done = done and not np.any(np.abs(change) > 4e-16 * np.abs(T))
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
                 rows[:, column] = np.where(moved > 0, moved, np.nan)
-                done = done and bool(np.all(~(np.abs(change[:, j]) > 4e-16 * np.abs(T))))
             if done:
                 break
+            now = function(rows)[:, 1:].reshape(len(rows), -1, 4)
         return rows, released
 
     def _next_equilibrium(

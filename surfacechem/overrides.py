@@ -26,6 +26,15 @@ def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
     return with_paths(tree)
 
 
+def assignments(texts: Sequence[str]) -> dict[str, object]:
+    """Texts "path=value" as plain values.
+
+    >>> assignments(["f=3 pN", "g=[1, 2]"])
+    {'f': '3 pN', 'g': [1, 2]}
+    """
+    return {path: tree.plain() for path, tree in _pairs(texts)}
+
+
 def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
     pairs = overrides.items() if isinstance(overrides, Mapping) else (_split(text) for text in overrides)
     for path, value in pairs:

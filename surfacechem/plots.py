@@ -77,7 +77,7 @@ def figure(
 
     ``variables`` are shown instead of the usual choice; over the variable ``against`` instead of time.
     """
-    dataset = _opened(data)
+    dataset = opened(data)
     panels = chosen(dataset, variables) if variables else usual(dataset)
     if against is not None:
         panels = _others(dataset, panels, against)
@@ -94,7 +94,7 @@ def figure(
         if balances:
             _draw_balances(axes[-1], dataset)
         _variable_axis(axes[-1], dataset, against) if against else _time_axis(axes, dataset)
-        _headings(plot, axes[0], dataset)
+        headings(plot, axes[0], dataset)
     return plot
 
 
@@ -120,7 +120,8 @@ def save(plot: Figure, target: Any, kind: str) -> None:
         plot.savefig(target, format=kind, dpi=160, metadata=metadata)
 
 
-def _opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+    """A dataset, read from its netCDF file if need be."""
     if isinstance(data, xarray.Dataset):
         return data
     try:
@@ -143,7 +144,7 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
     ax.set_ylabel(f"{panel.title} [{unit}]" if panel.title else f"[{unit}]")
     ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
     _margins(ax, dataset, panel.names)
-    _legend(ax)
+    legend(ax)
 
 
 def _margins(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
@@ -155,7 +156,8 @@ def _margins(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
         ax.set_ylim(middle - 0.05 * abs(middle or 1.0), middle + 0.05 * abs(middle or 1.0))
 
 
-def _legend(ax: Axes) -> None:
+def legend(ax: Axes) -> None:
+    """The legend beside the axes."""
     _, labels = ax.get_legend_handles_labels()
     if labels:
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
@@ -175,7 +177,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, LEAST), max(high, 1e-12))
     ax.set_ylabel("Balance residual [1]")
-    _legend(ax)
+    legend(ax)
 
 
 def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
@@ -201,16 +203,22 @@ def logarithmic(times: Array) -> bool:
     return bool(np.mean(after > 0.1 * after[-1]) < 0.6)
 
 
-def _headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+    """Title, how it ended, error and solver."""
     attributes = dataset.attrs
     plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
     facts = [str(attributes.get("reason", ""))]
     if "error" in attributes:
-        source = "exact solution" if any(str(n).endswith("_exact") for n in dataset) else "estimate"
+        exact = str(attributes.get("error_source", "")).startswith("exact") or any(map(_is_exact, dataset))
+        source = "exact solution" if exact else "estimate"
         facts.append(f"error {attributes['error']:.1e} ({source})")
     if "solver" in attributes:
         facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
     ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
+
+
+def _is_exact(name: object) -> bool:
+    return str(name).endswith("_exact")
 
 
 def symbol(name: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.terms import Fluid
+from surfacechem.substances import Fluid
 
 Array = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from surfacechem.integrate import Run
     from surfacechem.scene import Scene
     from surfacechem.solution import Solution
+    from surfacechem.sweep_dataset import SweepSolution
     from surfacechem.system import System
 
 REGIMES = {
@@ -74,6 +75,28 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         *([labelled("written", str(written))] if written else []),
     ]
     return "\n".join(lines)
+
+
+def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
+    """What was swept, how the runs ended, how accurate and how fast they were, and where they are."""
+    sweep, accuracy = solution.sweep, solution.accuracy
+    axes = [f"{name} ({_span(axis.values)}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
+    speed = f"run {duration(sweep.seconds)}, compile {duration(sweep.model.compile_seconds)}"
+    lines = [
+        solution.title or "untitled",
+        labelled("swept", " by ".join(axes)),
+        labelled("solved", f"{states(solution.system)}; {solution.system.regime}; {_method(sweep.run)}"),
+        labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
+        *([labelled("error", f"{accuracy.errors.max():.2g} ({accuracy.source})")] if accuracy else []),
+        labelled("time", f"{speed}; {sweep.batch.steps.sum()} steps"),
+        labelled("balances", f"energy {sweep.energy_error.max():.1e}"),
+        *([labelled("written", str(written))] if written else []),
+    ]
+    return "\n".join(lines)
+
+
+def _span(values: Sequence[float]) -> str:
+    return f"{values[0]:g} to {values[-1]:g}" if len(values) > 1 else f"{values[0]:g}"
 
 
 def _method(run: Run) -> str:

@@ -14,6 +14,7 @@ from surfacechem import case as cases
 from surfacechem.errors import InputError, Place
 from surfacechem.simulation import Simulation
 from surfacechem.solution import Solution
+from surfacechem.sweep_dataset import SweepSolution, recorded_plan
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ def read(path: str | Path) -> Record:
     return Record(Path(path), attributes, variables)
 
 
-def run_again(record: Record) -> Solution:
-    """The case of a record, run as it was run."""
+def run_again(record: Record) -> Solution | SweepSolution:
+    """The case of a record, run or swept as it was."""
     mechanism = record.attributes.get("mechanism")
     case = cases.load_text(str(record.attribute("case")), record.path.stem, record.path.parent, mechanism)
     departures = json.loads(record.attributes.get("departures", "{}"))
@@ -64,10 +65,13 @@ def run_again(record: Record) -> Solution:
         max_steps=departures.get("max_steps", case.run.max_steps),
         max_seconds=None,
     )
-    return Simulation(case).run(departures.get("changes"), run)
+    if "sweep" not in record.attributes:
+        return Simulation(case).run(departures.get("changes"), run)
+    plan = recorded_plan(str(record.attribute("sweep")))
+    return Simulation(replace(case, run=run)).sweep_plan(plan, departures.get("changes"))
 
 
-def differences(record: Record, solution: Solution) -> list[str]:
+def differences(record: Record, solution: Solution | SweepSolution) -> list[str]:
     """Names of the variables that are not bit for bit those of the record, or in one of the two only."""
     ours = {column.name: np.asarray(column.values) for column in solution.columns}
     theirs = record.variables

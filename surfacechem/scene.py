@@ -4,21 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from surfacechem.errors import InputError, Place
-from surfacechem.terms import (
-    BodyEnergy,
-    Fluid,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    Potential,
-    Property,
-    RateLaw,
-    parameter,
-)
+from surfacechem.substances import Fluid, Property
+from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, parameter
 
 
 @dataclass(frozen=True)
@@ -115,6 +105,21 @@ class BondingVariable:
     long_name: str = ""
 
 
+class Engine(Protocol):
+    """Something outside that gives parameters of the scene while it runs, from values of its variables."""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Names of the variables."""
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """Paths of the parameters."""
+
+    def __call__(self, values: Sequence[float]) -> Sequence[float]:
+        """Values of the parameters at values of the variables."""
+
+
 @dataclass(frozen=True)
 class Medium:
     """What fills the space between the bodies: a fluid, or single properties by name (k_m, eta_m, rho_m, cp_m).
@@ -150,6 +155,8 @@ class Interface:
     limits: Sequence[Limit] = ()
     loss: float = 0.0
     medium: Medium | None = None
+    engine: Engine | None = None
+    """What evaluates those rates that are not formulas."""
 
 
 @dataclass(frozen=True)

@@ -16,21 +16,11 @@ from surfacechem.case.mechanics import MOVING, WAYS
 from surfacechem.case.medium import MEDIUM_KEYS, PROPERTIES
 from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
+from surfacechem.case.sweep import RANGE_KEYS, SWEEP_KEYS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Mounting
-from surfacechem.terms import (
-    BodyEnergy,
-    Factor,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    Potential,
-    Property,
-    RateLaw,
-    Spec,
-)
+from surfacechem.substances import Property
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
 
 Schema = dict[str, Any]
 
@@ -97,6 +87,7 @@ def _top() -> dict[str, Schema]:
         "initial": _initial(),
         "run": _run(),
         "reference": _reference(),
+        "sweep": _sweep(),
     }
 
 
@@ -196,6 +187,20 @@ def _reference() -> Schema:
     name = {"enum": references.names()}
     options = {"type": "object", "properties": {"name": name}, "required": ["name"]}
     return {"description": "exact solution to compare with", "anyOf": [name, options]}
+
+
+def _sweep() -> Schema:
+    whole = {"type": "integer", "minimum": 1, "description": "number of values, with both ends"}
+    ends = {key: _quantity(text) for key, text in (("from", "first value"), ("to", "last value"))}
+    spacing = {"enum": list(SPACINGS), "default": SPACINGS[0]}
+    span = _object({**ends, "points": whole, "spacing": spacing}, required=RANGE_KEYS[:3])
+    values = {"anyOf": [{"type": "array", "items": _ref("quantity"), "minItems": 1}, span]}
+    over = {"type": "object", "additionalProperties": values, "minProperties": 1, "maxProperties": 2}
+    until = {"type": "object", "additionalProperties": _ref("quantity"), "minProperties": 1, "maxProperties": 1}
+    texts = {"over": "values of one or two parameters, by path", "until": "a prescribed ramp and where each run ends"}
+    properties = {"over": {**over, "description": texts["over"]}, "until": {**until, "description": texts["until"]}}
+    assert set(properties) == set(SWEEP_KEYS)
+    return _object(properties, required=("over",))
 
 
 def _key(contract: type[Law], law: type[Law]) -> str:

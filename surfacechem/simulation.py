@@ -7,26 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import case as cases
+from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
 from surfacechem.case import Case, Reference
-from surfacechem.errors import InputError, suggestion
+from surfacechem.document import from_plain
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solution import Accuracy, Solution
 from surfacechem.system import System
 from surfacechem.units import parse
 
-TIGHTER = 1e-2
-"""Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
-
-TIGHTEST = 1e-13
-"""Tolerances below this are rounding."""
-
-FLOOR = 1e-9
-"""Exact values of a state below this part of its largest count as this when errors are made relative."""
+if TYPE_CHECKING:
+    from surfacechem.sweep_dataset import SweepSolution
+    from surfacechem.sweeps import Plan
 
 
 def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
@@ -39,11 +37,22 @@ def run(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) 
     return load(name, overrides).run()
 
 
+def sweep(
+    name: str | Path,
+    over: Mapping[str, object] | None = None,
+    until: Mapping[str, object] | None = None,
+    overrides: Sequence[str] | Mapping[str, object] = (),
+) -> SweepSolution:
+    """Read a case and run its sweep, or the one given."""
+    return load(name, overrides).sweep(over, until)
+
+
 class Simulation:
     """A case with its system and machine code, each made when first needed."""
 
     def __init__(self, case: Case) -> None:
         self.case = case
+        self._sweep_models: dict[str, Model] = {}
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -79,9 +88,55 @@ class Simulation:
             case_run=case.run,
         )
 
-    def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
+    def sweep(
+        self,
+        over: Mapping[str, object] | None = None,
+        until: Mapping[str, object] | None = None,
+        changes: Mapping[str, float | str] | None = None,
+        threads: int | None = None,
+    ) -> SweepSolution:
+        """Run over values of one or two parameters in one call of the compiled loop; nothing is compiled twice.
+
+        ``over`` maps paths to lists of values or to ranges {from, to, points, spacing}, ``until`` a prescribed ramp to
+        the value at which each run ends; what is not given is that of the section ``sweep`` of the case.
+        """
+        return self.sweep_plan(self._plan(over, until), changes, threads)
+
+    def sweep_plan(
+        self, plan: Plan, changes: Mapping[str, float | str] | None = None, threads: int | None = None
+    ) -> SweepSolution:
+        """Run a plan whose values are in SI."""
+        from surfacechem import sweeping
+
+        key = plan.until[0] if plan.until else ""
+        try:
+            if key not in self._sweep_models:
+                self._sweep_models[key] = Model(sweeping.prepared(self.system, plan)) if key else self.model
+            return sweeping.sweep(self.case, self._sweep_models[key], plan, self._values(changes or {}), threads)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
+        from surfacechem.case.sweep import read_sweep, read_until
+
+        section = self.case.sweep
+        given = {"over": {path: _listed(values) for path, values in (over or {}).items()}, "until": dict(until or {})}
+        if over is not None:
+            section = read_sweep(from_plain({"over": given["over"]}, Place(path="sweep")), section)
+        if until is not None and section is not None:
+            section = replace(section, until=read_until(from_plain(given["until"], Place(path="sweep.until"))))
+        if section is None:
+            raise InputError("a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.")
+        return section.plan(self._units)
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
+        """Unit of everything that a run may change, by path."""
         units = {p.path: p.spec.unit for p in self.system.parameters if p.changeable}
-        units |= {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
+        return units | {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
+
+    def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
+        units = self._units
         changes = {path if path in units else _level(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
@@ -114,7 +169,7 @@ class Simulation:
     def _against_tighter(self, trajectory: Trajectory) -> Accuracy:
         """Error estimated from a second run; at the tightest tolerance that run is the looser one."""
         rtol = trajectory.run.rtol
-        other = max(rtol * TIGHTER, TIGHTEST) if rtol > TIGHTEST else rtol / TIGHTER
+        other = second_tolerance(rtol)
         second = self.model.resolve(trajectory, other)
         ours, theirs = _states(trajectory), _states(second)
         if len(second.result.times) < len(trajectory.result.times) or len(trajectory.result.times) < 2:
@@ -122,6 +177,11 @@ class Simulation:
         shared = len(trajectory.result.times)
         errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
         return Accuracy(max(errors.values()), f"estimate: a second run at rtol {other:.0e}", errors)
+
+
+def _listed(values: object) -> object:
+    """Arrays as lists."""
+    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 def _level(path: str, known: Mapping[str, str]) -> str:
@@ -138,11 +198,3 @@ def computed(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
     """States and named quantities at the output times."""
     names = [item.name for item in trajectory.model.system.outputs]
     return _states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
-
-
-def relative_error(values: NDArray[np.float64], exact: NDArray[np.float64], floor: float) -> float:
-    """Largest error relative to the exact value at the same time, or to ``floor`` times its largest if that is more."""
-    largest = float(np.max(np.abs(exact), initial=0.0))
-    if largest == 0.0:
-        return float(np.max(np.abs(values), initial=0.0))
-    return float(np.max(np.abs(values - exact) / np.maximum(np.abs(exact), floor * largest), initial=0.0))

@@ -72,9 +72,12 @@ class Column:
 def cf_unit(unit: str) -> str:
     """A unit of this package in the notation of the CF conventions.
 
-    >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1")
-    ('W m-2 K-1', 'm-2', '1')
+    >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1"), cf_unit("(m/s)/s")
+    ('W m-2 K-1', 'm-2', '1', 'm s-1 s-1')
     """
+    if unit.startswith("("):
+        inner, _, rest = unit[1:].partition(")")
+        return " ".join(part for part in (cf_unit(inner), cf_unit(f"1{rest}")) if part != "1") or "1"
     top, _, bottom = unit.partition("/")
     factors = [re.sub(r"\^", "", factor) for factor in top.split() if factor != "1"]
     for factor in bottom.strip("()").split():
@@ -252,7 +255,7 @@ class Solution:
             "site_error": books.site_error,
             "entropy_violations": ", ".join(books.violations) or "none",
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
-            "versions": _versions(),
+            "versions": versions(),
         }
 
     def _departures(self) -> dict[str, str]:
@@ -279,12 +282,13 @@ class Solution:
         """Save as netCDF; the file appears whole or not at all."""
         target = Path(path)
         with replacing(target) as temporary:
-            _write_netcdf(temporary, self.columns, self.attributes)
+            write_netcdf(temporary, self.columns, self.attributes)
         return target
 
 
 @cache
-def _versions() -> str:
+def versions() -> str:
+    """Versions of what a result depends on."""
     names = ("surfacechem", "numpy", "numba", "symengine")
     return ", ".join(f"{name} {version(name)}" for name in names)
 
@@ -318,7 +322,8 @@ def replacing(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    """Write columns and attributes to a new file."""
     import netCDF4
 
     with netCDF4.Dataset(path, "w", format="NETCDF4") as file:

@@ -12,6 +12,7 @@ import symengine
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
+from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
 
 START = "run.t_start"
@@ -194,6 +195,14 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class Outside:
+    """An engine with the expressions of what it reads."""
+
+    engine: Engine
+    reads: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
 class Role:
     """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
 
@@ -230,6 +239,7 @@ class System:
     pairs: tuple[Pair, ...] = ()
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
+    outside: Outside | None = None
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:

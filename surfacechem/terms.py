@@ -13,7 +13,6 @@ contract           states                                              audited f
 :class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
 :class:`RateFactor`    logarithm of what load does to a rate coefficient   --
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
-:class:`Property`      property of the medium between the bodies           --
 :class:`Load`          prescribed history of a variable                    --
 :class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
 :class:`Factor`        how a parameter varies with one variable            --
@@ -30,13 +29,10 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, dataclass_transform
+from typing import Any, ClassVar, Literal, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
-
-if TYPE_CHECKING:
-    from surfacechem.fits import Piece
 
 
 @dataclass(frozen=True)
@@ -326,46 +322,6 @@ class HeatTransfer(Law):
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """The conductances in parallel that the whole is the sum of, by what carries the heat."""
         return {self.channel: self.statement}
-
-
-class Property(Law):
-    """Property of the medium between the bodies, as a function of temperature and pressure."""
-
-    contract = "property"
-    formula = "value"
-    quantity: ClassVar[str]
-    """Name of the property in the table of quantities."""
-
-    value: ClassVar[Callable[..., Expression]]
-
-
-@dataclass(frozen=True)
-class FluidRange:
-    """Temperatures [K] at which a fluid stays what it is, and what happens beyond."""
-
-    low: float
-    high: float
-    reason_low: str
-    reason_high: str
-
-
-class Fluid(ABC):
-    """A substance whose properties have no formula; they are fitted where a scene reads them.
-
-    Properties go by the names of the table of quantities; ``capacity_m`` is the heat capacity per volume over T,
-    rho_m cp_m / T [J/(m^3 K^2)].
-    """
-
-    name: str
-    pressure: float
-
-    @abstractmethod
-    def range(self, T: float) -> FluidRange:
-        """Temperatures around T [K] at which it has properties; InputError where it has none at T."""
-
-    @abstractmethod
-    def fit(self, quantity: str, low: float, high: float) -> tuple[Piece, ...]:
-        """A property between two temperatures [K]; InputError where it has none."""
 
 
 class Limit(Law):

@@ -39,3 +39,10 @@ def test_problem_is_checked() -> None:
     program = compile_program(t, [y], [dy], [], [dy + y])
     with pytest.raises(ValueError, match="output times must lie within"):
         Problem(program, np.ones(1), np.array([3.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-6, np.ones(1))
+
+
+@pytest.mark.parametrize("name", ["bdf", "scipy-radau"])
+def test_factorizations_are_counted_where_the_library_tells(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + 1e4 * (y - se.cos(t))])
+    assert solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-6)).counters.factorizations > 1

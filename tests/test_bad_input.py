@@ -99,7 +99,11 @@ MISTAKES = [
     ("v: 0.1 m/s", "v: {table: {times: [0, 1 m], values: [0]}}", "17: loading.v.table.times[2]: 1 m is a length; time"),
     ("v: 0.1 m/s", "v: 0.1 m/s, T: 3 K", "18: initial.T: T is prescribed under `loading`, so it has no initial value"),
     ("phi: 0,", "phi: 2,", "18: initial.phi: phi = 2 is outside its range: >= 0 and <= 1."),
-    ("phi: 0,", "psi: 0,", "18: initial.psi: nothing that evolves is called 'psi'. Did you mean 'phi'? Known: T, phi."),
+    (
+        "phi: 0,",
+        "psi: 0,",
+        "18: initial.psi: nothing that evolves is called 'psi'. Did you mean 'phi'? Known: T, ln_phi, phi.",
+    ),
     ("T: 300 K}\nrun", "T: -1 K}\nrun", "18: initial.T: T = -1 is outside its range: > 0."),
     ("{until: 5 s}", "{until: -5 s}", "19: run.until: until = -5 is outside its range: > 0."),
     ("{until: 5 s}", "{untill: 5 s}", f"19: run: unknown key 'untill'. Did you mean 'until'? {RUN_KEYS}"),

@@ -28,6 +28,7 @@ KEYS = [
     *("T_0", "bodies", "interface", "temperature", "sites", "partition", "potential", "friction", "bonding", "heat"),
     *("loading", "initial", "run", "until", "T", "T_1", "phi", "v", "p", "g_n", "J_c", "Q_1", "coulomb", "value", "C"),
     *("times", "of", "between", "h", "mechanism", "coverages", "reference", "capacity", "surroundings", "", "a.b"),
+    *("medium", "fluid", "pressure", "thickness", "viscosity", "closure", "radiation", "vogel"),
 ]
 SAMPLES = [name for name in names() if "kappa" not in name]
 

@@ -8,7 +8,11 @@ import surfacechem
 from surfacechem.case import names
 from surfacechem.simulation import Simulation
 
-STOPPED = {"cooling-to-zero": "the temperature T reached zero"}
+STOPPED = {
+    "cooling-to-zero": "the temperature T reached zero",
+    "adhesion-cluster": "the bonds ruptured",
+    "shared-load-rupture": "the bonds ruptured",
+}
 """Cases that end early, and why."""
 
 FLAGGED = ("debonding-cooling",)

@@ -72,7 +72,7 @@ def test_sliding_is_unstable_below_the_critical_stiffness(stiffness, slips):
     column = [s.name for s in trajectory.model.system.states].index("v")
     v = trajectory.result.outputs[300:, column]
     assert (trajectory.result.steps.y[:, column].max() > 10 * V) == slips
-    assert (np.ptp(v) < 1e-2 * V) != slips
+    assert bool(np.all(np.abs(v - V) < 1e-2 * V)) != slips
 
 
 def test_an_extreme_direct_effect_does_not_overflow():
@@ -117,12 +117,12 @@ def names(trajectory):
 
 def test_a_stiff_mounting_follows_the_falling_line_and_unloads_to_the_origin():
     trajectory = debonding(1e14, [0.0, 3e-8, 0.0, 0.0, 1.4e-7])
-    assert names(trajectory) == ["soften", "unload", "touch", "release", "soften", "part"]
+    assert names(trajectory) == ["soften", "unload", "soften", "part"]
     work = trajectory.result.ledger[[a.quantity.name for a in trajectory.model.system.ledger].index("W_n")]
     assert work == pytest.approx(0.5 * 1e6 * 5e-8, rel=1e-9), "the work of separation is dissipated"
     assert audit(trajectory).energy_error < 1e-9
     unloaded = trajectory.jumps[1].before.y
-    assert trajectory.jumps[4].t == pytest.approx(3 + (unloaded[1] * (1 + unloaded[0])) / 1.4e-7, rel=1e-9)
+    assert trajectory.jumps[2].t == pytest.approx(3 + (unloaded[1] * (1 + unloaded[0])) / 1.4e-7, rel=1e-9)
 
 
 def test_a_soft_mounting_tears_the_interface_open():

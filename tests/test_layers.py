@@ -13,13 +13,16 @@ import surfacechem.data
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
-    "contracts": ["terms", "scene"],
+    "contracts": ["terms", "substances", "scene"],
     "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "jumps", "events", "integrate"],
-    "results": ["solution", "audit", "event_table", "detailedbalance"],
+    "results": ["accuracy", "solution", "audit", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
-        "sweep",
+        "spectrum",
+        "sweeps",
+        "sweep_dataset",
+        "sweep_plots",
         "precision",
         "stability",
         "check",
@@ -33,7 +36,19 @@ FLOORS = {
         "mechanismsheet",
         "rateplots",
     ],
-    "doors": ["case.*", "schema", "simulation", "reactor", "rerun", "guard", "cli", "__init__", "__main__"],
+    "doors": [
+        "case.*",
+        "schema",
+        "sweeping",
+        "simulation",
+        "extension",
+        "reactor.*",
+        "rerun",
+        "guard",
+        "cli",
+        "__init__",
+        "__main__",
+    ],
 }
 # The concrete laws stand beside the tower: what they see, and who sees them.
 WING = ["laws.*", "mechanism.*", "media.*"]

@@ -6,10 +6,10 @@ import math
 import cantera as ct
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from mechanisms import KMOL, call, partial_molar, values
+from mechanisms import KMOL, call, mechanism_texts, partial_molar, states, values
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.errors import InputError
@@ -19,6 +19,7 @@ from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttac
 from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.bonds import LoadedReaction
 from surfacechem.mechanism.kinds import names
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.quantities import BOLTZMANN
@@ -164,6 +165,34 @@ def test_bond_energy_is_an_enthalpy_and_load_a_factor(tmp_path_factory, equation
     assert law.log_factor(f=force, T_c=T) < 690
     mu = [row[0] for row in partial_molar(read, point)]
     assert mu == pytest.approx(surface.chemical_potentials / 1e3, rel=digits, abs=1e-12 * 8.3 * T)
+
+
+LOADS = [("Bell", BELL), ("Dembo", DEMBO), ("Dembo-formation", DEMBO), ("two-pathway", PATHS)]
+LOADS += [("Dudko-Hummer-Szabo", DUDKO), ("gap-attachment", TETHER)]
+
+
+@given(data=st.data(), f=st.floats(-40e-12, 40e-12), g_n=st.floats(0.0, 4e-8))
+@settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.generate])
+def test_loads_multiply_the_rates_of_random_mechanisms(tmp_path_factory, data, f, g_n):
+    """Whatever the thermo, orders and coverage dependencies: Cantera's rates times what the load does."""
+    ct.suppress_thermo_warnings(True)
+    text = data.draw(mechanism_texts())
+    surface, loaded = ct.Interface(yaml=text), json.loads(text)
+    for entry in loaded["reactions"]:
+        kind, more = data.draw(st.sampled_from([("Arrhenius", {}), *LOADS]))
+        entry |= {"type": kind, **more}
+    path = tmp_path_factory.mktemp("loaded") / "random.yaml"
+    path.write_text(json.dumps(loaded), encoding="utf-8")
+    read = load_mechanism(path)
+    T, coverages = data.draw(states(len(read.variables)))
+    surface.TP = T, ct.one_atm
+    surface.coverages = coverages
+    point = values(read, T, surface.coverages.tolist()) | {"f": f, "g_n": g_n}
+    for i, law in enumerate(read.reactions):
+        factor = math.exp(call(law.log_factor, point)) if isinstance(law, LoadedReaction) else 1.0
+        theirs = surface.forward_rates_of_progress[i], surface.reverse_rates_of_progress[i]
+        for ours, rate in zip((law.forward, law.reverse), theirs, strict=True):
+            assert call(ours, point) == pytest.approx(rate * KMOL * factor, rel=2e-12, abs=1e-290)
 
 
 def test_bonds_under_load_end_in_the_equilibrium_of_their_springs(tmp_path):

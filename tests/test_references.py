@@ -84,6 +84,8 @@ ENDOTHERMIC = [f"S622_endothermic_kappa_{kappa}" for kappa in ("0p1", "0p5", "0p
 NEARLY_ONE = [f"x01_endothermic_kappa_1m2e-{power}" for power in (10, 20, 40)]
 FLUXES = {"q1": "q_1", "q2": "q_2"}
 KINETICS = {"phi": "phi", "phi_dot": "phi_dot"}
+IGNITED = {"T": "T", "phi": "phi", "ln_1_minus_phi": "ln_unbonded"}
+CURED = {"alpha": "phi", "T": "T", "alpha_dot": "phi_dot"}
 MANUFACTURED = {"T1": "T_1", "T2": "T_2", "Tc": "T_c", "phi": "phi", "g": "g_n"}
 
 
@@ -113,6 +115,21 @@ def friction(p: Mapping[str, float]) -> dict[str, float]:
 
 def cooling(p: Mapping[str, float]) -> dict[str, float]:
     return {"C": p["C_tot"], "Q": p["Q_cool"], "T_i": p["T0"]}
+
+
+def bell(p: Mapping[str, float]) -> dict[str, float]:
+    given = {"k_off": p["k0"], "x_off": p["x"]}
+    return given | {name: p[key] for name, key in (("f", "F"), ("rate", "r")) if key in p}
+
+
+def cluster(load: float, rebinding: float = 0.0) -> dict[str, float]:
+    """A cluster with a force per site of ``load`` force scales, in units of the unstressed lifetime."""
+    given = {"k_off": 1.0, "x_off": 4e-10, "T": 300.0, "n_c": 1e14, "t_n": load * 1e14 * BOLTZMANN * 300.0 / 4e-10}
+    return given | ({"k_on": rebinding} if rebinding else {})
+
+
+def cure(p: Mapping[str, float]) -> dict[str, float]:
+    return {"A_1": p["A1"], "A_2": p["A2"], "E_1": p["E1"], "E_2": p["E2"], "T_0": p["T_i"], "delta_T": p["dT_ad"]}
 
 
 def from_20_kelvin(p: Mapping[str, float]) -> dict[str, float]:
@@ -150,6 +167,11 @@ CASES = [
          lambda p: {"A": p["k0"], "E_a": p["Ea"], "delta_T": p["dT_ad"]}, rounding_of_time=True),
     Case("k_coupled_explicit", "adiabatic-linear-rate", {"T": "T", "phi": "phi"},
          lambda p: {"k_i": p["k0"], "delta_T": p["dT_ad"]}),
+    Case("c_bell_constant_force", "bell-constant-force", {"S": "phi"}, bell),
+    Case("x18_friction_ignited_bonding", "friction-ignited-bonding", IGNITED,
+         lambda p: {"A": p["k0"], "E_a": p["Ea"], "C": p["C_tot"]}),
+    Case("k_kamal_quadratic_energy", "kamal-cure", CURED, cure, rounding_of_time=True),
+    Case("k_kamal_const_capacity", "kamal-cure-constant-capacity", CURED, cure, rounding_of_time=True),
     Case("l_mms_coupled", "manufactured", MANUFACTURED),
     Case("l_mms_coupled_stiff", "manufactured", MANUFACTURED),
 ]  # fmt: skip

@@ -325,3 +325,27 @@ def test_thirteen_digits_against_high_precision() -> None:
     result = radau.solve(problem(program, [0.1], [0.0, 5.0], 1e-13, atol=1e-16))
     exact = mpmath.mpf(1) / (1 + 9 * mpmath.exp(-5))
     assert abs(result.y[0] / float(exact) - 1) < 1e-13
+
+
+def test_batch_with_times_of_their_own_and_events() -> None:
+    """Runs that end at different times, and where each crosses half of its way."""
+    t, y, dy, k = se.symbols("t y dy k")
+    program = compile_program(t, [y], [dy], [k], [dy + k * y], margins=[y - 0.5])
+    rates = np.array([1.0, 10.0, 100.0])
+    ends = 3.0 / rates
+    batch = solve_many(
+        program,
+        np.ones((3, 1)),
+        rates[:, None, None],
+        np.stack([np.zeros(3), ends], axis=1),
+        1e-11,
+        [1e-17],
+        times=np.outer(ends, [0.0, 0.5, 1.0]),
+        margins=[Margin.restart()],
+        event_rows=4,
+    )
+    np.testing.assert_allclose(batch.t, ends)
+    np.testing.assert_allclose(batch.outputs[:, :, 0], np.exp([[0.0, -1.5, -3.0]] * 3), rtol=1e-10)
+    np.testing.assert_allclose([events.t[0] for events in batch.events], np.log(2.0) / rates, rtol=1e-10)
+    with pytest.raises(ValueError, match="segments and times too"):
+        solve_many(program, np.ones((3, 1)), rates[:, None, None], [[0.0, 1.0]], 1e-8, 1e-8, times=[[1.0]])

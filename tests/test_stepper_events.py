@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import symengine as se
-from solver_problems import problem
+from solver_problems import BROKEN, RUPTURE, problem, rupture_problem, slider, slider_events
 
 from surfacechem.compile import compile_program
 from surfacechem.solvers.contract import Margin, Status
@@ -136,3 +136,26 @@ def test_restart_at_zero_by_repeated_runs():
         assert result.t == pytest.approx(exact, rel=1e-13)
         t, v = result.t, -result.y[1] / 2
     assert v == pytest.approx(2.0**-25, rel=1e-8)
+
+
+def test_stick_slip_by_repeated_runs():
+    """Bonds re-form in stick and break in slip: 24 events at exact times, the mode and the jump made by hand."""
+    program, state, mode, times = slider(), np.zeros(3), 0.0, [0.0]
+    for _event in range(24):
+        case = problem(program, state, [times[-1], 1000.0], 1e-12, parameters=[mode], margins=STOP)
+        result = radau.solve(case)
+        assert result.status == Status.EVENT
+        times.append(result.t)
+        state, mode = result.y * [1.0, 0.0, 0.0], 1.0 - mode
+    np.testing.assert_allclose(times[1:], slider_events(24), rtol=1e-11)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+def test_rupture_of_a_cluster_under_a_growing_force(rtol):
+    """Finite-time rupture with an interface a thousand million times lighter than the bodies; energy is conserved."""
+    result = radau.solve(rupture_problem(rtol))
+    assert result.status == Status.EVENT
+    assert result.y[0] == pytest.approx(BROKEN, rel=1e-12)
+    assert result.t == pytest.approx(2.318145972772154, rel=rtol)
+    heat = result.y[1] + result.y[2] - 600.0 + RUPTURE[3] * (result.y[3] - 300.0)
+    assert heat == pytest.approx(20.0 * (BROKEN - 0.9), rel=1e-12 + rtol)

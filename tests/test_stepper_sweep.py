@@ -19,6 +19,10 @@ CONDITION = 200
 """Differences of two states (heat released, entropy made) lose two digits; their floor in the tables is 1e-2."""
 
 radau = Radau()
+ROUNDING = {"x05_closing_film": 3e-8}
+"""Floors of what can be known: one ulp of the time is 1e-7 of the film left 1e-8 s before it closes, and a film thinner
+by a tenth is hotter by 0.3 K."""
+
 each_tolerance = pytest.mark.parametrize("rtol", TOLERANCES)
 
 
@@ -65,7 +69,7 @@ def test_extreme_tables(name: str) -> None:
         if rtol > COARSE and not trajectory.result.success:
             continue
         assert trajectory.status == "finished", trajectory.reason
-        assert max(errors(table, trajectory).values()) < CONDITION * rtol
+        assert max(errors(table, trajectory).values()) < CONDITION * rtol + ROUNDING.get(name, 0.0)
         assert trajectory.result.counters.steps < 2000 or rtol > COARSE
 
 

@@ -3,6 +3,7 @@
 import mpmath
 import pytest
 import scenes
+import scenes_mechanics
 import symengine
 import thermodynamics as laws
 
@@ -31,6 +32,35 @@ def test_no_law_destroys_entropy(scene):
     for seed in range(3):
         point = laws.consistent_point(system, seed)
         assert all(value >= 0 for law, value in laws.productions(system, point).items() if "prescribed" not in law)
+
+
+moving = pytest.mark.parametrize(
+    ("scene", "modes"),
+    [
+        pytest.param(m.scene, modes, id=f"{m.__name__}{list(modes.values())}")
+        for m in scenes_mechanics.ALL
+        for modes in m.modes
+    ],
+)
+
+
+@moving
+def test_moving_gaps_satisfy_both_laws(scene, modes):
+    """In each mode; where a gap is in equilibrium its rate follows from that, so the point is one of equilibrium."""
+    system = assemble(scene())
+    for seed in range(2):
+        point = laws.consistent_point(system, seed, modes)
+        assert laws.first_law_holds(system, point)
+        assert laws.second_law_holds(system, point)
+
+
+@moving
+def test_moving_gaps_never_destroy_entropy(scene, modes):
+    """The far field pulls forward; sliding backward is left at once, before it can give back heat."""
+    system = assemble(scene())
+    point = laws.consistent_point(system, 0, modes)
+    if modes.get("slip", 0.0) >= 0:
+        assert all(value >= 0 for value in laws.productions(system, point).values())
 
 
 def test_maxwell_relations():

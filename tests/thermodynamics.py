@@ -1,6 +1,7 @@
 """Both laws of thermodynamics on assembled equations, to 40 digits: no solver is involved."""
 
 import random
+from collections.abc import Mapping
 
 import mpmath
 import symengine
@@ -50,10 +51,11 @@ OPERATIONS = {
 }
 
 
-def start_point(system: System, seed: int) -> dict:
-    """Parameters as they are, states moved a little at random, time early in the run."""
+def start_point(system: System, seed: int, modes: Mapping[str, float] | None = None) -> dict:
+    """Parameters as they are, states moved a little at random, time early in the run; modes as given."""
     draw = random.Random(seed)
     point = {parameter.symbol: mpmath.mpf(parameter.at(0.0)) for parameter in system.parameters}
+    point |= {mode.symbol: mpmath.mpf(modes[mode.name]) for mode in system.modes if mode.name in (modes or {})}
     point[system.t] = mpmath.mpf(draw.uniform(0.0, 0.1))
     for state in system.states:
         inside = (
@@ -61,21 +63,29 @@ def start_point(system: System, seed: int) -> dict:
         )
         point[state.symbol] = mpmath.mpf(min(inside, 0.95) if state.scale == 1.0 else inside)
         point[state.dot] = mpmath.mpf(0)
+        if state.name == "v" and "slip" in (modes or {}):
+            point[state.symbol] *= mpmath.mpf(modes["slip"])
     return point
 
 
-def consistent_point(system: System, seed: int) -> dict:
-    """A point at which the equations hold to DIGITS digits: Newton on derivatives and algebraic variables."""
-    point = start_point(system, seed)
-    unknowns = [state.symbol if state.algebraic else state.dot for state in system.states]
-    rows = system.residual()
-    slopes = [[symengine.diff(row, unknown) for unknown in unknowns] for row in rows]
-    for _ in range(50):
+def consistent_point(system: System, seed: int, modes: Mapping[str, float] | None = None) -> dict:
+    """A point at which the equations hold to DIGITS digits: Newton on derivatives, algebraic variables and gaps in
+    equilibrium.
+    """
+    point = start_point(system, seed, modes)
+    rows, free = system.residual(), [state.symbol if state.algebraic else state.dot for state in system.states]
+    held = {state.name: state.symbol for state in system.states}
+    for e in system.equilibria:
+        residual = system.expand(e.residual)
+        if number(symengine.diff(residual, held[e.state]), point) != 0:
+            rows, free = [*rows, residual], [*free, held[e.state]]
+    slopes = [[symengine.diff(row, unknown) for unknown in free] for row in rows]
+    for _ in range(80):
         matrix = mpmath.matrix([[number(entry, point) for entry in row] for row in slopes])
         step = mpmath.lu_solve(matrix, -mpmath.matrix([number(row, point) for row in rows]))
-        for unknown, change in zip(unknowns, step, strict=True):
+        for unknown, change in zip(free, step, strict=True):
             point[unknown] += change
-        if all(abs(change) <= 1e-50 * (1 + abs(point[u])) for u, change in zip(unknowns, step, strict=True)):
+        if all(abs(change) <= 1e-50 * (1 + abs(point[u])) for u, change in zip(free, step, strict=True)):
             return point
     raise AssertionError("no consistent point")
 

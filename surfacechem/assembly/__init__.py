@@ -23,7 +23,7 @@ from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch
 from surfacechem.errors import InputError, suggestion
 from surfacechem.scene import Scene
-from surfacechem.system import START, Role, System
+from surfacechem.system import START, Outside, Role, System
 from surfacechem.terms import Spec
 
 __all__ = ["LOADABLE", "assemble"]
@@ -50,8 +50,8 @@ STAGES = (
     equations,
     stage_ends,
     totals,
-    logarithmic_state,
     touch,
+    logarithmic_state,
 )
 
 
@@ -84,6 +84,7 @@ def assemble(scene: Scene) -> System:
         sinks=taking,
         fit=build.fit() if build.fit else None,
         warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
+        outside=_outside(build),
     )
 
 
@@ -91,6 +92,20 @@ def _is_there(build: Build, role: Role) -> bool:
     """Whether a derived variable was derived: one that nobody reads is not there."""
     name = role.variable
     return role.role != "derived" or build.variables.was_read(name) or any(item.name == name for item in build.named)
+
+
+def _outside(build: Build) -> Outside | None:
+    engine = build.interface.engine
+    if engine is None:
+        return None
+    reads = tuple(build.variables.get(name, "the engine of the mechanism") for name in engine.reads)
+    algebraic = [state for state in build.states if state.algebraic]
+    if algebraic:
+        raise InputError(
+            f"{algebraic[0].name} has no heat capacity, so it would have to be found together with rates that are "
+            "evaluated outside. Give the interface a capacity, or let it share the temperature of a body."
+        )
+    return Outside(engine, reads)
 
 
 def _refuse_idle_initial_values(build: Build) -> None:

@@ -14,10 +14,11 @@ from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.fits import DEGREE, NoFitError, Piece, divided
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.refit import Fit, first_range
+from surfacechem.substances import Fluid
 from surfacechem.system import Margin
-from surfacechem.terms import Fluid, Load, Spec
+from surfacechem.terms import Load, Spec
 
 PATH = "interface.medium.fluid"
 
@@ -118,13 +119,19 @@ class FluidFit:
         """A property as a named quantity, constant beyond its range."""
         values = self._values(name)
         pieces = self._pieces(name, values)
-        xs, coefficients = zip(*pieces, strict=True)
-        inside = [sum(c * x**k for k, c in enumerate(cs)) for x, cs in zip(xs, coefficients, strict=True)]
-        first = sum(c * (-1) ** k for k, c in enumerate(coefficients[0]))
-        last = sum(coefficients[-1])
+        inside = [self._polynomial(f"{name}_{i}", x, cs) for i, (x, cs) in enumerate(pieces)]
+        first = sum(c * (-1) ** k for k, c in enumerate(pieces[0][1]))
+        last = sum(pieces[-1][1])
         low, *bounds = (self.ends[0], *self._ends(name, values))
         branches = [(first, low > self.T), *zip(inside, (bound > self.T for bound in bounds), strict=True)]
         return self.build.name(VARIABLES[name], symengine.Piecewise(*branches, (last, True)))
+
+    def _polynomial(self, name: str, x: Expression, coefficients: Sequence[Expression]) -> Expression:
+        """A piece of a property, and its scaled temperature, by names."""
+        x = self.build.name(Quantity(f"{name}_x", "1", "scaled temperature of the piece below"), x, output=False)
+        powers = sum(c * x**k for k, c in enumerate(coefficients))
+        unit = VARIABLES[name.rpartition("_")[0]].unit
+        return self.build.name(Quantity(name, unit, "piece of the fit of a property"), powers, output=False)
 
     def energy(self) -> Expression:
         """Thermal free energy per volume [J/m^3]."""

@@ -16,7 +16,8 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, log
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Medium
-from surfacechem.terms import Property, Spec
+from surfacechem.substances import Property
+from surfacechem.terms import Spec
 
 PATH = "interface.medium"
 

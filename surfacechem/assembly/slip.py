@@ -35,6 +35,8 @@ class Kind:
     """Whether some friction has a limit below which nothing slides."""
     rate_dependent: bool
     """Whether what resists sliding depends on its velocity."""
+    slides: bool
+    """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
 
     @property
     def inertial(self) -> bool:
@@ -50,7 +52,8 @@ def _kind(build: Build) -> Kind | None:
     rate_dependent = any("v" in reads(law.statement) for law in laws)
     if not elastic and mount is not None:
         rate_dependent = rate_dependent or mount.damped
-    return Kind(mount, elastic, any(law.has_limit for law in laws), rate_dependent)
+    sticks = any(law.has_limit for law in laws)
+    return Kind(mount, elastic, sticks, rate_dependent, bool(laws) or not elastic)
 
 
 def tangential_gap(build: Build) -> None:
@@ -109,6 +112,8 @@ def _elastic_gap(build: Build, kind: Kind) -> None:
 
 
 def _sliding_velocity(build: Build, kind: Kind) -> Expression:
+    if not kind.slides:
+        return NONE
     rate = build.gap_rates["u_t"]
     if kind.elastic:
         rate = rate - build.gap_rates["g_t"]
@@ -127,7 +132,7 @@ def tangential_motion(build: Build) -> None:
     t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
     carried = t_e if t_e is not None else t_f
     needed = t_e if t_e is not None else far.force(symengine.Symbol("u_t"), NONE)  # type: ignore[union-attr]
-    slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(1)
+    slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(kind.slides)
     if far is not None:
         far.book(build, symengine.Symbol("u_t"), rate)
         _balance(build, kind, far, slides, t_f, carried)

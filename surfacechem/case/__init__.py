@@ -13,11 +13,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from surfacechem import data, document, overrides
+from surfacechem import data, document, overrides, solvers
 from surfacechem.assembly import assemble
 from surfacechem.case.fields import mapping, text
 from surfacechem.case.run import Reference, Run, read_reference, read_run
 from surfacechem.case.scene import SceneReader, Source
+from surfacechem.case.sweep import Section, read_sweep
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.scene import Scene
@@ -27,7 +28,7 @@ __all__ = ["TOP_KEYS", "Case", "Reference", "Run", "load", "load_text", "names"]
 
 TOP_KEYS = (
     *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
-    *("mechanics", "loading", "programme", "initial", "run", "reference"),
+    *("mechanics", "loading", "programme", "initial", "run", "reference", "sweep"),
 )
 
 SECTIONS = (
@@ -35,6 +36,7 @@ SECTIONS = (
     (r"initial (\w+) =", r"initial.\1"),
     (r"nothing evolves or prescribes \w+: give ([\w-]+) a heat capacity", r"bodies.\1"),
     (r".*interface's potential", "interface"),
+    (r"(a sweep|sweep:|.* never reaches|.* is no ramp|runs until)", "sweep"),
 )
 """What messages of the assembly speak of, as a path in the case."""
 
@@ -52,6 +54,7 @@ class Case:
     scene: Scene
     run: Run
     reference: Reference | None
+    sweep: Section | None
     text: str
     mechanism_text: str | None
     places: Mapping[str, Place]
@@ -129,7 +132,8 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         if key not in top:
             raise tree.error(f"the case needs `{key}`, for example `{example}`.")
     places = dict(tree.places())
-    reader = SceneReader(Source(top, source.base, source.mechanism_text))
+    run = read_run(top["run"])
+    reader = SceneReader(Source(top, source.base, source.mechanism_text, run.solver in solvers.ASKING))
     titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
     return Case(
         name=name,
@@ -137,8 +141,9 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
         source=titles.get("source", ""),
         description=titles.get("description", ""),
         scene=reader.scene(),
-        run=read_run(top["run"]),
+        run=run,
         reference=read_reference(top["reference"]) if "reference" in top else None,
+        sweep=read_sweep(top["sweep"]) if "sweep" in top else None,
         text=content,
         mechanism_text=reader.mechanism.text if reader.mechanism else None,
         places=places,

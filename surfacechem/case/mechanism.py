@@ -16,25 +16,28 @@ if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
 
 
-def read_mechanism(tree: Tree | None, base: str, content: str | None) -> Mechanism | None:
-    """The mechanism of a case, or None; ``content`` is its text where that is already at hand."""
+def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: bool) -> Mechanism | None:
+    """The mechanism of a case, or None; ``content`` is its text where that is already at hand.
+
+    With ``evaluate`` what is not lowered is left to Cantera.
+    """
     if tree is None:
         return None
     file, phase, bonds = _choice(tree)
     if content is None:
         path = _find(file, Path(base), tree)
         document.read(path)
-        return _load(path, phase, bonds, tree)
+        return _load(path, phase, bonds, tree, evaluate)
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
         path.write_text(content, encoding="utf-8")
-        return _load(path, phase, bonds, tree)
+        return _load(path, phase, bonds, tree, evaluate)
 
 
-def _load(path: Path, phase: str | None, bonds: Sequence[str] | None, tree: Tree) -> Mechanism:
+def _load(path: Path, phase: str | None, bonds: Sequence[str] | None, tree: Tree, evaluate: bool) -> Mechanism:
     from surfacechem.mechanism import load_mechanism
 
-    return load_mechanism(path, phase, bonds, tree.place)
+    return load_mechanism(path, phase, bonds, tree.place, evaluate)
 
 
 def _choice(tree: Tree) -> tuple[str, str | None, Sequence[str] | None]:

@@ -10,7 +10,8 @@ from surfacechem.document import Tree
 from surfacechem.errors import InputError
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Medium
-from surfacechem.terms import Fluid, Property, Spec
+from surfacechem.substances import Fluid, Property
+from surfacechem.terms import Spec
 
 PROPERTIES = {"conductivity": "k_m", "viscosity": "eta_m", "density": "rho_m", "heat-capacity": "cp_m"}
 """Keys of single properties and the quantities that they are."""

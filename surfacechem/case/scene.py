@@ -42,6 +42,8 @@ class Source:
     top: Mapping[str, Tree]
     base: str = "."
     mechanism_text: str | None = None
+    evaluate: bool = False
+    """Whether the run can ask Cantera for rates that are not lowered."""
 
 
 class SceneReader:
@@ -51,7 +53,9 @@ class SceneReader:
         self.top = source.top
         self.bodies = self._body_trees()
         self.interface = mapping(source.top.get("interface"), INTERFACE_KEYS)
-        self.mechanism = read_mechanism(self.interface.get("mechanism"), source.base, source.mechanism_text)
+        self.mechanism = read_mechanism(
+            self.interface.get("mechanism"), source.base, source.mechanism_text, source.evaluate
+        )
         self.temperatures = self._temperatures()
         coverages = [variable.name for variable in self.mechanism.variables] if self.mechanism else []
         self.units = {name: quantity.unit for name, quantity in VARIABLES.items()}
@@ -181,6 +185,7 @@ class SceneReader:
             limits,
             loss,
             medium,
+            mechanism.engine,
         )
 
     def _partition(self) -> tuple[float, float]:

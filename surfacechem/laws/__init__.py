@@ -7,18 +7,8 @@ import inspect
 from collections.abc import Iterator
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.terms import (
-    BodyEnergy,
-    Factor,
-    Friction,
-    HeatTransfer,
-    Law,
-    Limit,
-    Load,
-    Potential,
-    Property,
-    RateLaw,
-)
+from surfacechem.substances import Property
+from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 
 from surfacechem.expressions import Expression, exp, log, power
-from surfacechem.terms import Property, parameter
+from surfacechem.substances import Property
+from surfacechem.terms import parameter
 
 
 class Vogel(Property):

@@ -55,7 +55,7 @@ def _number(source: Source, entry: Any, node: Any, key: str, spec: Spec, title: 
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise InputError(f"{title}: {key} must be a number, not {value!r}.", place)
     try:
-        number = _converted(units, value if isinstance(value, str) else float(value), spec.unit)
+        number = converted(units, value if isinstance(value, str) else float(value), spec.unit)
         spec.check(key, number)
     except InputError as error:
         raise InputError(f"{title}: {error.message}", place) from None
@@ -64,7 +64,7 @@ def _number(source: Source, entry: Any, node: Any, key: str, spec: Spec, title: 
     return number
 
 
-def _converted(units: Any, value: str | float, unit: str) -> float:
+def converted(units: Any, value: str | float, unit: str) -> float:
     """Energies may be per molecule or per mole, as Cantera's activation energies."""
     import cantera
 

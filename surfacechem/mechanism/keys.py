@@ -88,6 +88,9 @@ REMEDIES = {
 }
 """What Cantera knows and the compiled path does not, with the way out."""
 
+LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
+"""The way out for a rate type that is not lowered."""
+
 MODELS = {
     "edge": "a contact line has rates per length; write the reactions on a surface.",
     "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free energy; use "
@@ -96,8 +99,15 @@ MODELS = {
 """Phase models that are not plain surfaces, with the way out."""
 
 
-def check(source: Source, phase: Any) -> None:
-    """Raise InputError at the first entry that means nothing, means something else, or cannot be lowered."""
+PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
+"""Rate types of gases."""
+
+
+def check(source: Source, phase: Any, evaluate: bool = False) -> None:
+    """Raise InputError at the first entry that means nothing, means something else, or cannot be lowered.
+
+    With ``evaluate`` reactions of other types are left to Cantera.
+    """
     _check_file(source)
     _check_phase(source, phase)
     entries = list(source.species(phase))
@@ -107,7 +117,10 @@ def check(source: Source, phase: Any) -> None:
     names = _names(source, phase, entries)
     _check_state(source, phase, names)
     for entry in source.reactions(phase):
-        _check_reaction(source, phase, entry, names)
+        if evaluate and is_foreign(entry):
+            _check_equation(source, phase, entry, names, f"reaction {entry['equation']}")
+        else:
+            _check_reaction(source, phase, entry, names)
 
 
 def _check_file(source: Source) -> None:
@@ -211,6 +224,12 @@ def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) ->
     _check_rate(source, entry, law, [] if left_out else names, title)
 
 
+def is_foreign(entry: Any) -> bool:
+    """Whether a reaction is of a type that is not known here, but may be one of Cantera's or of another extension."""
+    kind = str(entry.get("type", "Arrhenius"))
+    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE
+
+
 def _own(law: type[SurfaceReaction]) -> set[str]:
     """Keys that a reaction has because of its rate type."""
     return {*law.keys, *law.own_keys()}
@@ -219,12 +238,12 @@ def _own(law: type[SurfaceReaction]) -> set[str]:
 def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
     """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
     kind = str(entry.get("type", "Arrhenius"))
-    if kind in ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev"):
+    if kind in PRESSURE:
         message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
         raise InputError(message, source.place(entry, "type"))
     law = kind_of(kind)
     if law is None:
-        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())}"
+        message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())} {LEAVE}"
         raise InputError(message, source.place(entry, "type"))
     return law
 

@@ -10,14 +10,15 @@ from typing import Any
 
 from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.mechanism.evaluated import EvaluatedReaction, SurfaceEngine
 from surfacechem.mechanism.fields import rate_fields, spring
-from surfacechem.mechanism.keys import check
+from surfacechem.mechanism.keys import check, is_foreign
 from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
-from surfacechem.mechanism.rates import KILO, SurfaceReaction, plain
+from surfacechem.mechanism.rates import KILO, plain
 from surfacechem.mechanism.source import Source, sides
 from surfacechem.mechanism.thermo import lower
-from surfacechem.scene import BondingVariable, Sites
+from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.terms import Potential, RateLaw
 
 SUM_TOLERANCE = 1e-9
@@ -42,6 +43,8 @@ class Mechanism:
     phase: str
     temperatures: tuple[float, float]
     """Range in which the thermo of every species holds [K]."""
+    engine: Engine | None = None
+    """What evaluates the rates that are not lowered."""
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
         """Initial values from coverages by species; those not given are zero, and all must sum to one."""
@@ -55,17 +58,22 @@ class Mechanism:
 
 
 def load_mechanism(
-    path: Path, phase: str | None = None, bonds: Sequence[str] | None = None, place: Place | None = None
+    path: Path,
+    phase: str | None = None,
+    bonds: Sequence[str] | None = None,
+    place: Place | None = None,
+    evaluate: bool = False,
 ) -> Mechanism:
     """Read one surface phase of a Cantera mechanism.
 
     ``phase`` may be left out where the file has one; ``bonds`` names the species that count as bonds. ``place`` is
-    where the case names the mechanism, for errors that are not in the mechanism file itself.
+    where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` rate
+    types that are not lowered are left to Cantera, which gives their rates while a scene runs.
     """
     path = _find(Path(path), place)
     source = Source(str(path), path.read_text(encoding="utf-8"))
     entry = source.phase(phase, place)
-    check(source, entry)
+    check(source, entry, evaluate)
     surface = _cantera(source, entry)
     species = _species(surface, source, entry)
     chosen = _bonds(species, bonds, place)
@@ -74,9 +82,10 @@ def load_mechanism(
     possible = density / min((item.sites for item in chosen), default=1.0)
     temperatures = (float(surface.min_temp), float(surface.max_temp))
     mixture = IdealMixture(species=species, temperatures=temperatures, place=_law_place(source, entry, "mechanism"))
+    reactions = _reactions(surface, source, entry, species)
     return Mechanism(
         potentials=(mixture,),
-        reactions=_reactions(surface, source, entry, species),
+        reactions=reactions,
         variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
         bonds=tuple(item.variable for item in chosen),
         sites=Sites(possible, possible),
@@ -84,7 +93,13 @@ def load_mechanism(
         species={item.name: item.variable for item in species},
         phase=str(entry["name"]),
         temperatures=temperatures,
+        engine=_engine(surface, species, reactions),
     )
+
+
+def _engine(surface: Any, species: tuple[Species, ...], reactions: tuple[RateLaw, ...]) -> Engine | None:
+    evaluated = {i: law for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)}
+    return SurfaceEngine(surface, species, evaluated) if evaluated else None
 
 
 def _find(path: Path, place: Place | None) -> Path:
@@ -167,7 +182,7 @@ def _law_place(source: Source, node: Any, path: str) -> Place:
     return Place(source.file, source.place(node).line, path)
 
 
-def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species, ...]) -> tuple[SurfaceReaction, ...]:
+def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species, ...]) -> tuple[RateLaw, ...]:
     entries = _kept(source, phase, species)
     paired = zip(surface.reactions(), entries, strict=True)
     return tuple(
@@ -187,13 +202,16 @@ def _species_of(entry: Any) -> set[str]:
     return {*reactants, *products}
 
 
-def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> SurfaceReaction:
+def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
     place = _law_place(source, entry, f"mechanism.{number}")
+    variables = {item.name: item.variable for item in species}
+    if is_foreign(entry):
+        change = _change(reaction, variables)
+        return EvaluatedReaction(number=number, equation=reaction.equation, change=change, value=0.0, place=place)
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:
         message = f"reaction {reaction.equation}: rate type '{reaction.rate.type}' is not lowered."
         raise InputError(f"{message}{suggestion(reaction.rate.type, names())}", place)
-    variables = {item.name: item.variable for item in species}
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     _check_reaction(reaction, forward, place)
     taking_part = tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders})

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from surfacechem import fits
 from surfacechem.errors import InputError
-from surfacechem.terms import Fluid, FluidRange
+from surfacechem.substances import Fluid, FluidRange
 
 Array = NDArray[np.float64]
 

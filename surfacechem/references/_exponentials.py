@@ -49,3 +49,18 @@ def _second_difference_series(a: Array, b: Array) -> Array:
         factorial *= order + 2.0
         total = total + polynomial / factorial
     return total
+
+
+def remainder(q: Array) -> Array:
+    r""":math:`e^{-q}-1+q\ge0` without cancellation, for any q.
+
+    >>> float(remainder(np.array(1e-9)))
+    4.999999998333333e-19
+    """
+    p = np.abs(q)
+    near = np.minimum(p, 1.0)
+    falling = near**2 * second_difference(np.zeros_like(near), -near)
+    rising = near**2 * np.exp(near) * second_difference(-near, -near)
+    with np.errstate(over="ignore"):
+        far = np.where(q < -40.0, np.exp(p), np.expm1(-np.maximum(q, -40.0)) + q)
+    return np.where(p < 1.0, np.where(q < 0.0, rising, falling), far)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,18 @@ class Start:
         system = run.model.system
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
         self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
-        self.named = dict(zip((item.name for item in system.outputs), run.outputs[0], strict=True))
-        rates = run.rates[0]
-        self.rates = {state.name: float(rate) for state, rate in zip(system.states, rates, strict=True)}
+
+    @cached_property
+    def named(self) -> dict[str, float]:
+        """Named quantities."""
+        names = (item.name for item in self.run.model.system.outputs)
+        return dict(zip(names, self.run.outputs[0], strict=True))
+
+    @cached_property
+    def rates(self) -> dict[str, float]:
+        """Rates of the states."""
+        states = self.run.model.system.states
+        return {state.name: float(rate) for state, rate in zip(states, self.run.rates[0], strict=True)}
 
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
@@ -34,18 +44,17 @@ class Start:
             return None
 
     def _plain(self, name: str) -> float:
-        variable = name.removesuffix("_i")
-        for source, key in ((self.parameters, name), *((s, n) for n in (name, variable) for s in self._values())):
-            if key in source:
-                return float(source[key])
+        for source in (self.parameters, self.initial):
+            if name in source:
+                return float(source[name])
+        for key in (name, name.removesuffix("_i")):
+            if key in self.initial or key in self.named:
+                return float(self.initial[key] if key in self.initial else self.named[key])
         return self.at(f".{name}")
-
-    def _values(self) -> tuple[Mapping[str, float], Mapping[str, float]]:
-        return self.initial, self.named
 
     def at(self, ending: str) -> float:
         """The one parameter whose path ends like this; KeyError if there is none, or there are several."""
-        found = [float(value) for path, value in self.run.values.items() if path.endswith(ending)]
+        found = [value for path, value in self.run.values.items() if path.endswith(ending)]
         if len(found) != 1:
             raise KeyError(ending)
         return found[0]
@@ -56,9 +65,8 @@ class Start:
 
     def held_at(self, parameter: str) -> float:
         """A parameter of the mounting; of the normal gap if both directions are mounted."""
-        normal, tangential = (f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential"))
-        values = self.run.values
-        return float(values[normal] if normal in values else values[tangential])
+        paths = [f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential")]
+        return next(self.run.values[path] for path in (*paths, paths[0]) if path in self.run.values)
 
     def sliding(self) -> float:
         """Traction of dry sliding."""
@@ -66,8 +74,9 @@ class Start:
 
     def sticking(self) -> float:
         """Traction that sticking bears."""
-        static = [value for path, value in self.run.values.items() if path.endswith(".mu_s")]
-        return float(max(self.at(".mu"), *static) * self.named["p"]) if static else self.sliding()
+        values = self.run.values
+        static = next((values[p] for p in values if p.endswith(".mu_s")), 0.0)
+        return float(max(self.at(".mu"), static) * self.named["p"])
 
     def heated(self, heat: Array) -> Array:
         """The one temperature of the scene once its bodies have taken up a heat."""
@@ -118,6 +127,8 @@ class Start:
 RULES: dict[str, Callable[[Start], float]] = {
     "C": lambda s: s.capacity(),
     "n_c": lambda s: s.parameters["N_c"],
+    "n_1": lambda s: s.parameters.get("N_1", s.parameters["N_c"]),
+    "n_2": lambda s: s.parameters.get("N_2", s.parameters["N_c"]),
     "K_c": lambda s: s.parameters["K_0"],
     "T": lambda s: s.temperature(),
     "T_i": lambda s: s.temperature(),
@@ -126,7 +137,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "D": lambda s: s.friction(),
     "D_0": lambda s: s.friction(s.parameters["T_0"]) + s.supplied(),
     "Q": lambda s: -s.supplied(),
-    "delta_T": lambda s: s.parameters["H_r"] / s.capacity(),
+    "delta_T": lambda s: s.parameters["H_r"] / s.capacity() if s.capacity() else 0.0,
     "h": lambda s: s.conductance(lambda ends: True),
     "H": lambda s: s.conductance(lambda ends: True),
     "h_1": lambda s: s.into(1),

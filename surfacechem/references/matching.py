@@ -63,10 +63,10 @@ def _solution(reference: Reference, start: Start, t: Array) -> dict[str, Array]:
     if "T" not in exact and "heat" in exact:
         with suppress(KeyError):
             exact["T"] = start.heated(exact["heat"])
-    return _renamed(exact, start.run)
+    return renamed(exact, start.run)
 
 
-def _renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
+def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Exact values under the names of the scene; those it does not have are left out."""
     system = run.model.system
     known = [state.name for state in system.states] + [item.name for item in system.outputs]

@@ -3,7 +3,7 @@
 >>> solver("radua")
 Traceback (most recent call last):
     ...
-ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cvode, ida, lsoda, radau, scipy-radau.
+ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, ida, lsoda, radau, scipy-radau.
 """
 
 import difflib
@@ -18,9 +18,13 @@ _FACTORIES = {
     "scipy-radau": ("scipy_methods", "radau"),
     "cvode": ("sundials", "CVODESolver"),
     "ida": ("sundials", "IDASolver"),
+    "cantera": ("cantera_network", "CanteraSolver"),
 }
 
 names = tuple(_FACTORIES)
+
+ASKING = ("cantera",)
+"""Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
 
 
 def solver(name: str) -> Solver:

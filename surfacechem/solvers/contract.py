@@ -53,7 +53,9 @@ REASONS = {
 class Margin:
     """What happens where a margin crosses zero; direction -1 is falling, +1 rising, 0 both.
 
-    A margin that is zero at the start of a run or restart fires only after it has left zero.
+    A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
+    or below at a start fires at once where it falls, with the state of the start, and not where it rises; one that
+    touches zero without crossing it has reached it.
     """
 
     terminal: bool

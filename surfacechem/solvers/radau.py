@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +30,8 @@ CHUNK = 256
 """Runs a thread takes at a time."""
 END, OUTPUTS, EVENTS, RECORDS = range(4)
 _STATUSES = tuple(Status)
+TIMES = 10
+"""Where segments and output times stand among the arguments of the compiled entry point."""
 
 
 @lru_cache(maxsize=256)
@@ -57,9 +60,10 @@ class _Tables:
         self.stop = np.zeros(1, np.int64)
         self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
         self.counts = np.zeros((runs, 10), np.int64)
-        self.outputs = np.empty((runs, len(times), n + q))
+        self.outputs = np.empty((runs, times.shape[-1], n + q))
         self.steps = np.empty((runs, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(runs)
         self.events = np.empty((runs, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(runs)
+        self.own_times = (segments, times) if segments.ndim == 2 else None
         self.arguments = (
             program.addresses,
             program.algebraic_mask,
@@ -81,7 +85,12 @@ class _Tables:
         )
 
     def run(self, first: int, last: int) -> None:
-        stepper.run_batch()(first, last, *self.arguments)
+        if self.own_times is None:
+            stepper.run_batch()(first, last, *self.arguments)
+            return
+        for i, (segments, times) in enumerate(zip(*(t[first:last] for t in self.own_times), strict=True), first):
+            before, after = self.arguments[:TIMES], self.arguments[TIMES + 2 :]
+            stepper.run_batch()(i, i + 1, *before, segments, times, *after)
 
 
 @lru_cache(maxsize=4)
@@ -200,6 +209,8 @@ class Batch:
     ledger_outputs: Array
     counts: NDArray[np.int64]
     steps: NDArray[np.int64]
+    events: Sequence[Events]
+    """Events of each run, where they were asked for."""
 
 
 def solve_many(
@@ -214,30 +225,47 @@ def solve_many(
     margins: Sequence[Margin] = (),
     max_steps: int = 100_000,
     threads: int = 1,
+    event_rows: int = 0,
 ) -> Batch:
     """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number
     of threads.
+
+    Segments and output times are shared by all runs, or have one row a run, both of them. Events are recorded where
+    ``event_rows``, the usual number of them, is not zero.
     """
     states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
     weights = np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))
-    if len(states) != len(table):
-        raise ValueError(
-            f"{len(states)} initial values but {len(table)} parameter tables; a batch needs one of each a run."
+    own = breaks.ndim == 2
+    rows = {len(states), len(table), *((len(breaks), len(outputs)) if own else ())}
+    if len(rows) != 1 or outputs.ndim != breaks.ndim:
+        counts = f"{len(states)} initial values but {len(table)} parameter tables"
+        raise ValueError(f"{counts}; a batch needs one of each a run, and of segments and times too if of either.")
+    kinds = tuple(margins)
+    for i in range(len(states) if own else min(1, len(states))):  # runs that share times share all that is checked
+        when, pieces = (outputs[i], breaks[i]) if own else (outputs, breaks)
+        Problem(program, states[i], when, pieces, table[i], rtol, weights, kinds, max_steps)
+    while True:
+        tables = _Tables(
+            program, states, table, breaks, outputs, rtol, np.array(weights), kinds, max_steps, 0, event_rows
         )
-    if len(states):
-        # All runs share shapes, so the checks of one problem are those of the batch.
-        Problem(program, states[0], outputs, breaks, table[0], rtol, weights, tuple(margins), max_steps)
-    tables = _Tables(program, states, table, breaks, outputs, rtol, np.array(weights), tuple(margins), max_steps, 0, 0)
-    starts = range(0, len(states), CHUNK)
+        _run_all(tables, len(states), threads)
+        most = int(tables.counts[:, EVENTS].max(initial=0))
+        if not 0 < event_rows < most:
+            return _batch(program, tables)
+        event_rows = most
+
+
+def _run_all(tables: _Tables, runs: int, threads: int) -> None:
     stepper.run_batch()
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda start: tables.run(start, min(start + CHUNK, len(states))), starts))
-    return _batch(program, tables)
+        list(pool.map(lambda start: tables.run(start, min(start + CHUNK, runs)), range(0, runs, CHUNK)))
 
 
 def _batch(program: Program, tables: _Tables) -> Batch:
     n, q = program.n, program.n_ledger
     _, y, ydot, rest = _points(tables.ends, n)
+    room = tables.events.shape[1]
+    events = zip(tables.events, np.minimum(tables.counts[:, EVENTS], room).tolist(), strict=True)
     return Batch(
         status=tables.counts[:, END],
         t=tables.ends[:, 0],
@@ -249,6 +277,7 @@ def _batch(program: Program, tables: _Tables) -> Batch:
         ledger_outputs=tables.outputs[:, :, n:],
         counts=tables.counts[:, OUTPUTS],
         steps=tables.counts[:, RECORDS + 1],
+        events=[_events(found[:count], n) if count else _no_events(n, q) for found, count in events],
     )
 
 
@@ -259,6 +288,18 @@ class Consistent:
     y: Array
     ydot: Array
     valid: NDArray[np.bool_]
+
+
+def search_arguments(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> tuple[Any, ...]:
+    """Arguments of the compiled loop that make rows [t | y | ydot] consistent where they stand.
+
+    ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, 10] gets the outcomes under END.
+    """
+    none, nothing = np.zeros(0), _no_rows(len(ends))
+    return (
+        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(program.n), _kinds(()),
+        ends, table, none, none, ends, counts, nothing, nothing, nothing,
+    )  # fmt: skip
 
 
 def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, parameters: ArrayLike) -> Consistent:
@@ -278,11 +319,11 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     )
     if len(table) not in (1, len(ends)):
         raise ValueError(f"{len(ends)} states but {len(table)} parameter vectors; one is needed, or one a state.")
+    if program.filler is not None:
+        rows = np.broadcast_to(table[:, 0], (len(ends), program.n_parameters))
+        filled = program.filled(np.concatenate([ends, rows], axis=1))
+        table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), 10), np.int64)
-    none, nothing, kinds = np.zeros(0), _no_rows(len(ends)), _kinds(())
-    stepper.run_batch()(
-        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(n), kinds, ends, table,
-        none, none, ends, counts, nothing, nothing, nothing,
-    )  # fmt: skip
+    stepper.run_batch()(*search_arguments(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)

@@ -43,6 +43,10 @@ class _Stretch(Method):
     def at(self, t: float) -> Array:
         return np.asarray(self.solver.y if t == self.solver.t else self.dense(t))
 
+    @property
+    def factorizations(self) -> int:
+        return int(self.solver.nlu)
+
 
 class SciPySolver(SteppingSolver):
     """One method of ``scipy.integrate``; algebraic variables are eliminated inside the right-hand side."""

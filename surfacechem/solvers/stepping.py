@@ -42,7 +42,7 @@ class View:
     jacobians: int = 0
 
     def inputs(self, t: float, y: Array, ydot: Array) -> Array:
-        return np.concatenate(([t], y, ydot, self.parameters))
+        return self.problem.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, differential: Array) -> tuple[Array, Array]:
         """State and derivative with the algebraic variables found from the equations."""
@@ -83,6 +83,11 @@ class Method(ABC):
     def at(self, t: float) -> Array:
         """X inside the last step."""
 
+    @property
+    def factorizations(self) -> int:
+        """Matrices factored so far; 0 where the library does not tell."""
+        return 0
+
 
 @dataclass
 class Progress:
@@ -102,6 +107,7 @@ class Progress:
     count: int = 0
     residuals: int = 0
     jacobians: int = 0
+    factorizations: int = 0
 
     def restart_sides(self, fired: set[int]) -> None:
         self.sides = np.sign(self.margins)
@@ -172,7 +178,10 @@ class SteppingSolver(Solver):
             progress.restart_sides(fired)
             _start_tables(progress)
             method = self.begin(view, start, end, progress.y, progress.ydot, progress.ledger)
-            fired = self._stretch(view, progress, method, end)
+            try:
+                fired = self._stretch(view, progress, method, end)
+            finally:
+                progress.factorizations += method.factorizations
             if any(view.problem.margins[i].terminal for i in fired):
                 return Status.EVENT
             over = progress.over_budget()
@@ -291,6 +300,11 @@ def _result(progress: Progress, status: Status) -> Result:
         outputs=outputs[:, :n],
         ledger_outputs=outputs[:, n:],
         events=Events(*_rows([event[1:] for event in progress.events], problem), index=index),
-        counters=Counters(steps=progress.count, residuals=progress.residuals, jacobians=progress.jacobians),
+        counters=Counters(
+            steps=progress.count,
+            residuals=progress.residuals,
+            jacobians=progress.jacobians,
+            factorizations=progress.factorizations,
+        ),
         steps=Points(*_rows(progress.steps, problem)) if problem.record_steps else None,
     )

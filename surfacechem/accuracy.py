@@ -1,0 +1,32 @@
+"""How errors are made relative, and how they are estimated where no exact solution is known."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+TIGHTER = 1e-2
+"""Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
+
+TIGHTEST = 1e-13
+"""Tolerances below this are rounding."""
+
+FLOOR = 1e-9
+"""Exact values of a state below this part of its largest count as this when errors are made relative."""
+
+
+def second_tolerance(rtol: float) -> float:
+    """Tolerance of the second run; at the tightest tolerance that run is the looser one.
+
+    >>> second_tolerance(1e-8), second_tolerance(1e-13)
+    (1e-10, 1e-11)
+    """
+    return max(rtol * TIGHTER, TIGHTEST) if rtol > TIGHTEST else rtol / TIGHTER
+
+
+def relative_error(values: NDArray[np.float64], exact: NDArray[np.float64], floor: float) -> float:
+    """Largest error relative to the exact value at the same time, or to ``floor`` times its largest if that is more."""
+    largest = float(np.max(np.abs(exact), initial=0.0))
+    if largest == 0.0:
+        return float(np.max(np.abs(values), initial=0.0))
+    return float(np.max(np.abs(values - exact) / np.maximum(np.abs(exact), floor * largest), initial=0.0))

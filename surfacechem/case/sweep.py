@@ -1,0 +1,78 @@
+"""The section ``sweep`` of a case: which parameters run over which values, and where each run ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from surfacechem.case.fields import choice, items, mapping, number, whole
+from surfacechem.case.run import SPACINGS
+from surfacechem.document import Tree
+from surfacechem.errors import InputError, suggestion
+from surfacechem.quantities import VARIABLES
+from surfacechem.sweeps import MOST_RUNS, Axis, Plan
+
+SWEEP_KEYS = ("over", "until")
+RANGE_KEYS = ("from", "to", "points", "spacing")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A sweep as read; units of the values are known once the scene is assembled."""
+
+    over: Mapping[str, Tree]
+    until: tuple[str, Tree] | None
+
+    def plan(self, units: Mapping[str, str]) -> Plan:
+        """The plan in SI; ``units`` are those of the parameters that may be changed, by path."""
+        until = (
+            (self.until[0], number(self.until[1], VARIABLES[self.until[0]].unit, self.until[0])) if self.until else None
+        )
+        return Plan([_axis(path, tree, units) for path, tree in self.over.items()], until)
+
+
+def read_sweep(tree: Tree, usual: Section | None = None) -> Section:
+    """The section ``sweep``; where it does not say how runs end, they end as in the usual one."""
+    fields = mapping(tree, SWEEP_KEYS)
+    over = mapping(fields.get("over"))
+    if not over:
+        raise tree.error(
+            "a sweep needs `over`, for example `over: {loading.f.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`."
+        )
+    for values in over.values():
+        if isinstance(values.value, dict):
+            mapping(values, RANGE_KEYS)
+    return Section(over, read_until(fields["until"]) if "until" in fields else usual.until if usual else None)
+
+
+def read_until(tree: Tree) -> tuple[str, Tree]:
+    """A prescribed variable and the value at which each run ends."""
+    fields = mapping(tree)
+    if len(fields) != 1:
+        raise tree.error("`until` is one prescribed variable and its value, for example `until: {f: 200 pN}`.")
+    ((name, value),) = fields.items()
+    choice(Tree(name, value.place), "variable", VARIABLES)
+    return name, value
+
+
+def _axis(path: str, tree: Tree, units: Mapping[str, str]) -> Axis:
+    path = path if path in units else f"{path}.level" if f"{path}.level" in units else path
+    if path not in units:
+        raise InputError(f"no parameter '{path}' to sweep.{suggestion(path, units)}", tree.place)
+    unit = units[path]
+    if not isinstance(tree.value, dict):
+        return Axis(path, [number(item, unit, path) for item in items(tree, "[1, 2, 3]")])
+    fields = mapping(tree, RANGE_KEYS)
+    for key in ("from", "to", "points"):
+        if key not in fields:
+            raise tree.error(f"a range needs `{key}`.")
+    first, last = (number(fields[key], unit, path) for key in ("from", "to"))
+    points = whole(fields["points"], "points", 1, MOST_RUNS)
+    spacing = choice(fields["spacing"], "spacing", SPACINGS) if "spacing" in fields else "linear"
+    if spacing == "linear":
+        return Axis(path, np.linspace(first, last, points).tolist())
+    if not (first > 0 and last > 0):
+        raise fields["spacing"].error("a logarithmic range needs ends above zero.")
+    return Axis(path, np.geomspace(first, last, points).tolist(), logarithmic=True)

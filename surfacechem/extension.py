@@ -1,0 +1,269 @@
+"""Rates of bonds under load in Cantera itself.
+
+A mechanism that says ``extensions: [{type: python, name: surfacechem.extension}]`` may give its reactions any rate type
+of this package (``type: Bell`` and so on), in every Cantera script. What a rate reads beside temperature and coverages
+(``f``, the force per bond [N]; ``g_n``, the gap [m]) is an attribute of the surface, which has to be of a subclass of
+``cantera.Interface`` that takes attributes, such as :class:`LoadedInterface`.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, fields
+from typing import Any, ClassVar
+
+import cantera
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.mechanism.affinity import AffinityReaction
+from surfacechem.mechanism.fields import converted
+from surfacechem.mechanism.keys import REACTION
+from surfacechem.mechanism.kinds import kinds
+from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rates import KILO, CoverageTerm, InterfaceArrhenius
+from surfacechem.mechanism.source import sides
+from surfacechem.quantities import VARIABLES
+from surfacechem.terms import Spec
+
+__all__ = ["LoadedInterface"]
+
+MOLECULAR = KILO * AVOGADRO
+"""Molecules in a kmol."""
+
+LARGEST = 700.0
+"""Affinity over k_B T above which its exponential counts as this one's."""
+
+FLOOR = 1e-100
+"""Coverages below this count as this where mass action has to be divided out."""
+
+
+class LoadedInterface(cantera.Interface):
+    """A Cantera surface whose bonds are under load: give it the attributes that its rates read, ``f`` or ``g_n``.
+
+    ``f`` [N] may be a mapping from species to forces; a reaction then takes that of the first of its species.
+    """
+
+
+class Surroundings(cantera.ExtensibleRateData):
+    """What the rates of a type read: temperature, coverages, and the attributes of the surface."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.T = 0.0
+        self.names: list[str] = []
+        self.coverages: dict[str, float] = {}
+        self.surface: Any = None
+
+    def update(self, surface: Any) -> bool:
+        """Take over the state; always, since a force can change at constant temperature."""
+        self.T = surface.T
+        if not self.names:
+            self.names = [surface.species(k).name for k in range(surface.n_species)]
+        coverages = getattr(surface, "coverages", None)  # a clone is no Interface; it has lost its load too
+        self.coverages = dict(zip(self.names, coverages.tolist(), strict=True)) if coverages is not None else {}
+        # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
+        self.surface = weakref.ref(surface) if hasattr(surface, "__weakref__") else None
+        return True
+
+    def read(self, name: str, kind: str) -> Any:
+        """An attribute of the surface; there is no default, since a load that was forgotten is not zero."""
+        surface = self.surface() if self.surface is not None else None
+        if not hasattr(surface, name):
+            quantity = VARIABLES[name]
+            raise AttributeError(
+                f"a rate of type {kind} reads {name}, the {quantity.long_name.partition(',')[0]} [{quantity.unit}], "
+                f"which the surface does not have. Load the mechanism with surfacechem.extension.LoadedInterface, set "
+                f"its attribute `{name}`, and do not let Cantera clone it."
+            )
+        return getattr(surface, name)
+
+
+class LoadedRate(cantera.ExtensibleRate):
+    """A rate type of this package as Cantera's; a subclass names the law whose coefficient it evaluates."""
+
+    law: ClassVar[type[InterfaceArrhenius]]
+
+    def set_parameters(self, node: Any, units: Any) -> None:
+        """Read the entry of a reaction. What is wrong with it is kept for ``validate``, where it gets its line."""
+        self.kind = self.law.kind.removeprefix("interface-")
+        self.problem = ""
+        self.bound: InterfaceArrhenius | None = None
+        self.units = units.product()
+        try:
+            self.bound = self._read(node, units)
+        except (InputError, cantera.CanteraError, ValueError) as error:
+            self.problem = str(error)
+
+    def _read(self, node: Any, units: Any) -> InterfaceArrhenius:
+        equation = str(node.get("equation", ""))
+        own = self.law.own_keys()
+        _check_keys(node, {*REACTION, *self.law.keys, *own}, f"a rate of type {self.kind}")
+        constant = node.get("rate-constant")
+        _check_all(constant, self.law.keys["rate-constant"], "rate-constant")
+        coverage = node.get("coverage-dependencies") or {}
+        values: dict[str, Any] = {
+            "A": float(constant.convert_rate_coeff("A", units)),
+            "b": float(constant["b"]),
+            "Ea": _number(node.units, "Ea", constant["Ea"], "J/mol"),
+            "coverage": tuple(_coverage_term(node.units, name, item) for name, item in sorted(coverage.items())),
+        }
+        values |= self._own(node, own)
+        reactants, products, reversible = sides(equation)
+        orders = reactants | {str(name): float(order) for name, order in (node.get("orders") or {}).items()}
+        change = {name: products.get(name, 0.0) - reactants.get(name, 0.0) for name in (*reactants, *products)}
+        structure = {"equation": equation, "orders": orders, "products": products, "change": change}
+        values |= {"number": "R", "species": (), "reversible": reversible, **structure}
+        return self.law(**values)
+
+    def _own(self, node: Any, own: Mapping[str, str]) -> dict[str, Any]:
+        """Parameters of the load's factor."""
+        specs = dict(self.law.specs())
+        optional = {item.name for item in fields(self.law) if item.default is not MISSING}
+        found = {}
+        for key, name in own.items():
+            if key in node:
+                found[name] = _number(node.units, key, node[key], specs[name].unit)
+            elif name not in optional:
+                message = f"a rate of type {self.kind} needs `{key}`: {specs[name].text} [{specs[name].unit}]."
+                raise InputError(message)
+        return found
+
+    def get_parameters(self, node: Any) -> None:
+        """Write the entry of the reaction in the units of its file."""
+        if self.bound is None:
+            return
+        specs = dict(self.law.specs())
+        for key, name in self.law.own_keys().items():
+            if not self.bound.is_default(name):
+                _put(node, key, getattr(self.bound, name), specs[name])
+        constant = cantera.AnyMap()
+        constant.set_quantity("A", self.bound.A, self.units)
+        constant["b"] = self.bound.b
+        constant.set_activation_energy("Ea", self.bound.Ea * KILO, "J/kmol")
+        node["rate-constant"] = constant
+        if self.bound.coverage:
+            node["coverage-dependencies"] = {term.variable: _coverage_entry(term) for term in self.bound.coverage}
+
+    def validate(self, equation: str, surface: Any) -> None:
+        """Refuse what is wrong with the entry, and what Cantera would make of it."""
+        if self.problem:
+            raise ValueError(self.problem)
+        assert self.bound is not None
+        species = {item.name: item for item in map(surface.species, range(surface.n_species))}
+        for term in self.bound.coverage:
+            if term.variable not in species:
+                guess = suggestion(term.variable, species)
+                raise ValueError(f"coverage-dependencies: no species '{term.variable}'.{guess}")
+        self.species = tuple(word for word in equation.split() if word in species)
+        elastic = [name for name in self.species if "bond" in species[name].input_data]
+        if "<=>" in equation and elastic:
+            raise ValueError(
+                f"{elastic[0]} is elastic, which Cantera's equilibrium constant does not know, so the reverse rate "
+                "would be wrong. Write two one-way reactions."
+            )
+
+    def eval(self, data: Any) -> float:
+        """Rate coefficient in kmol, m and s."""
+        assert self.bound is not None
+        values: dict[str, Any] = {"T_c": data.T, **data.coverages}
+        for name in self.bound.own_reads():
+            if name not in values:
+                values[name] = self._load(data, name)
+        return float(self.bound.coefficient(values, 0.0))
+
+    def _load(self, data: Surroundings, name: str) -> float:
+        value = data.read(name, self.kind)
+        if not isinstance(value, Mapping):
+            return float(value)
+        found = next((species for species in self.species if species in value), None)
+        if found is None:
+            raise AttributeError(f"{name} has no value for any of {', '.join(self.species)}.")
+        return float(value[found])
+
+
+class ByAffinity(Surroundings):
+    """What rates by affinity read: the chemical potentials over R T too."""
+
+    def update(self, surface: Any) -> bool:
+        """Take over the state."""
+        super().update(surface)
+        potentials = surface.chemical_potentials / (cantera.gas_constant * self.T)
+        self.potentials = dict(zip(self.names, potentials.tolist(), strict=True))
+        return True
+
+
+class AffinityRate(LoadedRate):
+    """A rate by affinity as the coefficient of mass action that gives the same net rate."""
+
+    def eval(self, data: Any) -> float:
+        """Rate coefficient in kmol, m and s."""
+        law = self.bound
+        assert isinstance(law, AffinityReaction)
+        x = sum(nu * data.potentials[name] for name, nu in law.change.items())
+        ratio = law.drive(x) / math.expm1(min(x, LARGEST)) if x else 1.0
+        for name, order in law.orders.items():
+            ratio /= max(data.coverages[name], FLOOR) ** order
+        return float(super().eval(data) * ratio)
+
+
+def _check_keys(node: Any, known: Any, title: str) -> None:
+    for key in node:
+        if key not in known:
+            raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), known)}")
+
+
+def _check_all(node: Any, keys: Collection[str], title: str) -> None:
+    """Raise InputError unless a mapping has these keys and no other, as Cantera's own rates have."""
+    if not isinstance(node, Mapping):
+        raise InputError(f"{title} must be a mapping with {', '.join(sorted(keys))}.")
+    _check_keys(node, keys, title)
+    for key in sorted(set(keys) - set(node)):
+        raise InputError(f"{title}: {key} is missing.")
+
+
+def _coverage_term(units: Any, name: str, entry: Any) -> CoverageTerm:
+    _check_all(entry, InterfaceArrhenius.keys["coverage-dependencies"], f"coverage-dependencies: {name}")
+    energies = entry["E"]
+    listed = energies if isinstance(energies, list | tuple) else [energies]
+    E = tuple(_number(units, "E", energy, "J/mol") for energy in listed)
+    return CoverageTerm(name, float(entry["a"]), float(entry["m"]), E)
+
+
+def _coverage_entry(term: CoverageTerm) -> Any:
+    entry = cantera.AnyMap()
+    entry["a"], entry["m"] = term.a, term.m
+    entry["E"] = [f"{energy!r} J/mol" for energy in term.E]  # a list gets no units from Cantera
+    return entry
+
+
+def _number(units: Any, key: str, value: Any, unit: str) -> float:
+    try:
+        return converted(units, value, unit)
+    except (cantera.CanteraError, TypeError, ValueError):
+        raise InputError(f"{key} = {value} is not a quantity in {unit}.") from None
+
+
+def _put(node: Any, key: str, value: float, spec: Spec) -> None:
+    if spec.unit == "1":
+        node[key] = value
+    elif spec.unit == "J/mol":
+        node.set_activation_energy(key, value * KILO, "J/kmol")
+    elif spec.unit == "J":
+        node.set_activation_energy(key, value * MOLECULAR, "J/kmol")
+    else:
+        node.set_quantity(key, value, spec.unit)
+
+
+def _register() -> None:
+    """A rate of Cantera for every rate type that it does not know itself."""
+    for kind, law in kinds().items():
+        if law.native:
+            continue
+        rate, data = (AffinityRate, ByAffinity) if issubclass(law, AffinityReaction) else (LoadedRate, Surroundings)
+        made = type(law.__name__, (rate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
+        globals()[law.__name__] = cantera.extension(name=kind, data=data)(made)
+
+
+_register()

@@ -1,0 +1,10 @@
+"""A scene in a Cantera reactor network, beside gas reactors, reservoirs, walls and flow controllers.
+
+``interface`` (the reactor that holds a scene), ``network`` (a ReactorNet that stops at breakpoints and limits),
+``coupling`` (how other reactors touch its bodies), ``history`` (what it went through, as a dataset).
+"""
+
+from surfacechem.reactor.interface import InterfaceReactor, InterfaceStopped
+from surfacechem.reactor.network import ReactorNet
+
+__all__ = ["InterfaceReactor", "InterfaceStopped", "ReactorNet"]

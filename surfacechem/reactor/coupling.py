@@ -1,0 +1,124 @@
+"""How other reactors touch the bodies of a scene, and what that changes in the scene.
+
+A body with a heat capacity keeps it, and stands in the network as a reservoir with its temperature: heat through
+Cantera's walls on that reservoir is its external heat. A body without one can be replaced by a reactor: its temperature
+is then the reactor's, and what flows into it the reactor receives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import cantera
+import symengine
+
+from surfacechem.errors import InputError, suggestion
+from surfacechem.laws.loading import Hold
+from surfacechem.scene import Body, Scene
+from surfacechem.system import Parameter, System
+from surfacechem.terms import Load, Spec
+
+STAND_IN = """
+phases:
+- {name: body, thermo: ideal-gas, species: [nitrogen], state: {T: 300 K, P: 1 atm}}
+species:
+- {name: nitrogen, composition: {N: 2}, thermo: {model: constant-cp}}
+"""
+"""What a reservoir is made of that stands for a body; nothing of it matters but its temperature."""
+
+
+def suffix_of(scene: Scene, name: str) -> str:
+    """Suffix of a body, or of 'interface', in the names of variables; InputError where there is none of that name."""
+    names = {body.name: str(k) for k, body in enumerate(scene.bodies, start=1)} | {"interface": "c"}
+    if name not in names:
+        raise InputError(f"the scene has no body '{name}'.{suggestion(name, names)}")
+    return names[name]
+
+
+def node_of(scene: Scene, name: str) -> str:
+    """Name of the evolving temperature of a body or of the interface; InputError where it has none."""
+    suffix = suffix_of(scene, name)
+    where = {"1": scene.bodies[0].temperature, "2": scene.bodies[1].temperature, "c": scene.interface.temperature}
+    temperature = where[suffix]
+    if temperature is None or isinstance(temperature, Load) or temperature in scene.loading:
+        raise InputError(
+            f"{name} has no temperature that evolves, so heat through a wall would not change it. Give it a heat "
+            "capacity, or let a reactor take its place."
+        )
+    return temperature
+
+
+def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
+    """The scene with external heat into bodies, to be given while it runs."""
+    loading = dict(scene.loading)
+    for name in names:
+        heat = f"Q_{suffix_of(scene, name)}"
+        if heat in scene.loading:
+            raise InputError(f"{heat} has two roles: the case prescribes it, and a wall gives it. Remove one of them.")
+        loading[heat] = Hold(level=0.0)
+    return replace(scene, loading=loading)
+
+
+def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:
+    """The scene with bodies whose temperatures are given while it runs."""
+    first, second = (_replaced(body, reactors.get(body.name)) for body in scene.bodies)
+    for name in reactors:
+        if suffix_of(scene, name) == "c":
+            raise InputError("a reactor can take the place of a body, not of the interface.")
+    return replace(scene, bodies=(first, second))
+
+
+def _replaced(body: Body, reactor: Any) -> Body:
+    if reactor is None:
+        return body
+    if body.energy is not None or not isinstance(body.temperature, Load):
+        raise InputError(
+            f"a reactor takes the place of {body.name}, so the case must not give it a heat capacity or a temperature "
+            f"that it shares. Write `{body.name}: {{temperature: 300 K}}`; the value is not used."
+        )
+    return replace(body, temperature=Hold(level=float(reactor.T)))
+
+
+def with_multipliers(system: System) -> tuple[System, tuple[str, ...]]:
+    """The system with a factor on each reaction rate, and the labels of the reactions in the order of the scene."""
+    labels = tuple(item.name[2:] for item in system.named if item.quantity.tag == "e:R")
+    symbols = {f"R_{label}": symengine.Symbol(f"multiplier_{label}") for label in labels}
+    named = tuple(
+        replace(item, expression=symbols[item.name] * item.expression) if item.name in symbols else item
+        for item in system.named
+    )
+    factors = tuple(
+        Parameter(symbol, f"multiplier.{name[2:]}", Spec("1", "factor on a rate"), 1.0)
+        for name, symbol in symbols.items()
+    )
+    return replace(system, named=named, parameters=(*system.parameters, *factors)), labels
+
+
+class Port:
+    """A body as a reservoir in the network, with its present temperature and the heat through its walls."""
+
+    def __init__(self, name: str, node: str, heat_name: str) -> None:
+        self.node, self.heat_name = node, heat_name
+        self.name = name
+        self.reservoir = cantera.Reservoir(cantera.Solution(yaml=STAND_IN, name="body"), clone=False, name=name)
+
+    def warm(self, temperature: float) -> None:
+        """Show a temperature [K] to the walls."""
+        if temperature > 0:
+            self.reservoir.phase.TP = temperature, None
+            self.reservoir.syncState()
+
+    def heat(self) -> float:
+        """Heat [W] that flows into the body through its walls."""
+        return sum(self._through(wall) for wall in self.reservoir.walls)
+
+    def _through(self, wall: Any) -> float:
+        if wall.heat_flux != 0.0:
+            raise InputError(
+                f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U or "
+                f"an emissivity, or prescribe {self.heat_name} under `loading`."
+            )
+        rate = float(wall.heat_rate)
+        return -rate if wall.left_reactor is self.reservoir else rate

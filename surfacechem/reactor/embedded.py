@@ -1,0 +1,131 @@
+"""A scene whose surroundings are given while it runs: assembled, compiled and evaluated for a reactor of a network."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from surfacechem.assembly import assemble
+from surfacechem.case import Case
+from surfacechem.errors import InputError, suggestion
+from surfacechem.integrate import Model, Run
+from surfacechem.reactor import coupling
+from surfacechem.solvers.contract import Array
+from surfacechem.solvers.evaluation import Evaluation
+from surfacechem.system import System
+
+FOREVER = 1e300
+"""End of the last piece of time [s]."""
+
+
+DIFFERENCE = 1e-7
+"""Cantera's integrator differentiates by steps of about this size, which bounds must not take for the solution."""
+
+
+WIDER = 5
+"""How often the range of a fluid's properties is doubled and more."""
+
+
+class EndError(Exception):
+    """The scene does not go on at a state, with the reason in words."""
+
+
+def _refuse_jumps(system: System) -> None:
+    if system.transitions:
+        reasons = "; ".join(dict.fromkeys(item.reason for item in system.transitions))
+        raise InputError(f"the scene jumps ({reasons}), which a reactor network does not follow. Run the case alone.")
+
+
+def _widest(system: System, values: dict[str, float]) -> dict[str, float]:
+    """The values with the properties of a fluid for as many temperatures as there are, since a network runs once."""
+    fit = system.fit
+    if fit is None:
+        return values
+    values = fit.started(values)
+    for _ in range(WIDER):
+        wider = fit.wider(values, np.array([values[end] for end in fit.bounds]))
+        values = wider or values
+    return values
+
+
+class EmbeddedScene:
+    """The scene of a case with what the network gives it: temperatures of reactors, heat, factors on its rates.
+
+    The variables are the differential states and then the ledger, in SI units per area; the parameters are those of
+    the present piece of time.
+    """
+
+    def __init__(self, case: Case, reactors: Mapping[str, Any], heated: Iterable[str]) -> None:
+        self.case = case
+        try:
+            scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
+            system, self.reactions = coupling.with_multipliers(assemble(scene))
+            _refuse_jumps(system)
+            self.model = Model(system)
+            self.values = _widest(system, self.model.values())
+            self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)
+        except InputError as error:
+            raise case.located(error) from None
+        self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
+        self.begin_piece(0.0, DIFFERENCE)
+        self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
+        self._position = {parameter.path: j for j, parameter in enumerate(system.parameters)}
+        self.states = tuple(system.states[j].name for j in self.evaluation.free)
+
+    def start(self) -> Array:
+        """Initial values of the variables."""
+        ledger = np.zeros(self.problem.program.n_ledger)
+        return np.concatenate((self.problem.y0[self.evaluation.free], ledger))
+
+    @property
+    def accounts(self) -> tuple[str, ...]:
+        """Names of the ledger's lines."""
+        return tuple(account.quantity.name for account in self.model.system.ledger)
+
+    def account(self, name: str) -> int:
+        """Position among the variables of the heat that a replaced body needs to keep its temperature."""
+        wanted = f"H_T_{coupling.suffix_of(self.case.scene, name)}"
+        if wanted not in self.accounts:
+            message = f"no heat flows into {name}, so no reactor can take its place. Give it a path under `heat`."
+            raise InputError(message)
+        return len(self.states) + self.accounts.index(wanted)
+
+    def give(self, path: str, value: float) -> None:
+        """Set a parameter of the present piece of time."""
+        self.evaluation.parameters[self._position[path]] = value
+
+    def rates(self, t: float, x: Array) -> Array:
+        """Time derivatives of the variables; EndError where there are none, or a limit of the scene is passed."""
+        evaluation = self.evaluation
+        if not evaluation.put(t, x[: len(self.states)]):
+            raise EndError("no state satisfies the equations")
+        closed = self._terminal & ~(evaluation.margins() >= 0)
+        if closed.any():
+            raise EndError(self.model.margins[int(closed.argmax())].reason)
+        return evaluation.rates()
+
+    def quantity(self, name: str, t: float, x: Array) -> float:
+        """A state or a named quantity in SI units."""
+        evaluation, system = self.evaluation, self.model.system
+        evaluation.put(t, x[: len(self.states)])
+        found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
+        if name in found:
+            return float(found[name])
+        names = [item.name for item in system.outputs]
+        if name not in names:
+            raise InputError(f"the scene has no quantity '{name}'.{suggestion(name, [*found, *names])}")
+        return float(self.model.output_function(evaluation.inputs)[names.index(name)])
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times [s] at which a history or its slope jumps."""
+        return tuple(float(t) for t in self.problem.segments[1:-1])
+
+    def begin_piece(self, t: float, rtol: float) -> None:
+        """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
+        run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
+        table = self.model.problem(run, self.values).parameters
+        self.evaluation.parameters[:] = table[bisect_right(self.breakpoints, t)]

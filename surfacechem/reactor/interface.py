@@ -1,0 +1,210 @@
+"""The reactor that holds a scene."""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import cantera
+import numpy as np
+
+from surfacechem import case as cases
+from surfacechem.case import Case
+from surfacechem.errors import InputError
+from surfacechem.reactor.coupling import Port, node_of, suffix_of
+from surfacechem.reactor.embedded import EmbeddedScene, EndError
+from surfacechem.reactor.history import History
+from surfacechem.simulation import Simulation
+from surfacechem.solvers.cantera_network import BackOffError, HeldReactor, contents
+from surfacechem.solvers.contract import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+LEDGER_UNIT = 1e100
+"""Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
+
+LOCATED = 1e-12
+"""Relative distance in time at which the end of a scene counts as found."""
+
+
+class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing went wrong
+    """The scene ends here, with the reason in words."""
+
+
+class InterfaceReactor(HeldReactor):
+    """An interface between two bodies as a reactor of a Cantera network.
+
+    ``case`` is a case file, the name of a shipped case, a Case or a Simulation; ``overrides`` change it as in
+    ``surfacechem.load``. ``area`` [m^2] turns what the scene counts per area into what the network counts. ``bodies``
+    names reactors that take the place of bodies: {body: reactor}. InputError where the scene does not allow it.
+    """
+
+    scene: EmbeddedScene
+
+    def __new__(
+        cls,
+        case: str | Path | Case | Simulation,
+        *,
+        bodies: Mapping[str, Any] | None = None,
+        overrides: Sequence[str] | Mapping[str, object] = (),
+        name: str = "interface",
+        **_: Any,
+    ) -> Self:
+        """Read the scene, whose reactions Cantera has to know from the start."""
+        scene = EmbeddedScene(_case(case, overrides), bodies or {}, ())
+        made = super().__new__(cls, contents(scene.reactions or ("bond",)), name=name)
+        made.scene = scene
+        return made
+
+    def __init__(
+        self,
+        case: str | Path | Case | Simulation,
+        *,
+        area: float = 1.0,
+        bodies: Mapping[str, Any] | None = None,
+        overrides: Sequence[str] | Mapping[str, object] = (),
+        name: str = "interface",
+    ) -> None:
+        super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
+        if not area > 0:
+            raise InputError(f"area = {area} is outside its range: > 0.")
+        self.area, self.bodies = float(area), dict(bodies or {})
+        self.ports: dict[str, Port] = {}
+        self.passes_breakpoints = False
+        """Whether the network looks after breakpoints."""
+        self.t = 0.0
+        self.evaluations, self.seconds = 0, 0.0
+        self._take_up(self.scene)
+        for body, reactor in self.bodies.items():
+            self._connect(reactor, self.scene.account(body))
+
+    def __repr__(self) -> str:
+        """Title and states in a line."""
+        return f"<InterfaceReactor {self.name!r}: {self.scene.case.title!r}, {', '.join(self.scene.states)}>"
+
+    def _take_up(self, scene: EmbeddedScene) -> None:
+        self.scene = scene
+        self.names = (*scene.states, *(f"{account} / {LEDGER_UNIT:g}" for account in scene.accounts))
+        self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
+        self.x = scene.start()
+        self.reason = ""
+        self._last: tuple[float, Array, Array] | None = None
+        """Time, variables and rates of the last evaluation."""
+        self._current = False
+        """Whether that is of the variables last put."""
+        self.history = History(scene)
+
+    def _connect(self, reactor: Any, account: int) -> None:
+        """What must be given to the body to keep the reactor's temperature, the reactor loses."""
+        cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
+
+    def body(self, name: str) -> Any:
+        """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat."""
+        case = self.scene.case
+        if name not in self.ports:
+            if self.evaluations:
+                raise InputError(f"a wall on {name} comes too late: put it there before the network runs.")
+            node = node_of(case.scene, name)
+            if node not in self.scene.states:
+                raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
+            port = Port(name, node, f"Q_{suffix_of(case.scene, name)}")
+            self._take_up(EmbeddedScene(case, self.bodies, [*self.ports, name]))
+            self.ports[name] = port
+            self.put(self.start())
+        return self.ports[name].reservoir
+
+    # -- the network's view -------------------------------------------------------------------------------------------
+
+    def start(self) -> Array:
+        return np.asarray(self.x / self.unit)
+
+    def put(self, x: Array) -> None:
+        self.x, self._current = x * self.unit, False
+        for port in self.ports.values():
+            port.warm(float(self.x[self.scene.states.index(port.node)]))
+
+    def rates(self, t: float) -> Array:
+        began = time.perf_counter()
+        self._check_piece(t)
+        rates = np.asarray(self._rates(t) / self.unit)
+        self.evaluations += 1
+        self.seconds += time.perf_counter() - began
+        return rates
+
+    def _rates(self, t: float) -> Array:
+        """Rates [SI per s] for the values last put. Where there are none the integrator comes closer, up to the end."""
+        if self._current and self._last is not None and self._last[0] == t:
+            return self._last[2]
+        self._listen()
+        try:
+            rates = self.scene.rates(t, self.x)
+        except EndError as end:
+            stop = f"{end} at t = {t:.9g} s"
+            if self._last is None or abs(t - self._last[0]) <= LOCATED * abs(t):
+                self.reason, self.error = stop, InterfaceStopped(stop)
+            raise self.error or BackOffError(stop) from None
+        self._last, self._current = (t, self.x, rates), True
+        return rates
+
+    def _listen(self) -> None:
+        """Take over temperatures, heats and multipliers from the network."""
+        for name, reactor in self.bodies.items():
+            self.scene.give(f"loading.T_{suffix_of(self.scene.case.scene, name)}.level", reactor.T)
+        for port in self.ports.values():
+            self.scene.give(f"loading.{port.heat_name}.level", port.heat() / self.area)
+        for i, label in enumerate(self.scene.reactions):
+            self.scene.give(f"multiplier.{label}", self.surface.multiplier(i))
+
+    def _check_piece(self, t: float) -> None:
+        breakpoints = self.scene.breakpoints
+        following = bisect_right(breakpoints, self.t)
+        if not self.passes_breakpoints and following < len(breakpoints) and t > breakpoints[following]:
+            raise InputError(
+                f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
+                "over. Use surfacechem.reactor.ReactorNet."
+            )
+
+    def begin_piece(self, t: float, rtol: float) -> None:
+        """Go on with the pieces of the histories that hold from time t [s] on, at a relative tolerance."""
+        self.t, self._current = t, False
+        self.scene.begin_piece(t, rtol)
+
+    def end(self) -> None:
+        """Go back to the last state before the end of the scene, and keep it."""
+        if self._last is not None:
+            t, self.x, _ = self._last
+            self.record(t)
+
+    # -- results ------------------------------------------------------------------------------------------------------
+
+    def __getitem__(self, name: str) -> float:
+        """Present value, in SI units, of a state or of a named quantity of the scene."""
+        self._listen()
+        return self.scene.quantity(name, self.t, self.x)
+
+    @property
+    def seconds_per_rate(self) -> float:
+        """Mean time of one evaluation of the rates [s], what surrounds the interface included."""
+        return self.seconds / max(self.evaluations, 1)
+
+    def record(self, t: float) -> None:
+        """Keep the present state, at time t [s], for the dataset."""
+        self.t = t
+        self._listen()
+        self.history.append(t, self.x)
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """What was recorded, with the variables and attributes of a run."""
+        alone = not self.bodies and not self.ports
+        return self.history.solution(self.reason, self.seconds, alone=alone).dataset
+
+
+def _case(case: str | Path | Case | Simulation, overrides: Sequence[str] | Mapping[str, object]) -> Case:
+    if isinstance(case, Simulation):
+        return case.case
+    return case if isinstance(case, Case) else cases.load(case, overrides)

@@ -1,0 +1,56 @@
+"""Autocatalytic cure with the heat of reaction in the bodies, for both energy models."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from surfacechem.errors import InputError
+from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.references._separable import Separable
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+
+class Cure(Reference):
+    """Kamal and Sourour's rate; a subclass states the temperature."""
+
+    A_1: float = parameter("1/s", "pre-exponential factor of the uncatalysed reaction", at_least=0)
+    E_1: float = parameter("J/mol", "activation energy of the uncatalysed reaction", default=0.0, at_least=0)
+    A_2: float = parameter("1/s", "pre-exponential factor of the autocatalytic reaction", at_least=0)
+    E_2: float = parameter("J/mol", "activation energy of the autocatalytic reaction", default=0.0, at_least=0)
+    m: float = parameter("1", "order of the autocatalysis", default=1.0, above=0)
+    n: float = parameter("1", "order of the reaction", default=1.0, at_least=1)
+    T_i: float = parameter("K", "initial temperature", above=0)
+    delta_T: float = parameter("K", "heat of reaction over the heat capacity at T_0", default=0.0, at_least=0)
+    phi_i: float = parameter("1", "initial degree of cure", default=0.0, at_least=0, at_most=1)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot start."""
+        super().__post_init__()
+        if self.A_1 == 0.0 and (self.phi_i == 0.0 or self.A_2 == 0.0):
+            raise InputError(f"{self.name}: nothing starts the reaction; A_1 or phi_i and A_2 must be above zero.")
+
+    @abstractmethod
+    def temperature(self, cured: Array) -> Array:
+        """Temperature when phi has grown by ``cured``."""
+
+    def rate(self, cured: Array, left: Array) -> Array:
+        """Rate of phi [1/s] when it has grown by ``cured`` and is short of one by ``left``."""
+        RT = GAS_CONSTANT * self.temperature(cured)
+        k_1, k_2 = self.A_1 * np.exp(-self.E_1 / RT), self.A_2 * np.exp(-self.E_2 / RT)
+        return np.asarray((k_1 + k_2 * (self.phi_i + cured) ** self.m) * left**self.n)
+
+    @cached_property
+    def _path(self) -> Separable:
+        return Separable(self.rate, 1.0 - self.phi_i)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        if self.phi_i == 1.0:
+            return {"phi": 1.0, "unreacted": 0.0, "T": self.T_i, "phi_dot": 0.0}
+        cured, left = self._path.position(t)
+        phi = np.where(left < 0.5, 1.0 - left, self.phi_i + cured)
+        return {"phi": phi, "unreacted": left, "T": self.temperature(cured), "phi_dot": self.rate(cured, left)}

@@ -1,0 +1,91 @@
+r"""Autonomous equations of one variable, integrated by quadrature and inverted to rounding.
+
+The variable runs from a start to an end that it may reach or only approach. It is known by its distances from both, so
+that neither end loses digits. Gauss panels shrink geometrically towards both ends and towards any point at which the
+rate nearly vanishes, so that no singularity is closer to a panel than its length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.references._roots import increasing_root
+from surfacechem.references.base import Array
+
+POINTS = 18
+HALVINGS = 800
+SOON = 1e-300
+"""Times [s] below this count as zero."""
+
+NEAR = 60
+"""Halvings towards a point inside; below 2^-60 of the span it is no longer resolved."""
+
+Rate = Callable[[Array, Array], Array]
+"""Rate at which the distance covered grows, from the distances to the start and to the end; positive between them."""
+
+
+class Separable:
+    """Times along a path of given length."""
+
+    def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
+        self.rate, self.length, self.hard = rate, length, tuple(hard)
+        self.nodes, self.weights = np.polynomial.legendre.leggauss(POINTS)
+
+    @cached_property
+    def _panels(self) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """First and last distance of each panel and which of them count from the end."""
+        half, powers = 0.5 * self.length, 0.5 ** np.arange(HALVINGS + 1.0)
+        points = np.concatenate([[0.0], half * powers[::-1]])
+        early = self._refined(points, [at for at in self.hard if at < half])
+        late = self._refined(points, [self.length - at for at in self.hard if at >= half])[:0:-1]
+        first, last = np.concatenate([early[:-1], late[:-1]]), np.concatenate([early[1:], late[1:]])
+        return first, last, np.arange(len(first)) >= len(early) - 1
+
+    def _refined(self, points: Array, hard: Sequence[float]) -> Array:
+        span = 0.5 * self.length * 0.5 ** np.arange(1.0, NEAR)
+        extra = [at + side * span for at in hard for side in (-1.0, 1.0)]
+        every = np.unique(np.concatenate([points, np.asarray(hard, dtype=float), *extra]))
+        return every[(every >= 0.0) & (every <= 0.5 * self.length)]
+
+    @cached_property
+    def _times(self) -> Array:
+        """Time at which each panel begins, and the end of the last."""
+        first, last, late = self._panels
+        return np.concatenate([[0.0], np.cumsum(self._time(first, last, late))])
+
+    def _time(self, first: Array, last: Array, late: NDArray[np.bool_]) -> Array:
+        """Time between two points of one panel."""
+        middle, half = 0.5 * (first + last)[:, None], 0.5 * (last - first)[:, None]
+        with np.errstate(all="ignore"):  # where the rate overflows no time passes
+            times = np.abs(half) / self._rate(middle + half * self.nodes, late[:, None]) @ self.weights
+        return np.where(first == last, 0.0, times)
+
+    def _rate(self, distance: Array, late: NDArray[np.bool_]) -> Array:
+        rest = self.length - distance
+        return self.rate(np.where(late, rest, distance), np.where(late, distance, rest))
+
+    @property
+    def duration(self) -> float:
+        """Time in which all but 2^-801 of the path is covered."""
+        return float(self._times[-1])
+
+    def position(self, t: Array) -> tuple[Array, Array]:
+        """Distances from the start and from the end at the times t."""
+        first, last, late = self._panels
+        t = np.where(t < SOON, 0.0, t)
+        j = np.clip(np.searchsorted(self._times, t, side="right") - 1, 0, len(first) - 1)
+        start, stop, from_end = first[j], last[j], late[j]
+
+        def elapsed(share: Array) -> tuple[Array, Array]:
+            point = start + share * (stop - start)
+            return self._time(start, point, from_end), np.abs(stop - start) / self._rate(point, from_end)
+
+        target = np.minimum(t, self.duration) - self._times[j]
+        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target))
+        distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
+        rest = self.length - distance
+        return np.where(from_end, rest, distance), np.where(from_end, distance, rest)

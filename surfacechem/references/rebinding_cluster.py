@@ -1,0 +1,180 @@
+"""Parallel bonds that share a constant load and form again: the critical load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.errors import InputError
+from surfacechem.references._cluster import Cluster
+from surfacechem.references._exponentials import remainder
+from surfacechem.references._lambert import lambert_of_exp
+from surfacechem.references._roots import increasing_root
+from surfacechem.references._separable import Separable
+from surfacechem.references.base import Array
+from surfacechem.terms import parameter
+
+FAR = 0.1
+"""Growth of F/phi beyond its critical value from which the two terms of the rate no longer cancel."""
+
+
+@dataclass(frozen=True)
+class Expansion:
+    r"""The rate r about a bonding state, in units of :math:`e^{1+F_*}`: value, slope and all the rest.
+
+    .. math:: r(a+\delta)=r(a)+r'(a)\,\delta+e^{x_a}(a+\delta)(e^{-q}-1+q),\quad x_a=\frac Fa,\quad
+        q=\frac{x_a\delta}{a+\delta}
+    """
+
+    state: float
+    critical_exponent: float
+    apart: float
+    """Critical exponent minus F/a."""
+    value: float
+    slope: float
+
+    def rate(self, delta: Array | float, phi: Array | float) -> Array:
+        """Rate at phi, which is ``delta`` away from the state."""
+        q = (self.critical_exponent - self.apart) * delta / phi
+        rest = math.exp(-self.apart) * phi * remainder(np.asarray(q))
+        return np.asarray(self.value + self.slope * delta + rest)
+
+    def derivative(self, delta: Array) -> Array:
+        """Derivative of the rate."""
+        exponent = self.critical_exponent - self.apart
+        q = exponent * delta / (self.state + delta)
+        curved = remainder(np.asarray(q)) - np.expm1(-q) * exponent * self.state / (self.state + delta)
+        return np.asarray(self.slope + math.exp(-self.apart) * curved)
+
+
+class RebindingCluster(Cluster):
+    r"""Bonds that share a constant traction and form again where no load acts.
+
+    .. math:: \dot\phi=-k_{off}\,r(\phi),\quad r=\phi e^{F/\phi}-\gamma(1-\phi),\quad F=\frac{t_nx_{off}}{n_ck_BT},\quad
+        \gamma=\frac{k_{on}}{k_{off}}
+
+    A steady state exists up to the critical load :math:`F_*=W_0(\gamma/e)`, where
+    :math:`\phi_*=\frac{F_*}{1+F_*}`. Above it the cluster breaks; just above, after
+    :math:`\pi\sqrt{2/(e^{F_*/\phi_*}(F-F_*)r''(\phi_*))}/k_{off}`. The way to the steady state and that to rupture are
+    quadratures, inverted to rounding. The rate is written about the critical state in terms that do not cancel, so that
+    a lifetime is known to the rounding of F over its distance from :math:`F_*`.
+
+    Source: Erdmann & Schwarz (2004), J. Chem. Phys. 121, 8997, doi 10.1063/1.1805496; Bell (1978), Science 200, 618.
+
+    >>> site = 1e14 * 1.380649e-23 * 300.0 / 4e-10
+    >>> cluster = RebindingCluster(k_off=1.0, k_on=1.0, x_off=4e-10, T=300.0, n_c=1e14, t_n=0.3 * site)
+    >>> f"{cluster.critical_load:.10f}, {cluster.critical_state:.10f}, {cluster.end_time:.6f} s"
+    '0.2784645428, 0.2178117057, 3.163522 s'
+    """
+
+    name: ClassVar[str] = "rebinding-cluster"
+
+    k_on: float = parameter("1/s", "rate at which free sites bond", above=0)
+
+    @property
+    def critical_load(self) -> float:
+        """Largest force per site, in units of the force scale, that has a steady state: F_*."""
+        return float(lambert_of_exp(np.array(math.log(self.k_on / self.k_off) - 1.0)))
+
+    @property
+    def critical_traction(self) -> float:
+        """Largest traction [Pa] that has a steady state."""
+        return self.critical_load * self.n_c * self.force_scale
+
+    @property
+    def critical_state(self) -> float:
+        """Bonding state at the critical load."""
+        return self.critical_load / (1.0 + self.critical_load)
+
+    @property
+    def breaks(self) -> bool:
+        """Whether the cluster goes to rupture, not to its steady state."""
+        below = self.phi_i < self.critical_state and bool(
+            self._critical.rate(self.phi_i - self.critical_state, self.phi_i) > 0.0
+        )
+        return self.load > self.critical_load or below
+
+    @property
+    def end_time(self) -> float:
+        """Time [s] at which the last bond breaks; infinite where there is a steady state."""
+        return self._path.duration / self.k_off if self.breaks else math.inf
+
+    @property
+    def steady_state(self) -> float:
+        """The stable bonding state below the critical load; InputError above it."""
+        return self.critical_state + self._above_critical
+
+    @property
+    def passage_time(self) -> float:
+        """Asymptotic lifetime [s] just above the critical load, from where the cluster is slowest."""
+        exponent = 1.0 + self.critical_load
+        curvature = math.exp(exponent) * exponent**2 / self.critical_state
+        distance = math.exp(exponent) * (self.load - self.critical_load)
+        return math.pi * math.sqrt(2.0 / (distance * curvature)) / self.k_off
+
+    @property
+    def _critical(self) -> Expansion:
+        return self._about(0.0)
+
+    def _about(self, d: float) -> Expansion:
+        """The rate about the state that is ``d`` above the critical one."""
+        state, exponent, below = self.critical_state + d, 1.0 + self.critical_load, self.critical_load - self.load
+        apart = (exponent * d + below) / state  # critical exponent minus that of this state
+        slope = -self.critical_load * math.expm1(-apart) + apart * math.exp(-apart)
+        value = -self.critical_state * -math.expm1(-below / self.critical_state) if d == 0.0 else 0.0
+        return Expansion(state, exponent, apart, value, slope)
+
+    @cached_property
+    def _above_critical(self) -> float:
+        """Distance of the stable state from the critical one."""
+        if self.load > self.critical_load:
+            raise InputError(f"{self.name}: no steady state above t_n = {self.critical_traction!r} Pa.")
+        expansion = self._critical
+        target = np.array([-expansion.value])
+        if target[0] == 0.0:
+            return 0.0
+
+        def distance(d: Array) -> tuple[Array, Array]:
+            return expansion.rate(d, self.critical_state + d) - expansion.value, expansion.derivative(d)
+
+        top = np.array([1.0 - self.critical_state])
+        return float(increasing_root(distance, target, np.zeros(1), top)[0])
+
+    @cached_property
+    def _path(self) -> Separable:
+        """The way from the start to rupture or to the steady state, in units of 1/k_off."""
+        if self.breaks:
+            return Separable(self._rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
+        end = self._about(self._above_critical)
+        side = math.copysign(1.0, self.phi_i - self.steady_state)
+
+        def relaxing(_: Array, left: Array) -> Array:
+            return side * self._scale * end.rate(side * left, self.steady_state + side * left)
+
+        return Separable(relaxing, abs(self.phi_i - self.steady_state))
+
+    @property
+    def _scale(self) -> float:
+        return math.exp(1.0 + self.critical_load)
+
+    def _rupture(self, gone: Array, left: Array) -> Array:
+        """Rate at which bonds break; far above the critical load its two terms do not cancel."""
+        if self.load > self.critical_load + FAR * self.critical_state:
+            return left * np.exp(self.load / left) - self.k_on / self.k_off * (1.0 - left)
+        delta = np.where(gone < left, self.phi_i - self.critical_state - gone, left - self.critical_state)
+        return self._scale * self._critical.rate(delta, left)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        if not self.breaks and self.phi_i == self.steady_state:
+            phi: Array | float = self.phi_i
+        else:
+            covered, left = self._path.position(self.k_off * t)
+            end = 0.0 if self.breaks else self.steady_state
+            toward = math.copysign(1.0, end - self.phi_i)
+            phi = np.where(covered < left, self.phi_i + toward * covered, end - toward * left)
+        return {"phi": phi, "f": self.t_n / (self.n_c * np.asarray(phi))}

@@ -1,0 +1,78 @@
+"""A program at one state after another, for a library that calls from Python: no array is made twice."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from surfacechem.compile import Function, Program
+from surfacechem.solvers import stepper
+from surfacechem.solvers.contract import Array
+from surfacechem.solvers.radau import END, search_arguments
+
+CODE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class Evaluation:
+    """State, derivatives and parameters of a program in one buffer, made consistent by :meth:`put`.
+
+    ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from where they were last.
+    """
+
+    def __init__(self, program: Program, y: Array, parameters: Array) -> None:
+        n = program.n
+        self.program = program
+        self.inputs = np.concatenate(([0.0], y, np.zeros(n), parameters))
+        self.y, self.ydot, self.parameters = (
+            self.inputs[1 : n + 1],
+            self.inputs[n + 1 : 2 * n + 1],
+            self.inputs[2 * n + 1 :],
+        )
+        self.free = np.flatnonzero(~program.algebraic_mask)
+        self._algebraic = np.flatnonzero(program.algebraic_mask)
+        self._guess = y[self._algebraic]
+        self._counts = np.zeros((1, 10), np.int64)
+        self._search = stepper.run_batch()
+        ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
+        self._arguments = search_arguments(program, ends, table, self._counts)
+        self._ledger = _Code(program.ledger, self.inputs)
+        self._margins = _Code(program.margins, self.inputs)
+
+    def put(self, t: float, differential: Array) -> bool:
+        """Go to a state; whether derivatives and algebraic variables were found there."""
+        self.inputs[0] = t
+        self.y[self.free] = differential
+        self.y[self._algebraic] = self._guess
+        self.ydot[:] = 0.0
+        self._counts[:] = 0
+        self.program.filled(self.inputs)
+        self._search(*self._arguments)
+        found = bool(self._counts[0, END] == 0)
+        if found:
+            self._guess = self.y[self._algebraic]
+        return found
+
+    def rates(self) -> Array:
+        """Derivatives of the differential variables and of the ledger."""
+        return np.concatenate((self.ydot[self.free], self._ledger()))
+
+    def margins(self) -> Array:
+        """Values of the margins."""
+        return self._margins()
+
+
+class _Code:
+    """A compiled function of a fixed buffer."""
+
+    def __init__(self, function: Function | None, inputs: Array) -> None:
+        self.out = np.zeros(function.n_out if function else 0)
+        self._call: Any = CODE(function.address) if function else None
+        self._arguments = (self.out.ctypes.data, inputs.ctypes.data, function.user) if function else ()
+        self._keep = function
+
+    def __call__(self) -> Array:
+        if self._call is not None:
+            self._call(*self._arguments)
+        return self.out

@@ -1,0 +1,232 @@
+"""A sweep as a labelled dataset: every quantity over the swept parameters, how each run ended, errors and run time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.quantities import Quantity
+from surfacechem.solution import CONVENTIONS, DATASET_NAMES, Column, replacing, versions, write_netcdf
+from surfacechem.sweeps import Axis, Plan, Sweep
+from surfacechem.system import System
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+WORDS = {"mode": "most probable", "median": "median", "mean": "mean"}
+
+
+@dataclass(frozen=True)
+class SweepAccuracy:
+    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
+
+    errors: Array
+    source: str
+    exact: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, repr=False)
+class SweepSolution:
+    """What a sweep hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
+
+    sweep: Sweep
+    title: str = ""
+    source: str = ""
+    case: str = ""
+    mechanism: str = ""
+    accuracy: SweepAccuracy | None = None
+    changes: Mapping[str, float] = field(default_factory=dict)
+    """Parameters and initial values that differ from the case, by path."""
+
+    def __repr__(self) -> str:
+        """Title, size and ends in a line."""
+        return f"<SweepSolution {self.title!r}: {len(self.sweep)} runs, {self.ends}>"
+
+    @property
+    def plan(self) -> Plan:
+        """What was swept."""
+        return self.sweep.plan
+
+    @property
+    def system(self) -> System:
+        """The assembled equations."""
+        return self.sweep.model.system
+
+    @property
+    def ends(self) -> str:
+        """How many runs ended in which way, in words."""
+        every = [status for status, _ in self.sweep.ends]
+        return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
+
+    @property
+    def status(self) -> str:
+        """'failed' if a run failed numerically, else 'finished'; that physics stops a run is a result of a sweep."""
+        return "failed" if any(status == "failed" for status, _ in self.sweep.ends) else "finished"
+
+    @cached_property
+    def axes(self) -> dict[str, Axis]:
+        """The swept parameters by the names of their dimensions."""
+        taken = {*self.sweep.named, "time"}
+        axes: dict[str, Axis] = {}
+        for axis in self.plan.axes:
+            parts = [
+                p.replace("-", "_").replace("[", "_").strip("]") for p in axis.path.removesuffix(".level").split(".")
+            ]
+            names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
+            axes[next((name for name in names if name not in taken | set(axes)), f"{names[-1]}_swept")] = axis
+        return axes
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Every variable of the dataset, the coordinates first."""
+        return (*self._coordinates(), *self._along(), *self._of_runs(), *self._statistics())
+
+    @property
+    def inner(self) -> str:
+        """The dimension along each run: time, or the load that all runs grow to."""
+        return self.plan.until[0] if self.plan.until else "time"
+
+    def _coordinates(self) -> list[Column]:
+        columns = []
+        for name, axis in self.axes.items():
+            unit, text = self._meaning(axis.path)
+            columns.append(Column(name, (name,), np.asarray(axis.values, dtype=float), unit, text))
+        times = self.sweep.times
+        if self.plan.until is None:
+            return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]
+        quantity = self._quantities[self.inner]
+        start = float(self.sweep.named[self.inner][0, 0])
+        load = start + (self.plan.until[1] - start) * times[0] / times[0, -1]
+        return [
+            *columns,
+            Column(self.inner, (self.inner,), load, quantity.unit, quantity.long_name),
+            Column("time", (*self.axes, self.inner), self._shaped(times), "s", "time since the start"),
+        ]
+
+    def _meaning(self, path: str) -> tuple[str, str]:
+        """Unit and long name of a swept value."""
+        state = next((s for s in self.system.states if path == f"initial.{s.name}"), None)
+        if state is not None:
+            return state.quantity.unit, f"initial {state.quantity.long_name}"
+        spec = next(p.spec for p in self.system.parameters if p.path == path)
+        return spec.unit, f"{spec.text} ({path})"
+
+    @property
+    def _quantities(self) -> dict[str, Quantity]:
+        states = {state.name: state.quantity for state in self.system.states}
+        return states | {item.name: item.quantity for item in self.system.outputs}
+
+    def _shaped(self, values: Array) -> Array:
+        """Values whose first axis is the run, with one axis for each swept parameter."""
+        return values.reshape(*self.plan.shape, *values.shape[1:])
+
+    def _along(self) -> list[Column]:
+        dimensions = (*self.axes, self.inner)
+        return [
+            Column(
+                DATASET_NAMES.get(name, name),
+                dimensions,
+                self._shaped(self.sweep.named[name]),
+                q.unit,
+                q.long_name,
+                q.tag,
+            )
+            for name, q in self._quantities.items()
+            if name != self.inner
+        ]
+
+    def _of_runs(self) -> list[Column]:
+        sweep, batch = self.sweep, self.sweep.batch
+        words = [np.array([end[k] for end in sweep.ends], dtype=object) for k in (0, 1)]
+        rows = [
+            ("status", words[0], "1", "how the run ended"),
+            ("reason", words[1], "1", "why the run ended"),
+            ("time_reached", batch.t, "s", "time that the run reached"),
+            ("steps", batch.steps.astype(float), "1", "steps of the run"),
+            ("energy_error", sweep.energy_error, "1", "largest energy residual relative to the energy exchanged"),
+        ]
+        if self.accuracy:
+            rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))
+        return [Column(name, tuple(self.axes), self._shaped(values), unit, text) for name, values, unit, text in rows]
+
+    def _statistics(self) -> list[Column]:
+        columns = []
+        exact = self.accuracy.exact if self.accuracy else {}
+        for which, word in WORDS.items() if self.sweep.statistics else ():
+            quantity = self._quantities[self.inner]
+            found = np.array([getattr(statistics, which) for statistics in self.sweep.statistics])
+            text = f"{word} {quantity.long_name} at rupture"
+            for suffix, values in (("", found), ("_exact", exact.get(which))):
+                if values is not None:
+                    name = f"{self.inner}_{which}{suffix}"
+                    label = f"exact {text}" if suffix else text
+                    columns.append(Column(name, tuple(self.axes), self._shaped(values), quantity.unit, label))
+        return columns
+
+    @cached_property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+        sweep, run = self.sweep, self.sweep.run
+        error: dict[str, str | float] = {}
+        if self.accuracy:
+            error = {"error": float(np.max(self.accuracy.errors)), "error_source": self.accuracy.source}
+        return {
+            "Conventions": CONVENTIONS,
+            "title": self.title,
+            "source": self.source or "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
+            "case": self.case,
+            **({"mechanism": self.mechanism} if self.mechanism else {}),
+            "sweep": json.dumps(_recorded(self.plan)),
+            **({"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}),
+            "status": self.status,
+            "reason": self.ends,
+            "regime": self.system.regime,
+            "solver": run.solver,
+            "rtol": float(run.rtol),
+            "runs": len(sweep),
+            "count_steps": int(sweep.batch.steps.sum()),
+            "run_seconds": float(sweep.seconds),
+            "compile_seconds": float(sweep.model.compile_seconds),
+            **error,
+            "energy_error": float(np.max(sweep.energy_error)),
+            "versions": versions(),
+        }
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The sweep as an xarray Dataset."""
+        import xarray
+
+        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
+        coordinates = {name: data.pop(name) for name in (*self.axes, *dict.fromkeys((self.inner, "time")))}
+        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
+
+    def write(self, path: str | Path) -> Path:
+        """Save as netCDF; the file appears whole or not at all."""
+        target = Path(path)
+        with replacing(target) as temporary:
+            write_netcdf(temporary, self.columns, self.attributes)
+        return target
+
+
+def _recorded(plan: Plan) -> dict[str, object]:
+    axes = [{"path": a.path, "values": list(a.values), "logarithmic": a.logarithmic} for a in plan.axes]
+    return {"axes": axes, "until": list(plan.until) if plan.until else None}
+
+
+def recorded_plan(text: str) -> Plan:
+    """The plan that an attribute ``sweep`` records."""
+    content = json.loads(text)
+    until = content["until"]
+    return Plan([Axis(**axis) for axis in content["axes"]], (until[0], until[1]) if until else None)

@@ -1,0 +1,88 @@
+"""The sweep of a case: runs, and how far each of them is from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import references, sweeps
+from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
+from surfacechem.case import Case, Reference
+from surfacechem.errors import InputError
+from surfacechem.integrate import Model
+from surfacechem.references._start import Start
+from surfacechem.references.matching import exact_values, match, renamed
+from surfacechem.spectrum import Statistics
+from surfacechem.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
+from surfacechem.sweeps import Plan, Sweep, prepared
+
+__all__ = ["prepared", "sweep"]
+
+Array = NDArray[np.float64]
+
+
+def sweep(case: Case, model: Model, plan: Plan, changes: Mapping[str, float], threads: int | None) -> SweepSolution:
+    """Run the plan with the settings of the case; ``model`` is that of the prepared system."""
+    done = sweeps.solve(model, plan, case.run, changes, threads)
+    accuracy = _accuracy(case, done, changes, threads)
+    return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", accuracy, changes)
+
+
+def _accuracy(case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None) -> SweepAccuracy:
+    if case.reference is None:
+        return _against_tighter(done, changes, threads)
+    try:
+        return _against_exact(case, done, case.reference)
+    except InputError as error:
+        estimate = _against_tighter(done, changes, threads)
+        unused = f"the exact solution {case.reference.name} is not of this scene: {error.message}"
+        return replace(estimate, source=f"{estimate.source}; {unused}")
+
+
+def _against_exact(case: Case, done: Sweep, named: Reference) -> SweepAccuracy:
+    """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs."""
+    for i in {0, len(done) - 1}:
+        exact_values(named.name, named.options, case.scene, done[i])
+    errors = np.zeros(len(done))
+    found: dict[str, list[float]] = {which: [] for which in WORDS if done.statistics}
+    for i in range(len(done)):
+        reference = match(references.get(named.name), named.options, Start(done[i], case.scene))
+        for which, values in found.items():
+            values.append(getattr(reference, which))
+        errors[i] = _of_statistics(done, i, reference) if found else _of_quantities(done, i, reference)
+    return SweepAccuracy(errors, f"exact solution {named.name}", {which: np.array(v) for which, v in found.items()})
+
+
+def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
+    """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
+    pairs = [(getattr(done.statistics[i], which), getattr(exact, which)) for which in WORDS]
+    return float(max(abs(ours - true) / abs(true) if true else abs(ours) for ours, true in pairs))
+
+
+def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> float:
+    """Largest error of states and named quantities."""
+    run, reached = done[i], done.reached[i]
+    states = {state.name for state in done.model.system.states}
+    exact = renamed(reference.solution(run.result.times), run)
+    ours = {name: done.named[name][i][reached] for name in exact}
+    return max(relative_error(ours[name], exact[name], FLOOR if name in states else 1.0) for name in exact)
+
+
+def _against_tighter(done: Sweep, changes: Mapping[str, float], threads: int | None) -> SweepAccuracy:
+    """Errors of states and statistics, estimated from a second sweep."""
+    other = second_tolerance(done.run.rtol)
+    atol = None if done.run.atol is None else done.run.atol * other / done.run.rtol
+    second = sweeps.solve(done.model, done.plan, replace(done.run, rtol=other, atol=atol), changes, threads)
+    names = [state.name for state in done.model.system.states]
+    both = done.reached & second.reached
+    errors = np.full(len(done), np.nan)
+    for i in range(len(done)):
+        if done.statistics:
+            errors[i] = _of_statistics(done, i, second.statistics[i])
+        elif np.array_equal(done.reached[i], second.reached[i]):
+            parts = [relative_error(done.named[n][i][both[i]], second.named[n][i][both[i]], FLOOR) for n in names]
+            errors[i] = max(parts)
+    return SweepAccuracy(errors, f"estimate: a second sweep at rtol {other:.0e}")

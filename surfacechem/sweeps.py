@@ -1,0 +1,242 @@
+"""Sweeps: one compiled model over a grid of parameter values, in one call of the compiled loop over runs."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import spectrum
+from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
+from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.solvers.contract import Counters, Problem, Result, Status
+from surfacechem.solvers.radau import Batch, Radau, consistent, solve_many
+from surfacechem.spectrum import Statistics
+from surfacechem.system import System
+
+Array = NDArray[np.float64]
+
+MOST_AXES = 2
+MOST_RUNS = 1_000_000
+USUAL_EVENTS = 4
+"""Events of a run for which there is room at first."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A swept parameter or initial value: its path, its values in SI, and whether they are spaced by ratios."""
+
+    path: str
+    values: Sequence[float]
+    logarithmic: bool = False
+
+    def __post_init__(self) -> None:
+        """Values are at least one, finite and different from each to the next."""
+        if not len(self.values) or not np.all(np.isfinite(self.values)):
+            raise InputError(f"sweep: {self.path} needs finite values, at least one.")
+        if len(set(self.values)) != len(self.values):
+            raise InputError(f"sweep: {self.path} has a value twice.")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is swept. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value."""
+
+    axes: Sequence[Axis]
+    until: tuple[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        """One or two parameters, and no more runs than memory holds."""
+        if not 1 <= len(self.axes) <= MOST_AXES or len({axis.path for axis in self.axes}) != len(self.axes):
+            raise InputError(f"a sweep has one or {MOST_AXES} different parameters, not {len(self.axes)}.")
+        if math.prod(self.shape) > MOST_RUNS:
+            raise InputError(f"a sweep of {math.prod(self.shape)} runs is too large; {MOST_RUNS} at most.")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    @property
+    def points(self) -> list[dict[str, float]]:
+        """The swept values of each run by path, the last axis fastest."""
+        paths = [axis.path for axis in self.axes]
+        return [dict(zip(paths, point, strict=True)) for point in product(*(axis.values for axis in self.axes))]
+
+
+def prepared(system: System, plan: Plan) -> System:
+    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
+    if plan.until is None:
+        return system
+    spectrum.history(system, plan.until[0])
+    return spectrum.with_rupture(system, plan.until[0]) if spectrum.breaks_bonds(system) else system
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Runs over a grid, in the order of :attr:`Plan.points`."""
+
+    model: Model
+    plan: Plan
+    run: Run
+    values: Sequence[Mapping[str, float]]
+    problems: Sequence[Problem]
+    batch: Batch
+    seconds: float
+    """Run time of the whole batch."""
+    exact: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.problems)
+
+    def __getitem__(self, i: int) -> Trajectory:
+        """One run."""
+        problem, batch, n = self.problems[i], self.batch, int(self.batch.counts[i])
+        result = Result(
+            problem=problem,
+            status=Status(int(batch.status[i])),
+            t=float(batch.t[i]),
+            y=batch.y[i],
+            ydot=batch.ydot[i],
+            ledger=batch.ledger[i],
+            margins=batch.margins[i],
+            times=problem.times[:n],
+            outputs=batch.outputs[i, :n],
+            ledger_outputs=batch.ledger_outputs[i, :n],
+            events=batch.events[i],
+            counters=Counters(steps=int(batch.steps[i])),
+        )
+        run = replace(self.run, times=tuple(problem.times.tolist()))
+        return Trajectory(
+            self.model, run, result, self.values[i], *self.model.verdict(result, self.values[i]), self.seconds
+        )
+
+    @cached_property
+    def ends(self) -> list[tuple[str, str]]:
+        """Status and reason of each run."""
+        return [(self[i].status, self[i].reason) for i in range(len(self))]
+
+    @cached_property
+    def rates(self) -> Array:
+        """Time derivatives of the states at the outputs, [run, output, state]; not set where a run did not arrive."""
+        return self._inputs[:, :, 1 + self.model.program.n : 1 + 2 * self.model.program.n]
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which outputs each run reached, [run, output]."""
+        return np.arange(self.batch.outputs.shape[1]) < self.batch.counts[:, None]
+
+    @cached_property
+    def times(self) -> Array:
+        """Output times [s], [run, output]."""
+        return np.array([problem.times for problem in self.problems])
+
+    @cached_property
+    def _inputs(self) -> Array:
+        """Arguments of compiled functions at every output, zero where a run did not arrive."""
+        program, (runs, outputs, n) = self.model.program, self.batch.outputs.shape
+        table = np.zeros((runs, outputs, program.n_inputs))
+        for i, problem in enumerate(self.problems):
+            piece = np.searchsorted(problem.segments[1:-1], problem.times, side="left")
+            table[i, :, 1 + 2 * n :] = problem.parameters[piece]
+        table[:, :, 0] = self.times
+        rows = table[self.reached]
+        rows[:, 1 : 1 + n] = self.batch.outputs[self.reached]
+        guess = np.zeros((len(rows), n))
+        found = consistent(program, rows[:, 0], rows[:, 1 : 1 + n], guess, rows[:, 1 + 2 * n :])
+        rows[:, 1 + n : 1 + 2 * n] = found.ydot
+        table[self.reached] = rows
+        return table
+
+    @cached_property
+    def named(self) -> dict[str, Array]:
+        """States and named quantities at the outputs, [run, output]; not a number where a run did not arrive."""
+        system = self.model.system
+        rows = self._inputs[self.reached]
+        values = np.full((*self.reached.shape, len(system.states) + len(system.outputs)), np.nan)
+        n = len(system.states)
+        values[self.reached] = np.concatenate([rows[:, 1 : 1 + n], self.model.output_function(rows)], axis=1)
+        names = [*(state.name for state in system.states), *(item.name for item in system.outputs)]
+        return dict(zip(names, np.moveaxis(values, -1, 0), strict=True))
+
+    @cached_property
+    def statistics(self) -> list[Statistics]:
+        """Mode, median and mean of the load at rupture of each run; empty where the sweep has none."""
+        if self.plan.until is None or not spectrum.breaks_bonds(self.model.system):
+            return []
+        return [spectrum.statistics(self[i], self.plan.until[0]) for i in range(len(self))]
+
+    @cached_property
+    def energy_error(self) -> Array:
+        """Largest energy residual of each run relative to the energy it exchanged."""
+        total = self.named["E_total"] - self.named["E_total"][:, :1]
+        supplied, turned = self._booked("energy supply"), self._booked("dissipation")
+        stored = [values - values[:, :1] for name, values in self.named.items() if name in ("U_1", "U_2", "U_c")]
+        parts = [*stored, *np.moveaxis(supplied, -1, 0), *np.moveaxis(turned, -1, 0)]
+        scale = np.max([np.nanmax(np.abs(part), axis=1) for part in parts], axis=0, initial=0.0)
+        worst = np.nanmax(np.abs(total - supplied.sum(axis=-1)), axis=1)
+        return np.asarray(np.where(scale > 0, worst / np.where(scale > 0, scale, 1.0), worst))
+
+    def _booked(self, kind: str) -> Array:
+        columns = [j for j, account in enumerate(self.model.system.ledger) if account.kind == kind]
+        values = self.batch.ledger_outputs[:, :, columns]
+        return np.asarray(np.where(self.reached[:, :, None], values, np.nan))
+
+
+def solve(
+    model: Model, plan: Plan, run: Run, changes: Mapping[str, float] | None = None, threads: int | None = None
+) -> Sweep:
+    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    if run.solver != Radau.name:
+        raise InputError(f"a sweep runs with the solver {Radau.name}, not {run.solver}.")
+    if model.system.transitions or model.system.fit:
+        raise InputError(
+            "a sweep needs a scene without jumps, contact modes and fitted media; run its values one by one."
+        )
+    values = [model.values({**(changes or {}), **point}) for point in plan.points]
+    runs = _scaled(model.system, plan, run, values) if plan.until else [run] * len(values)
+    problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
+    first = problems[0]
+    Radau().prepare()
+    start = time.perf_counter()
+    batch = solve_many(
+        model.program,
+        np.array([problem.y0 for problem in problems]),
+        np.array([problem.parameters for problem in problems]),
+        np.array([problem.segments for problem in problems]) if plan.until else first.segments,
+        run.rtol,
+        first.atol,
+        times=np.array([problem.times for problem in problems]) if plan.until else first.times,
+        margins=first.margins,
+        max_steps=run.max_steps,
+        threads=threads or os.cpu_count() or 1,
+        event_rows=USUAL_EVENTS if first.margins else 0,
+    )
+    return Sweep(model, plan, run, values, problems, batch, time.perf_counter() - start)
+
+
+def _scaled(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
+    """The settings of each run, its output times stretched to where the load is reached."""
+    assert plan.until is not None
+    variable, target = plan.until
+    if system.breakpoints:
+        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.")
+    line = spectrum.history(system, variable)
+    shape = np.asarray(run.times) / run.times[-1]
+    runs = []
+    for at in values:
+        point = {parameter.symbol: at[parameter.path] for parameter in system.parameters}
+        start, slope = (float(part.subs({**point, system.t: 0})) for part in (line, derivative(line, system.t)))
+        if not (target - start) * slope > 0:
+            raise InputError(f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s.")
+        runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
+    return runs

@@ -1,0 +1,359 @@
+"""Scenes of the exact tables of mechanics. Each is compiled once; its rows are runs with changed parameters."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scenes import SITES, path, perfect_contact, varying
+
+from surfacechem.assembly import assemble
+from surfacechem.audit import audit
+from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.jumps import Jump
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.contact import BondedContact, BondSprings, InterfaceCapacity, NormalStiffness
+from surfacechem.laws.factors import Linear, Power
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, Viscous
+from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Hold, Ramp, Table
+from surfacechem.laws.longrange import LennardJonesDerjaguin, LennardJonesFlatFlat, LennardJonesSpherePlane
+from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
+
+FOLDER = Path(__file__).parent / "references"
+COLD_BODIES = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+
+
+@cache
+def table(name: str) -> dict:
+    return json.loads((FOLDER / f"{name}.json").read_text())
+
+
+def parameters(name: str) -> dict[str, float]:
+    return {key: float(value) for key, value in table(name)["parameters"].items()}
+
+
+def rows(name: str) -> list[dict]:
+    """Rows by column; words stay words."""
+    return [dict(zip(table(name)["columns"], map(_entry, row), strict=True)) for row in table(name)["rows"]]
+
+
+def columns(name: str) -> dict[str, np.ndarray]:
+    return {key: np.array([row[key] for row in rows(name)]) for key in table(name)["columns"]}
+
+
+def expected(name: str) -> dict[str, float]:
+    return {key: float(value) for key, value in table(name)["expect"].items()}
+
+
+def _entry(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+class Solved:
+    """A trajectory by names."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+        self.system = trajectory.model.system
+        self.jumps = trajectory.jumps
+        self.status, self.reason = trajectory.status, trajectory.reason
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A state, named quantity or account at the output times."""
+        trajectory, system = self.trajectory, self.system
+        result = trajectory.result
+        found = {state.name: result.outputs[:, j] for j, state in enumerate(system.states)}
+        found |= {item.name: trajectory.outputs[:, j] for j, item in enumerate(system.outputs)}
+        found |= {account.quantity.name: result.ledger_outputs[:, j] for j, account in enumerate(system.ledger)}
+        return found[name]
+
+    def account(self, name: str, when: int) -> float:
+        """A line of the ledger at an event."""
+        column = [account.quantity.name for account in self.system.ledger].index(name)
+        return float(self.trajectory.result.events.ledger[when, column])
+
+    def state(self, jump: Jump, name: str, side: str = "after") -> float:
+        return float(getattr(jump, side).y[[state.name for state in self.system.states].index(name)])
+
+    def of(self, name: str) -> list[Jump]:
+        """The jumps of a transition."""
+        return [jump for jump in self.jumps if jump.transition.name.startswith(name)]
+
+    @property
+    def energy_error(self) -> float:
+        return audit(self.trajectory).energy_error
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        return audit(self.trajectory).findings
+
+
+def solve(model: Model, times, changes=None, **settings) -> Solved:
+    times = [float(t) for t in times]
+    return Solved(model.solve(Run(times=times if times[0] == 0 else (0.0, *times), **settings), changes))
+
+
+# -- the normal gap -------------------------------------------------------------------------------------------------
+
+
+@cache
+def debonding(elastic: bool, violation: str = "warn") -> Model:
+    """A far field that reaches the strength at t = 1 s."""
+    potentials = [BondEnergy(K_0=1.0), *([BondedContact(E_n=1e12)] if elastic else [])]
+    limits = [TensileStrength(t_max=1.0, violation=violation)]
+    scene = Scene(
+        (Body("lower", "T", Quadratic(C=1.0)), Body("upper", "T", Quadratic(C=1.0))),
+        Interface("T", potentials, sites=SITES, limits=limits),
+        loading={"w_n": Ramp(rate=1.0)},
+        T_0=300.0,
+        initial={"T": 300.0, "phi": 1.0},
+        normal=Mounting(k=1.0),
+    )
+    return Model(assemble(scene))
+
+
+def debonded(q: dict, violation: str = "warn") -> Solved:
+    elastic = np.isfinite(q["E_n"])
+    opening = q["t_n"] / q["k_eff"] + (q["t_n"] / q["E_n"] if elastic else 0.0)
+    changes = {
+        "T_0": q["T0"],
+        "initial.T": q["T_i"],
+        "bodies.lower.C": q["C_tot"] / 2,
+        "bodies.upper.C": q["C_tot"] / 2,
+        "interface.potential.bond-energy.K_0": q["K0"],
+        "initial.phi": q["phi_i"],
+        "interface.limits.tensile-strength.t_max": q["t_n"],
+        "mechanics.normal.k": q["k_eff"],
+        "loading.w_n.rate": opening,
+    }
+    if elastic:
+        changes["interface.potential.bonded-contact.E_n"] = q["E_n"]
+    return solve(debonding(bool(elastic), violation), np.linspace(0.0, 1.5, 7), changes)
+
+
+ZONE = {"t_max": 1e6, "g_0": 1e-8, "E_n": 1e16}
+
+
+def zone(mounting: Mounting, w_n, energy=Quadratic, C: float = 1e-4, T: float = 300.0, programme=(), **more) -> Model:
+    scene = perfect_contact(
+        [ExponentialCohesiveZone(**ZONE)],
+        energy=energy,
+        C_1=C,
+        C_2=C,
+        T=T,
+        loading={"w_n": w_n},
+        normal=mounting,
+        programme=programme,
+        **more,
+    )
+    return Model(assemble(Scene(**scene.__dict__ | {"initial": {"T": T, "g_n": 0.0}})))
+
+
+def cycles(top: float, count: int) -> Table:
+    """Up to ``top`` and back, each way in a second."""
+    return Table(times=[float(t) for t in range(2 * count + 1)], values=[top * (t % 2) for t in range(2 * count + 1)])
+
+
+def pull_off(q: dict) -> tuple[Solved, list[float]]:
+    """Opening and closing, quasi-static, between reservoirs; a ramp for each fold. Returns w at the jumps."""
+    top, low = 1.05 * q["w_off"], 0.5 * min(q["w_on"], q["w_off"])
+    history = Table(times=[0.0, 1.0, 2.0, 3.0], values=[0.0, top, min(2.0 * q["w_on"], top), low])
+    scene = Scene(
+        COLD_BODIES,
+        Interface(None, [ExponentialCohesiveZone(**ZONE)]),
+        loading={"w_n": history},
+        initial={"g_n": 0.0},
+        normal=Mounting(k=q["k_eff"]),
+    )
+    solved = solve(Model(assemble(scene)), np.linspace(0.0, 3.0, 31))
+    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.jumps]
+
+
+def heating(energy) -> Solved:
+    p = parameters("h_pulloff_heating")
+    model = zone(Mounting(k=p["k_eff"]), cycles(1.5e-7, 19), energy, p["C_tot"] / 2, p["T_i"])
+    return solve(model, (0.0, 38.0))
+
+
+def dynamic() -> Solved:
+    p = parameters("h_pulloff_dynamic")
+    model = zone(Mounting(k=p["k_eff"], m=p["m"], c_b=p["c_b"]), Hold(level=p["w"]), C=p["C_tot"] / 2)
+    return solve(model, columns("h_pulloff_dynamic")["t"])
+
+
+@cache
+def overdamped() -> Model:
+    p = parameters("h_overdamped_bottleneck")
+    opens = Stage("open", variable="g_n", value=4 * p["g0"])
+    return zone(Mounting(k=p["k_eff"], c_g=p["c"]), Hold(level=1.0), C=10.0, programme=(opens,))
+
+
+def isentropic() -> Solved:
+    """Cohesion whose strength falls with temperature is opened in a second, without heat."""
+    p, exact = parameters("h_isentropic_cohesive_cooling"), columns("h_isentropic_cohesive_cooling")
+    potential = ExponentialCohesiveZone(t_max=varying(p["t0"], Power(exponent=-1.0)), g_0=p["g0"], E_n=1e16)
+    scene = perfect_contact(
+        [potential],
+        T=p["T_i"],
+        T_0=p["T0"],
+        C_1=p["C_tot"] / 2,
+        C_2=p["C_tot"] / 2,
+        loading={"g_n": Ramp(rate=exact["g"][-1])},
+    )
+    return solve(Model(assemble(scene)), exact["g"] / exact["g"][-1])
+
+
+def damage() -> Solved:
+    """Bonds that carry tension follow their equilibrium: they relax in 1e-10 of the time in which the gap opens."""
+    p, exact = parameters("h_damage_equilibrium"), columns("h_damage_equilibrium")
+    scene = Scene(
+        COLD_BODIES,
+        Interface(
+            Hold(level=300.0),
+            [BondSprings(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])],
+            reactions=[LinearAffinity(c_r=1e10 * SITES.density / p["K"])],
+            sites=SITES,
+        ),
+        loading={"g_n": Ramp(rate=exact["g"][-1])},
+        T_0=300.0,
+        initial={"phi": 1.0},
+    )
+    return solve(Model(assemble(scene)), exact["g"] / exact["g"][-1])
+
+
+LONG_RANGE = {"flat": LennardJonesFlatFlat, "sphere": LennardJonesSpherePlane, "derjaguin": LennardJonesDerjaguin}
+
+
+def long_range(kind: str, gaps: np.ndarray) -> Solved:
+    """The gap opens through the given values, one in a second, from contact to far away."""
+    p = parameters("i_lj_flat_flat")
+    sites = {"n_1": p["n1"], "n_2": p["n2"], "psi_0": p["psi0"], "g_0": p["g0"]}
+    size = {} if kind == "flat" else {"R": p["R"], "area": 1e-16}
+    times = [float(t) for t in range(len(gaps))]
+    scene = Scene(
+        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
+        Interface("T", [LONG_RANGE[kind](**sites, **size)]),
+        loading={"g_n": Table(times=times, values=[float(g) for g in gaps])},
+        T_0=300.0,
+        initial={"T": 300.0},
+    )
+    return solve(Model(assemble(scene)), times)
+
+
+def snap(q: dict) -> tuple[Solved, list[float]]:
+    """Flats approach until they snap in and are drawn apart until they pull off; w at the two jumps."""
+    p = parameters("i_lj_flat_flat")
+    sites = {"n_1": p["n1"], "n_2": p["n2"], "psi_0": p["psi0"], "g_0": p["g0"]}
+    far, near = 1.2 * q["w_snap_in"], 0.8 * q["w_snap_in"]
+    apart = 1.2 * max(q["w_pull_off"], q["w_snap_in"])
+    history = Table(times=[0.0, 1.0, 2.0], values=[far, near, apart])
+    scene = Scene(
+        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
+        Interface("T", [LennardJonesFlatFlat(**sites)]),
+        loading={"w_n": history},
+        T_0=300.0,
+        initial={"T": 300.0, "g_n": far},
+        normal=Mounting(k=q["k_eff"]),
+    )
+    solved = solve(Model(assemble(scene)), np.linspace(0.0, 2.0, 21))
+    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.jumps]
+
+
+@cache
+def penalty() -> Model:
+    p = parameters("x09_penalty_limit")
+    scene = Scene(
+        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
+        Interface("T", [NormalStiffness(E_n=1.0)]),
+        loading={"w_n": Ramp(rate=p["w"])},
+        T_0=300.0,
+        initial={"T": 300.0},
+        normal=Mounting(k=p["k_eff"]),
+    )
+    return Model(assemble(scene))
+
+
+def light_interface(C_c: float) -> Scene:
+    """An interface between reservoirs whose bonds take capacity away; nothing but its temperature moves."""
+    p = parameters("x13_negative_capacity_growth")
+    return Scene(
+        COLD_BODIES,
+        Interface("T_c", [BondEnergy(K_2=p["K2"]), InterfaceCapacity(C_c=C_c)]),
+        [path("interface", "lower", p["h1"]), path("interface", "upper", p["h2"])],
+        {"phi": Hold(level=p["phi"])},
+        T_0=p["T0"],
+        initial={"T_c": p["T"]},
+    )
+
+
+@cache
+def film() -> Model:
+    p = parameters("x05_closing_film")
+    scene = perfect_contact(
+        [],
+        frictions=[Viscous(eta=p["eta"])],
+        C_1=p["C_tot"] / 2,
+        C_2=p["C_tot"] / 2,
+        T=p["T0"],
+        loading={"v": Hold(level=p["v"]), "g_n": Ramp(start=p["g_i"], rate=-p["a"])},
+    )
+    return Model(assemble(scene))
+
+
+# -- sliding --------------------------------------------------------------------------------------------------------
+
+
+def coulomb_stop() -> Solved:
+    p = parameters("g_coulomb_stop")
+    scene = perfect_contact(
+        [],
+        frictions=[Coulomb(mu=p["mu"])],
+        C_1=p["C_tot"] / 2,
+        C_2=p["C_tot"] / 2,
+        loading={"p": Hold(level=p["p"])},
+        tangential=Mounting(m=p["m"]),
+    )
+    scene = Scene(**scene.__dict__ | {"initial": {"T": p["T0"], "v": p["v0"]}})
+    return solve(Model(assemble(scene)), columns("g_coulomb_stop")["t"])
+
+
+@cache
+def slider() -> Model:
+    p = parameters("g_stickslip_motion")
+    scene = perfect_contact(
+        [],
+        frictions=[Coulomb(mu=p["mu_k"], mu_s=p["mu_s"])],
+        C_1=500.0,
+        C_2=500.0,
+        loading={"p": Hold(level=p["p"]), "w_t": Ramp(rate=p["V"])},
+        tangential=Mounting(m=p["m"], k=p["k"]),
+    )
+    return Model(assemble(scene))
+
+
+@cache
+def rebonding_slider() -> Model:
+    """Bonds form while the interface sticks, without heat, and break as it slides."""
+    p = parameters("g_stickslip_rebonding_transient")
+    forms = Arrhenius(A=varying(1 / p["tau"], Linear(of="sticking", about=1.0, slope=1.0)), E_a=0.0)
+    scene = Scene(
+        COLD_BODIES,
+        Interface(
+            Hold(level=300.0),
+            frictions=[BondedCoulomb(mu=p["mu_k"], mu_b=p["mu_b"], mu_ub=p["mu_ub"])],
+            reactions=[forms],
+            sites=SITES,
+        ),
+        loading={"p": Hold(level=p["p"]), "w_t": Ramp(rate=p["V"])},
+        T_0=300.0,
+        initial={"phi": 0.0},
+        tangential=Mounting(m=p["m"], k=p["k"]),
+    )
+    return Model(assemble(scene))

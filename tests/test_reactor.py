@@ -1,0 +1,363 @@
+"""The interface as a reactor: what a run computes, in a Cantera network."""
+
+import gc
+import math
+
+import cantera as ct
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactorNet
+
+RTOL = 1e-9
+LOOSE = 1e-6
+"""Cantera's integrator misses its tolerance by some orders of magnitude."""
+
+
+def network(*arguments, others=(), **options):
+    interface = InterfaceReactor(*arguments, **options)
+    net = ReactorNet([*others, interface])
+    net.rtol = RTOL
+    return interface, net
+
+
+def states(solution):
+    result = solution.trajectory.result
+    return dict(zip((s.name for s in solution.trajectory.model.system.states), result.outputs.T, strict=True))
+
+
+def compare(solution, dataset, tolerance=LOOSE):
+    names = states(solution)
+    for name, values in names.items():
+        scale = np.abs(values).max()
+        np.testing.assert_allclose(dataset[name].values, values, atol=tolerance * scale, rtol=0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "exothermic",
+        "dna-adhesive",
+        "three-temperatures-no-capacity",
+        "no-medium",
+        "weakening-friction",
+        "lubricated-sliding",
+    ],
+)
+def test_same_trajectory_as_a_run(name):
+    solution = surfacechem.run(name)
+    interface, net = network(name)
+    for t in solution.trajectory.result.times[1:]:
+        net.advance(t)
+    dataset = interface.dataset
+    compare(solution, dataset)
+    ours, theirs = set(dataset.variables), set(solution.dataset.variables)
+    assert {n for n in ours ^ theirs if not n.endswith("_exact")} == set()
+    assert dataset.attrs["energy_error"] < 1e-6
+    assert dataset.attrs["reason"] == solution.reason
+    assert interface.seconds_per_rate > 0
+
+
+PULSE = """
+bodies:
+  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+  upper: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+loading:
+  Q_1: {table: {times: [0, 1, 1, 1.001, 1.001, 2], values: [0, 0, 1e6, 1e6, 0, 0]}}
+T_0: 300
+initial: {T: 300 K}
+run: {until: 2 s}
+"""
+
+
+@pytest.fixture
+def pulse(tmp_path):
+    path = tmp_path / "pulse.yaml"
+    path.write_text(PULSE)
+    return path
+
+
+@pytest.mark.parametrize("stepwise", [False, True])
+def test_no_breakpoint_is_stepped_over(pulse, stepwise):
+    interface, net = network(pulse)
+    if stepwise:
+        while net.time < 2:
+            net.step()
+    else:
+        net.advance(2)
+    assert {0.0, 1.0, 1.001} <= set(interface.dataset.time.values)
+    assert interface["T"] == pytest.approx(300.5, rel=1e-10)
+
+
+def test_an_ordinary_net_refuses_to_step_over_a_breakpoint(pulse):
+    net = ct.ReactorNet([InterfaceReactor(pulse)])
+    with pytest.raises(ct.CanteraError, match=r"breakpoint at t = 1 s.*Use surfacechem\.reactor\.ReactorNet"):
+        net.advance(2)
+
+
+def test_the_end_of_a_scene_is_found_and_said():
+    solution = surfacechem.run("cooling-to-zero")
+    interface, net = network("cooling-to-zero")
+    with pytest.raises(InterfaceStopped, match="the temperature T reached zero at t = "):
+        net.advance(surfacechem.load("cooling-to-zero").case.run.t_end)
+    assert interface.dataset.attrs["status"] == "stopped"
+    assert interface.dataset.time.values[-1] == pytest.approx(solution.trajectory.result.t, rel=1e-5)
+    assert interface.evaluations < 50_000
+
+
+def test_an_error_inside_stops_at_once_with_its_message(monkeypatch):
+    interface, net = network("exothermic")
+    net.advance(0.1)
+    before = interface.evaluations
+
+    def broken(t, x):
+        raise ZeroDivisionError("the real message")
+
+    monkeypatch.setattr(interface.scene, "rates", broken)
+    with pytest.raises(ZeroDivisionError, match="the real message"):
+        net.advance(1.0)
+    assert interface.evaluations - before < 20
+
+
+def test_an_error_that_a_neighbour_meets_first(warm, monkeypatch):
+    gas = stirred(350.0)
+    interface, net = network(warm, bodies={"upper": gas}, others=[gas])
+    net.advance(0.01)
+    before = interface.evaluations
+
+    def broken(t, x):
+        raise ZeroDivisionError("the real message")
+
+    monkeypatch.setattr(interface.scene, "rates", broken)
+    with pytest.raises(ZeroDivisionError, match="the real message"):
+        net.advance(1.0)
+    assert interface.evaluations - before < 20
+
+
+def test_components_have_names():
+    interface, net = network("dna-adhesive")
+    net.advance(1e-3)
+    assert interface.n_vars == len(interface.names)
+    assert interface.component_index("T_c") == interface.names.index("T_c")
+    assert net.component_name(0) == f"interface: {interface.names[0]}"
+    assert net.solver_stats["rhs_evals"] > 0
+    with pytest.raises(InputError, match=r"no quantity 'T_d'\. Did you mean 'T_c'"):
+        interface["T_d"]
+
+
+def test_sensitivity_to_a_rate():
+    """phi = 1 - exp(-m t / tau), so d ln phi / d ln m = (m t / tau) exp(-m t / tau) / phi."""
+    interface, net = network("exothermic")
+    interface.add_sensitivity_reaction(0)
+    net.rtol_sensitivity = net.atol_sensitivity = 1e-7
+    net.advance(0.4)
+    rate = -math.log1p(-interface["phi"])
+    assert net.sensitivity("phi", 0) == pytest.approx(rate * math.exp(-rate) / interface["phi"], rel=1e-4)
+    assert net.sensitivity_parameter_name(0) == "interface: open => linear_affinity"
+
+
+def test_a_multiplier_is_a_factor_on_a_rate():
+    slow, net = network("exothermic")
+    slow.phase.set_multiplier(0.5)
+    net.advance(1.0)
+    fast, net = network("exothermic")
+    net.advance(0.5)
+    assert slow["phi"] == pytest.approx(fast["phi"], rel=LOOSE)
+    assert slow["T"] == pytest.approx(fast["T"], rel=LOOSE)
+
+
+WARM = """
+bodies:
+  lower: {temperature: T_1, C: 2 kJ/m^2/K, capacity: constant}
+  upper: {temperature: 300 K}
+interface:
+  temperature: T_c
+  potential:
+    - constant-interface-capacity: {C_c: 42 J/m^2/K}
+  mechanism: {file: dna-tethers.yaml, bonds: [bond(s)]}
+heat:
+  - conductance: {between: [lower, interface], h: 2100 W/m^2/K}
+  - conductance: {between: [upper, interface], h: 4200 W/m^2/K}
+T_0: 298.15 K
+initial: {T_1: 298.15 K, T_c: 298.15 K, coverages: {free(s): 1}}
+run: {until: 10 s}
+"""
+
+
+@pytest.fixture
+def warm(tmp_path):
+    path = tmp_path / "warm.yaml"
+    path.write_text(WARM)
+    return path
+
+
+def stirred(temperature, **options):
+    gas = ct.Solution("air.yaml")
+    gas.TPX = temperature, ct.one_atm, "N2: 1"
+    return ct.IdealGasReactor(gas, clone=True, **options)
+
+
+def energy(gas):
+    return gas.mass * gas.phase.int_energy_mass
+
+
+def test_a_stirred_gas_as_the_second_body(warm):
+    """What the scene loses the gas receives, to the accuracy of the run."""
+    gas = stirred(350.0, volume=3.0)
+    interface, net = network(warm, area=0.7, bodies={"upper": gas}, others=[gas])
+    before = interface["E_total"] * interface.area + energy(gas)
+    warmth = energy(gas)
+    for t in np.linspace(0.1, 5, 20):
+        net.advance(t)
+    after = interface["E_total"] * interface.area + energy(gas)
+    exchanged = abs(energy(gas) - warmth)
+    assert exchanged > 1e4
+    assert after == pytest.approx(before, abs=1e-7 * exchanged)
+    assert gas.T < 349
+    dataset = interface.dataset
+    np.testing.assert_allclose(dataset["T_2"][-1], gas.T)
+    assert dataset.attrs["energy_error"] < 1e-7
+    assert dataset.attrs["case"] == ""
+
+
+def test_order_in_the_network_does_not_matter(warm):
+    ends = []
+    for order in (1, -1):
+        gas = stirred(350.0, volume=3.0)
+        interface = InterfaceReactor(warm, bodies={"upper": gas})
+        net = ReactorNet([gas, interface][::order])
+        net.rtol = RTOL
+        net.advance(1.0)
+        ends.append((gas.T, interface["T_1"], interface["phi"]))
+    assert ends[0] == pytest.approx(ends[1], rel=LOOSE)
+
+
+def test_a_large_gas_is_a_reservoir(warm):
+    gas = stirred(300.0, volume=1e12)
+    interface, net = network(warm, bodies={"upper": gas}, others=[gas])
+    net.advance(1.0)
+    solution = surfacechem.load(warm, {"run.until": "1 s"}).run()
+    for name, values in states(solution).items():
+        assert interface[name] == pytest.approx(values[-1], rel=LOOSE)
+
+
+def test_heat_through_a_wall(tmp_path):
+    """A body and a gas of constant capacity behind a wall: the difference decays exponentially."""
+    path = tmp_path / "body.yaml"
+    path.write_text(
+        "bodies:\n"
+        "  lower: {temperature: T_1, C: 1 kJ/m^2/K, capacity: constant}\n"
+        "  upper: {temperature: T_2, C: 1 kJ/m^2/K, capacity: constant}\n"
+        "heat: [conductance: {between: [lower, upper], h: 10 W/m^2/K}]\n"
+        "T_0: 300 K\ninitial: {T_1: 400 K, T_2: 300 K}\nrun: {until: 1 s}\n"
+    )
+    other, _ = network(path, overrides=["initial.T_2=350 K"])
+    interface = InterfaceReactor(path, area=2.0)
+    ct.Wall(other.body("upper"), interface.body("upper"), A=3.0, U=40.0)
+    other.area = 2.0
+    net = ReactorNet([interface, other])
+    net.rtol = RTOL
+    before = interface["E_total"] + other["E_total"]
+    net.advance(20.0)
+    rate = np.zeros((4, 4))  # T_1, T_2 of each, by hand
+    for i, j, h in ((0, 1, 10.0), (2, 3, 10.0), (1, 3, 3.0 * 40.0 / 2.0)):
+        rate[i, i] -= h / 1e3
+        rate[j, j] -= h / 1e3
+        rate[i, j] += h / 1e3
+        rate[j, i] += h / 1e3
+    values, vectors = np.linalg.eigh(rate)
+    exact = vectors @ (np.exp(20.0 * values) * (vectors.T @ [400.0, 300.0, 400.0, 350.0]))
+    found = [interface["T_1"], interface["T_2"], other["T_1"], other["T_2"]]
+    np.testing.assert_allclose(found, exact, rtol=1e-8)
+    assert interface["E_total"] + other["E_total"] == pytest.approx(before, abs=1e-6)
+
+
+def test_beside_flow_controllers_and_reservoirs(warm):
+    gas = stirred(300.0, volume=0.01)
+    hot = ct.Solution("air.yaml")
+    hot.TPX = 400.0, ct.one_atm, "N2: 1"
+    inlet, outlet = ct.Reservoir(hot, clone=True), ct.Reservoir(hot, clone=True)
+    feed = ct.MassFlowController(inlet, gas, mdot=0.05)
+    ct.PressureController(gas, outlet, primary=feed, K=1e-5)
+    interface, net = network(warm, area=0.01, bodies={"upper": gas}, others=[gas])
+    net.advance(200.0)
+    assert 300 < interface["T_1"] == pytest.approx(gas.T, rel=1e-3)
+    assert gas.T > 380
+
+
+@pytest.mark.parametrize(
+    ("case", "bodies", "message"),
+    [
+        ("exothermic", {"uper": None}, "no body 'uper'. Did you mean 'upper'"),
+        ("exothermic", {"interface": None}, "not of the interface"),
+        ("exothermic", {"upper": None}, "must not give it a heat capacity"),
+    ],
+)
+def test_bodies_that_no_reactor_can_replace(case, bodies, message):
+    with pytest.raises(InputError, match=message):
+        InterfaceReactor(case, bodies=dict.fromkeys(bodies, stirred(300.0)))
+
+
+def test_walls_that_would_not_be_felt(warm):
+    interface = InterfaceReactor(warm)
+    with pytest.raises(InputError, match="upper has no temperature that evolves"):
+        interface.body("upper")
+    with pytest.raises(InputError, match="T_c stores no heat"):
+        InterfaceReactor("three-temperatures-no-capacity").body("interface")
+
+
+def test_walls_come_before_the_network_runs(warm):
+    interface, net = network(warm)
+    assert interface.body("lower") is interface.body("lower")
+    net.advance(1e-3)
+    with pytest.raises(InputError, match="a wall on interface comes too late"):
+        interface.body("interface")
+
+
+def test_a_wall_with_a_history_of_its_own(warm):
+    interface, net = network(warm)
+    ct.Wall(interface.body("lower"), stirred(300.0), Q=lambda t: 5.0 + t)
+    with pytest.raises(InputError, match="a wall on lower has a heat flux of its own"):
+        net.advance(1.0)
+
+
+PULLED = """
+bodies:
+  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+  upper: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+interface:
+  temperature: T
+  sites: 1e16
+  potential: [penalty: {E_n: 1 MPa/um}]
+  limits: [tensile-strength: {t_max: 1 MPa}]
+loading: {g_n: {ramp: {rate: 1 um/s}}}
+T_0: 300
+initial: {T: 300 K, phi: 1}
+run: {until: 2 s}
+"""
+
+
+def test_a_scene_that_jumps(tmp_path):
+    path = tmp_path / "pulled.yaml"
+    path.write_text(PULLED)
+    with pytest.raises(InputError, match=r"the scene jumps \(.*\), which a reactor network does not follow"):
+        InterfaceReactor(path)
+
+
+def test_area_is_positive():
+    with pytest.raises(InputError, match="area = 0 is outside its range"):
+        InterfaceReactor("exothermic", area=0)
+
+
+def test_what_cantera_holds_stays_alive():
+    """Cantera's part is made before the reactor is, and must not be collected in between."""
+    threshold = gc.get_threshold()
+    gc.set_threshold(50)
+    try:
+        interfaces = [network("exothermic")[0] for _ in range(3)]
+        gc.collect()
+        assert [interface.phase.multiplier(0) for interface in interfaces] == [1.0] * 3
+    finally:
+        gc.set_threshold(*threshold)

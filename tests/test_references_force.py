@@ -1,0 +1,209 @@
+"""Exact solutions of bonds under force against their tables (30 digits), and in ranges where exponentials overflow."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from test_references import RELATIVE, assert_exact, bell, build, cluster, table
+
+from surfacechem.errors import InputError
+from surfacechem.references import get
+from surfacechem.references._lambert import lambert_of_exp
+
+
+@pytest.mark.parametrize("row", range(20))
+def test_force_spectrum(row):
+    data = table("c_bell_ramp")
+    rate, *exact = (data.columns[key][row] for key in ("r", "F_mode", "F_mean", "F_median", "S_at_mode"))
+    bond = build("bell-ramp", data.parameters, **bell(data.parameters), rate=rate)
+    survival = bond.solution(bond.mode / rate)["phi"]
+    assert_exact([bond.mode, bond.mean, bond.median, survival], exact)
+
+
+def test_survival_along_a_ramp():
+    data = table("c_bell_ramp_survival")
+    bond = build("bell-ramp", data.parameters, **bell(data.parameters))
+    exact = bond.solution(data.columns["F"] / bond.rate)
+    assert_exact(exact["phi"], data.columns["S"])
+    assert_exact(exact["ln_phi"], np.log(data.columns["S"]), absolute=1e-15)
+    assert_exact(np.exp(bond.log_density(data.columns["F"])), data.columns["pdf"])
+
+
+def test_survival_down_to_1e_300_and_beyond():
+    bond = get("bell-ramp")(k_off=0.1, x_off=4e-10, T=300.0, rate=1e-10)
+    last = bond.force_scale * math.log1p(300 * math.log(10) / bond.severity)
+    exact = bond.solution(np.array([last, 3 * last]) / bond.rate)
+    assert_exact(exact["phi"][0], 1e-300, relative=1e-12)
+    assert_exact(exact["ln_phi"][0], -300 * math.log(10))
+    assert exact["phi"][1] == 0.0
+    assert exact["ln_phi"][1] < -1e6
+
+
+@pytest.mark.parametrize("row", range(20))
+def test_bell_overflow(row):
+    data = table("x03_bell_overflow")
+    p = bell(data.parameters)
+    exponent = data.columns["Fx_over_kT"][row]
+    scale = get("bell-constant-force")(**p, T=300.0, f=0.0).force_scale
+    bond = build("bell-constant-force", data.parameters, **p, f=exponent * scale)
+    assert_exact(bond.log_rate, data.columns["ln_rate"][row], relative=1e-15)
+    # The rounding of the exponent alone is a relative error of the rate.
+    rounding = 4e-16 * max(exponent, 1.0)
+    half_life = data.columns["t_half"][row]
+    assert_exact(bond.half_life, half_life, relative=RELATIVE + rounding, absolute=1e-304)
+    exact = bond.solution([0.0, 1e-300, 1.0])
+    assert exact["phi"][0] == 1.0
+    for got, column in zip(exact["phi"][1:], ("S_at_1e-300_s", "S_at_1_s"), strict=True):
+        assert_exact(got, data.columns[column][row], relative=1e-12, absolute=1e-300)
+    assert not np.isnan(exact["ln_phi"]).any()
+
+
+def test_cluster_without_rebinding():
+    data = table("d_cluster_no_rebinding")
+    given = cluster(0.5)
+    bonds = get("shared-load-cluster")(**given)
+    assert_exact(bonds.end_time, data.expect["tau_star"], relative=1e-15)
+    tau, exact = data.columns["tau"], data.columns["N"] / data.parameters["N_t"]
+    got = bonds.solution(tau)["phi"]
+    # dphi/dtau = -phi exp(F/phi): close to rupture one unit in the last place of the time is seen.
+    sensitivity = np.spacing(tau) * exact * np.exp(0.5 / exact)
+    assert np.all(np.abs(got - exact) <= RELATIVE * exact + 2 * sensitivity)
+    assert bonds.solution(bonds.end_time)["phi"] == 0.0
+    with pytest.raises(InputError, match="exact for 0 <= t <="):
+        bonds.solution(bonds.end_time * 1.001)
+
+
+def test_lifetimes_of_clusters():
+    data = table("d_cluster_lifetimes")
+    for force, tau in zip(data.columns["f"], data.columns["tau_star"], strict=True):
+        bonds = get("shared-load-cluster")(**cluster(force / data.parameters["N_t"]))
+        assert_exact(bonds.end_time, tau)
+        assert_exact(bonds.solution(np.array([1e-12, 0.5]) * tau)["phi"][0], 1.0, relative=1e-10)
+    assert get("shared-load-cluster")(**cluster(1e4)).end_time == 0.0
+
+
+def test_fold_of_the_cluster_with_rebinding():
+    data = table("d_cluster_saddle_node")
+    for gamma, load, state in zip(*(data.columns[c] for c in ("gamma", "f_c_over_Nt", "n_c")), strict=True):
+        bonds = get("rebinding-cluster")(**cluster(load, gamma))
+        assert_exact([bonds.critical_load, bonds.critical_state], [load, state])
+        assert_exact(bonds.critical_traction, cluster(load)["t_n"])
+    below = get("rebinding-cluster")(**cluster(0.278, 1.0))
+    assert math.isinf(below.end_time)
+    assert below.steady_state > below.critical_state
+    with pytest.raises(InputError, match="no steady state above"):
+        _ = get("rebinding-cluster")(**cluster(0.279, 1.0)).steady_state
+
+
+@pytest.mark.parametrize("load", [0.27847, 0.2785, 0.28, 0.3, 0.5, 2.0, 20.0])
+def test_lifetime_above_the_fold(load):
+    """The quadrature of the rate as it stands, with 40 digits."""
+    bonds = get("rebinding-cluster")(**cluster(load, 1.0))
+    fold = bonds.critical_state
+    ladder = [fold * (1 + side * mpmath.mpf(10) ** -k) for k in range(1, 9) for side in (-1, 1)]
+    with mpmath.workdps(40):
+        F = mpmath.mpf(bonds.load)
+        points = sorted([0, fold / 100, fold / 3, fold, 3 * fold, 1, *ladder])
+        exact = mpmath.quad(lambda phi: 1 / (phi * mpmath.exp(F / phi) - (1 - phi)), points)
+    known = 1e-15 / abs(load / bonds.critical_load - 1)  # the rounding of the load against its distance from the fold
+    assert_exact(bonds.end_time, float(exact), relative=RELATIVE + known)
+
+
+def test_lifetime_close_to_the_fold_is_asymptotic():
+    ratios = []
+    for excess in (1e-2, 1e-4, 1e-6):
+        bonds = get("rebinding-cluster")(**cluster(0.278464542761074 * (1 + excess), 1.0))
+        ratios.append(abs(bonds.end_time / bonds.passage_time - 1))
+    assert ratios[0] > 3 * ratios[1] > 9 * ratios[2]
+    assert ratios[2] < 1e-3
+
+
+@pytest.mark.parametrize("phi_i", [0.15, 0.5, 1.0, 0.05])
+def test_cluster_with_rebinding_satisfies_its_equation(phi_i):
+    bonds = get("rebinding-cluster")(**cluster(0.2, 1.0), phi_i=phi_i)
+    t = np.linspace(0.05, 0.9, 7) * min(bonds.end_time, 8.0)
+    step = 1e-4 * t
+    before, phi, after = (bonds.solution(t + k * step)["phi"] for k in (-1, 0, 1))
+    assert_exact((after - before) / (2 * step), 1 - phi - phi * np.exp(bonds.load / phi), relative=1e-5, absolute=1e-9)
+    assert bonds.breaks == (phi_i < 0.1)
+
+
+def test_springs_in_equilibrium():
+    data = table("x_latticegas_equilibrium")
+    film = build("lattice-gas-springs", data.parameters, epsilon=data.parameters["eps"])
+    # The exponent is 14 and more, and its rounding is that of the bonding state.
+    assert_exact(film.equilibrium(data.columns["g"]), data.columns["phi_eq"])
+    assert_exact(film.traction(data.columns["g"]), data.columns["t_n"])
+    found = [film.peak_gap, film.peak_traction, film.work_of_separation]
+    assert_exact(found, [data.expect[key] for key in ("g_star", "t_max", "work_of_separation")])
+
+
+@pytest.mark.parametrize("epsilon", [-1e-17, -1e-19, 1e-19, 1e-17, 1e-15])
+def test_springs_of_any_energy(epsilon):
+    film = get("lattice-gas-springs")(n_c=1e16, epsilon=epsilon, k_b=1e-3, T=300.0, g_n=1e-9)
+    gap = film.peak_gap * np.array([1 - 1e-4, 1.0, 1 + 1e-4])
+    low, peak, high = film.traction(gap)
+    assert np.isfinite([low, peak, high, film.work_of_separation]).all()
+    assert low <= peak >= high
+
+
+def test_springs_relax_at_a_held_gap():
+    film = get("lattice-gas-springs")(n_c=1e16, epsilon=1e-21, k_b=1e-3, T=300.0, g_n=2e-9, k_i=3.0)
+    t, equilibrium = np.array([0.0, 1e-12, 0.1, 1e3]), float(film.equilibrium(2e-9))
+    assert_exact(film.solution(t)["phi"], -equilibrium * np.expm1(-3.0 / equilibrium * t))
+
+
+@pytest.mark.parametrize("a", [-700.0, -30.0, 0.0, 0.999, 1.001, 30.0, 700.0, 1e4, 1e12])
+def test_lambert_of_exponentials(a):
+    with mpmath.workdps(40):
+        w = mpmath.lambertw(mpmath.exp(mpmath.mpf(a))).real
+        assert_exact(lambert_of_exp(np.array(a)), float(w), relative=1e-15 * max(1.0, -a))
+
+
+def test_cure_that_nothing_starts_is_refused():
+    with pytest.raises(InputError, match="nothing starts the reaction"):
+        get("kamal-cure-constant-capacity")(A_1=0.0, A_2=1.0, T_i=300.0)
+
+
+def test_isothermal_first_order_cure_is_exponential():
+    layer = get("kamal-cure-constant-capacity")(A_1=2.0, A_2=0.0, T_i=300.0)
+    t = np.array([0.0, 1e-12, 0.1, 1.0, 20.0])
+    assert_exact(layer.solution(t)["phi"], -np.expm1(-2.0 * t))
+    assert_exact(layer.solution(t)["unreacted"], np.exp(-2.0 * t))
+
+
+def test_cure_from_where_it_stands():
+    """A second run from the middle of the first is the rest of it."""
+    given = {"A_1": 4e5, "E_1": 7e4, "A_2": 2e6, "E_2": 6e4, "m": 0.5, "n": 1.5, "delta_T": 120.0}
+    whole = get("kamal-cure-constant-capacity")(**given, T_i=360.0)
+    middle = whole.solution(180.0)
+    rest = get("kamal-cure-constant-capacity")(**given, T_i=middle["T"].item(), phi_i=middle["phi"].item())
+    assert_exact(rest.solution([5.0, 50.0])["phi"], whole.solution([185.0, 230.0])["phi"])
+
+
+def test_ignition_without_cancellation():
+    weld = get("friction-ignited-bonding")(A=1e14, E_a=1.2e5, T_i=300.0, C=500.0, D=2500.0)
+    t = np.array([1e-12, 1e-3, 0.5])
+    with mpmath.workdps(40):
+        s = mpmath.mpf(1.2e5) / mpmath.mpf(8.31446261815324)
+        exact = [mpmath.quad(lambda x: 1e14 * mpmath.exp(-s / (300 + 5 * x)), [0, mpmath.mpf(end)]) for end in t]
+    assert_exact(-weld.solution(t)["ln_unbonded"], [float(value) for value in exact], relative=3e-14)
+    assert_exact(weld.solution(1e4)["phi"], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("k_r", "n_2", "phi_i"), [(0.0, 1e16, 0.0), (0.5, 2e16, 0.0), (3.0, 0.4e16, 0.3), (1e-12, 1e16, 0.9)]
+)
+def test_bimolecular_bonding(k_r, n_2, phi_i):
+    """Against the quadrature of its rate, with 40 digits."""
+    sites = get("bimolecular-bonding")(k_f=1e-16, k_r=k_r, n_1=1e16, n_2=n_2, n_c=1e16, phi_i=phi_i)
+    t = np.array([1e-9, 0.1, 1.0, 10.0])
+    phi = sites.solution(t)["phi"]
+    with mpmath.workdps(40):
+        speed = lambda x: (1 - x) * (mpmath.mpf(n_2) / mpmath.mpf(1e16) - x) - mpmath.mpf(k_r) * x  # noqa: E731
+        for moment, end in zip(t, phi, strict=True):
+            elapsed = mpmath.quad(lambda x: 1 / speed(x), [mpmath.mpf(phi_i), mpmath.mpf(end)])
+            known = 4e-16 * max(end, phi_i) / abs(float(speed(mpmath.mpf(end)))) / moment  # rounding of phi as a time
+            assert_exact(float(elapsed), moment, relative=1e-12 + 4 * known)
+    assert_exact(get("bimolecular-bonding")(k_f=1e-16, n_1=1e16, n_2=1e16, n_c=1e16).solution(9.0)["phi"], 0.9)
