@@ -1,6 +1,7 @@
 """Figures that are computed when the documentation is built."""
 
 from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -149,7 +150,33 @@ def force_spectrum() -> Figure:
     return sweep_plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
 
 
+GALLERY: dict[str, tuple[list[str], str | None]] = {
+    "stick-slip": (["t_t", "v", "T"], None),
+    "stick-slip-rebonding": (["t_t", "phi"], None),
+    "coulomb-stop": (["v", "T"], None),
+    "cohesive-cycles": (["t_n"], "w_n"),
+    "dynamic-pull-off": (["g_n", "E_kinetic_n", "E_spring_n"], None),
+    "slow-passage": (["g_n"], None),
+    "cohesive-cooling": (["T"], "g_n"),
+    "debonding": (["t_n", "T"], None),
+    "debonding-cooling": (["t_n", "T"], None),
+    "press-hold-pull": (["theta_bond_s", "t_n"], None),
+    "snap-in": (["t_n"], "g_n"),
+    "thermal-press": (["g_n", "T_1", "T_2"], None),
+    "squeeze-film": (["g_n", "T"], None),
+    "closing-film": (["T"], "g_n"),
+}
+"""Cases of the gallery: what is plotted, and over what if not time."""
+
+
+def gallery(name: str) -> Figure:
+    """A case of the gallery."""
+    variables, against = GALLERY[name]
+    return plots.figure(surfacechem.run(name).dataset, variables, against)
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
+    **{f"gallery-{name}.svg": partial(gallery, name) for name in GALLERY},
     "accuracy.svg": accuracy,
     "signs.svg": signs,
     "press.svg": press,

@@ -296,9 +296,12 @@ def plot(
     variables: Annotated[
         str | None, typer.Option("--variables", help="Variables to plot, with commas between.")
     ] = None,
+    against: Annotated[
+        str | None, typer.Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
+    ] = None,
     changes: Changes = None,
 ) -> None:
-    """Plot a dataset or a case over time, or a sweep over its parameters."""
+    """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
     is_file = source.endswith((".nc", ".nc4", ".cdf"))
     target = output or Path(f"{Path(source).stem}.png")
     kind = _format(target)
@@ -311,7 +314,8 @@ def plot(
     solution = None if is_file else _solved_case(source, changes)
     chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
     dataset = solution.dataset if solution else plots.opened(Path(source))
-    figure = sweep_plots.figure(dataset, chosen) if "sweep" in dataset.attrs else plots.figure(dataset, chosen)
+    swept = "sweep" in dataset.attrs
+    figure = sweep_plots.figure(dataset, chosen) if swept else plots.figure(dataset, chosen, against)
     with replacing(target) as temporary:
         plots.save(figure, temporary, kind)
     typer.echo(str(target))

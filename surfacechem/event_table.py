@@ -26,17 +26,20 @@ def event_columns(trajectory: Trajectory) -> list[EventColumn]:
     """The table, without the columns of jumps where nothing jumped; empty where nothing happened."""
     margins, events = trajectory.model.margins, trajectory.result.events
     plain = [
-        (float(t), margins[i].reason, None) for t, i in zip(events.t, events.index, strict=True) if i < len(margins)
+        (float(t), margins[i].name, margins[i].reason, None)
+        for t, i in zip(events.t, events.index, strict=True)
+        if i < len(margins)
     ]
-    jumped = [(jump.t, jump.transition.reason, jump) for jump in trajectory.jumps]
+    jumped = [(jump.t, jump.transition.name, jump.transition.reason, jump) for jump in trajectory.jumps]
     rows = sorted([*plain, *jumped], key=lambda row: row[0])
     if not rows:
         return []
     columns = [
-        EventColumn("event_time", np.array([t for t, _, _ in rows]), "s", "time of the event"),
-        EventColumn("event_reason", np.array([reason for _, reason, _ in rows], dtype=object), "1", "what happened"),
+        EventColumn("event_time", np.array([row[0] for row in rows]), "s", "time of the event"),
+        EventColumn("event_name", np.array([row[1] for row in rows], dtype=object), "1", "name of the event"),
+        EventColumn("event_reason", np.array([row[2] for row in rows], dtype=object), "1", "what happened"),
     ]
-    return columns + (_jump_columns(trajectory, [jump for _, _, jump in rows]) if jumped else [])
+    return columns + (_jump_columns(trajectory, [row[3] for row in rows]) if jumped else [])
 
 
 def _jump_columns(trajectory: Trajectory, jumps: Sequence[Jump | None]) -> list[EventColumn]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,9 @@ from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
+from surfacechem import marks
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.panels import Panel, chosen, curves, merged, unit, usual, varies
 
 Array = NDArray[np.float64]
 
@@ -47,9 +49,6 @@ STYLE: Any = {
 DECADES = 1e3
 """Times that span more than this go on a logarithmic axis, unless they are evenly spaced."""
 
-FLAT = 1e-9
-"""A curve that changes by less than this part of its size is constant."""
-
 LEAST = 1e-18
 """Residuals below this are drawn as this."""
 
@@ -67,49 +66,51 @@ class Plot(Figure):
         return buffer.getvalue()
 
 
-@dataclass(frozen=True)
-class Panel:
-    """Curves that share an axis."""
-
-    title: str
-    unit: str
-    names: tuple[str, ...]
-
-
-KINDS: tuple[tuple[str, str, str], ...] = (
-    ("Temperature", "K", r"(?!.*_exact$).*"),
-    ("Bonding", "1", r"(?!formed_|.*_residual$|.*_exact$|J_c$|n_c$).*"),
-    ("Gap", "m", r"g_\w+"),
-    ("Velocity", "m s-1", r"\w+"),
-    ("Traction", "Pa", r"(?!.*_exact$|.*_nominal$).*"),
-    ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_exact$|.*_nominal$)\w+"),
-    ("Dissipation", "W m-2", r"D_\w+"),
-)
-"""Panels of the default figure: title, unit and pattern of the names."""
-
 RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
 """Residuals and the attributes that hold their largest relative values."""
 
 
-def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None) -> Figure:
-    """A figure of a run, from its dataset or its netCDF file; ``variables`` instead of the usual choice."""
+def figure(
+    data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None, against: str | None = None
+) -> Figure:
+    """A figure of a run, from its dataset or its netCDF file.
+
+    ``variables`` are shown instead of the usual choice; over the variable ``against`` instead of time.
+    """
     dataset = opened(data)
-    panels = _chosen(dataset, variables) if variables else _usual(dataset)
-    balances = not variables and any(name in dataset for name in RESIDUALS)
+    panels = chosen(dataset, variables) if variables else usual(dataset)
+    if against is not None:
+        panels = _others(dataset, panels, against)
+    balances = not variables and against is None and any(name in dataset for name in RESIDUALS)
     rows = len(panels) + balances
     if rows == 0 or dataset.sizes.get("time", 0) == 0:
         raise InputError("there is nothing to plot: the dataset holds no output times or none of its variables varies.")
     with matplotlib.rc_context(STYLE):
-        plot = Plot(figsize=(6.4, 0.9 + 1.55 * rows), layout="constrained")
+        plot = Plot(figsize=(6.4, 0.9 + (2.6 if against else 1.55) * rows), layout="constrained")
         FigureCanvasAgg(plot)
         axes = plot.subplots(rows, 1, sharex=True, squeeze=False)[:, 0].tolist()
         for ax, panel in zip(axes, panels, strict=False):
-            _draw(ax, dataset, panel)
+            _draw(ax, dataset, panel, against or "time")
         if balances:
             _draw_balances(axes[-1], dataset)
-        _time_axis(axes, dataset)
+        _variable_axis(axes[-1], dataset, against) if against else _time_axis(axes, dataset)
         headings(plot, axes[0], dataset)
     return plot
+
+
+def _others(dataset: xarray.Dataset, panels: Sequence[Panel], against: str) -> list[Panel]:
+    """The panels without the variable that is their axis."""
+    known = curves(dataset)
+    if against not in known:
+        raise InputError(f"no variable '{against}' over time in the dataset.{suggestion(against, known)}")
+    rest = [replace(panel, names=tuple(name for name in panel.names if name != against)) for panel in panels]
+    return [panel for panel in rest if panel.names]
+
+
+def _variable_axis(ax: Axes, dataset: xarray.Dataset, name: str) -> None:
+    text = str(dataset[name].attrs.get("long_name", name)).split(":")[0]
+    ax.set_xlabel(f"{text[:1].upper()}{text[1:]} {symbol(name)} [{unit_text(unit(dataset, name))}]")
+    ax.ticklabel_format(axis="x", useOffset=False, scilimits=(-3, 5))
 
 
 def save(plot: Figure, target: Any, kind: str) -> None:
@@ -131,53 +132,8 @@ def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(data))) from error
 
 
-def _curves(dataset: xarray.Dataset) -> list[str]:
-    """Variables that are functions of time alone."""
-    return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("time",)]
-
-
-def _unit(dataset: xarray.Dataset, name: str) -> str:
-    return str(dataset[name].attrs.get("units", "1"))
-
-
-def _usual(dataset: xarray.Dataset) -> list[Panel]:
-    panels = []
-    for title, unit, pattern in KINDS:
-        names = [n for n in _curves(dataset) if _unit(dataset, n) == unit and re.fullmatch(pattern, n)]
-        if title == "Heat flux" and {"q_1", "q_2"} & set(names):
-            names = [n for n in names if n in ("q_1", "q_2")]
-        if any(varies(dataset[n].values) for n in names):
-            panels.append(Panel(title, unit, tuple(names)))
-    return panels
-
-
-def varies(values: Array) -> bool:
-    """Whether a curve is more than a constant with rounding."""
-    finite = values[np.isfinite(values)]
-    if len(finite) < 2:
-        return len(finite) == 1
-    return bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))
-
-
-def _chosen(dataset: xarray.Dataset, variables: Sequence[str]) -> list[Panel]:
-    known = _curves(dataset)
-    for name in variables:
-        if name not in known:
-            raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
-    units = dict.fromkeys(_unit(dataset, name) for name in variables)
-    groups = {unit: tuple(n for n in dict.fromkeys(variables) if _unit(dataset, n) == unit) for unit in units}
-    return [Panel(_title(dataset, names), unit, names) for unit, names in groups.items()]
-
-
-def _title(dataset: xarray.Dataset, names: Sequence[str]) -> str:
-    if len(names) > 1:
-        return ""
-    text = str(dataset[names[0]].attrs.get("long_name", names[0])).split(":")[0]
-    return text[:1].upper() + text[1:] if len(text) < 26 else ""
-
-
-def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> None:
-    t = dataset["time"].values
+def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
+    t = dataset[over].values
     for names in merged(dataset, panel.names):
         ax.plot(t, dataset[names[0]].values, label=" = ".join(map(symbol, names)), marker="o" if len(t) == 1 else "")
     exact = [name for name in panel.names if f"{name}_exact" in dataset]
@@ -189,19 +145,6 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel) -> None:
     ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
     _margins(ax, dataset, panel.names)
     legend(ax)
-
-
-def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
-    """The names in groups whose curves coincide, so that none hides another."""
-    groups: list[list[str]] = []
-    for name in names:
-        values = dataset[name].values
-        twin = next((g for g in groups if np.allclose(dataset[g[0]].values, values, rtol=1e-9, atol=0.0)), None)
-        if twin is not None:
-            twin.append(name)
-        else:
-            groups.append([name])
-    return groups
 
 
 def _margins(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
@@ -244,9 +187,8 @@ def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
         for ax in axes:
             ax.set_xscale("log")
             ax.set_xlim(times[times > 0][0], times[-1])
-    for moment in np.unique(dataset["event_time"].values) if "event_time" in dataset else ():
-        for ax in axes:
-            ax.axvline(moment, color="black", linewidth=0.7, linestyle=":")
+    marks.bands(axes, dataset)
+    marks.events(axes, dataset)
 
 
 def logarithmic(times: Array) -> bool:

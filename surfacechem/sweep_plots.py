@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.plots import COLOURS, KINDS, STYLE, Plot, headings, legend, opened, symbol, unit_text, varies
+from surfacechem.panels import KINDS, varies
+from surfacechem.plots import COLOURS, STYLE, Plot, headings, legend, opened, symbol, unit_text
 from surfacechem.sweep_dataset import WORDS, recorded_plan
 
 Array = NDArray[np.float64]

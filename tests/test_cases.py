@@ -96,6 +96,24 @@ def test_an_exact_solution_of_another_scene_is_not_used(simulations):
     assert "it says nothing of phi" in third.source
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "reason"),
+    [
+        ("stick-slip", "mechanics.tangential.c_g=1 kPa s/m", "it misses the equation of"),
+        ("stick-slip", "initial.v=1 mm/s", "it starts from v = 0"),
+        ("stick-slip", "loading.w_t={harmonic: {amplitude: 1 mm, frequency: 1 Hz}}", "it needs V"),
+        ("cohesive-pull-off", "mechanics={normal: {m: 1 kg/m^2, c_g: 1 MPa s/m}}", "it says nothing of v_n"),
+        ("coulomb-stop", "loading.p={ramp: {start: 30 kPa, rate: 10 MPa/s}}", "it misses the equation of v"),
+        ("debonding", "loading.w_n={table: {times: [0 s, 9 s], values: [0, 9 um]}}", "it needs w_dot"),
+    ],
+)
+def test_an_exact_solution_of_mechanics_of_another_scene_is_not_used(name, change, reason):
+    changes = [change, "initial.g_n=0"] if "normal" in change else [change]
+    source = surfacechem.run(name, changes).accuracy.source
+    assert "is not of this scene" in source
+    assert reason in source
+
+
 def test_an_exact_solution_is_used_far_beyond_its_time_scale():
     assert surfacechem.run("exothermic", ["run.until=50 s"]).accuracy.source == "exact solution exothermic-bonding"
 

@@ -28,6 +28,8 @@ FLOORS = {
         "check",
         "listing",
         "plots",
+        "panels",
+        "marks",
         "printing",
         "report",
         "ratecurves",

@@ -7,7 +7,8 @@ import pytest
 import xarray
 
 from surfacechem.errors import InputError
-from surfacechem.plots import figure, logarithmic, merged, save, symbol
+from surfacechem.panels import merged
+from surfacechem.plots import figure, logarithmic, save, symbol
 
 
 def dataset(times=None, **more):
@@ -84,6 +85,51 @@ def test_events_are_marked():
     events = {"event_time": ("event", np.array([0.5]), {"units": "s"})}
     plot = figure(dataset().assign(events))
     assert any(line.get_linestyle() == ":" for line in plot.axes[0].get_lines())
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def with_events(times, names, **modes):
+    given = {
+        "event_time": ("event", np.array(times), {"units": "s"}),
+        "event_name": ("event", np.array(names, dtype=object), {"units": "1"}),
+    }
+    return dataset(**modes).assign(given)
+
+
+def test_few_events_have_their_names():
+    assert texts(figure(with_events([0.5, 1.5], ["debond", "touch"])).axes[0]) == ["debond", "touch"]
+    many = np.linspace(0.1, 1.9, 20)
+    assert texts(figure(with_events(many, ["snap"] * 20)).axes[0]) == []
+
+
+def test_modes_are_bands():
+    t = np.linspace(0.0, 2.0, 21)
+    data = with_events([0.55], ["debond"], bonded=("1", np.where(t < 0.55, 1.0, 0.0)))
+    data["bonded"].attrs["long_name"] = "mode (0: debonded, 1: bonded)"
+    first, *_ = figure(data).axes
+    (band,) = first.patches
+    assert (band.get_x(), band.get_width()) == pytest.approx((0.55, 1.45))
+    assert "bonded" not in "".join(str(names) for names in labels(figure(data)))
+
+
+def test_stages_have_their_names():
+    t = np.linspace(0.0, 2.0, 21)
+    data = with_events([0.55], ["end of press"], stage=("1", np.where(t < 0.55, 0.0, 1.0)))
+    data["stage"].attrs["long_name"] = "mode (0: press, 1: after the last stage)"
+    assert texts(figure(data).axes[0]) == ["press", "after the last stage"]
+
+
+def test_another_axis_than_time():
+    plot = figure(dataset(), ["T_1", "phi"], "phi")
+    (ax,) = plot.axes
+    assert ax.get_xlabel() == r"Phi $\phi$ [1]"
+    assert ax.get_lines()[0].get_xdata()[-1] == pytest.approx(1 - np.exp(-2.0))
+    assert all("residual" not in ax.get_ylabel() for ax in figure(dataset(), against="phi").axes)
+    with pytest.raises(InputError, match="Did you mean 'phi'"):
+        figure(dataset(), against="phy")
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])

@@ -117,6 +117,8 @@ def _probes(run: Trajectory) -> tuple[Array, Array]:
     """Times at which the equations are tested, inside the stretches between events, and how long each has lasted."""
     edges = np.unique(np.append(run.result.problem.segments, run.result.times[-1]))
     edges = edges[edges <= run.result.times[-1]]
+    if len(edges) < 2:
+        raise InputError("the run ended before anything could be compared.")
     chosen = np.unique(np.linspace(0, len(edges) - 2, PROBES).astype(int))
     parts = np.linspace(0.1, 0.9, max(2, PROBES // len(chosen)))
     starts, lengths = edges[chosen], np.diff(edges)[chosen]
