@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible
 
 ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
+
+CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "disp": False}
+"""How closely a root of the tractions is found: to rounding."""
 
 NEWTON = 60
 POLISH = 3
@@ -343,4 +347,4 @@ def _zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> fl
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300, disp=False))
+    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))

@@ -35,7 +35,7 @@ LOST = 1e-4
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
-DATASET_NAMES = {"Q_1": "Q_ext_1", "Q_2": "Q_ext_2", "Q_c": "Q_ext_c"}
+DATASET_NAMES = {"Q_1": "Q_ext_1", "Q_2": "Q_ext_2", "Q_c": "Q_ext_c", "W_n": "work_n", "W_t": "work_t"}
 """Names that differ in the dataset, where no two may be the same but for their case."""
 
 
@@ -191,7 +191,10 @@ class Solution:
     def _ledger(self) -> list[Column]:
         values = self.trajectory.result.ledger_outputs
         accounts = [account.quantity for account in self.trajectory.model.system.ledger]
-        return [Column(q.name, ("time",), values[:, j], q.unit, q.long_name) for j, q in enumerate(accounts)]
+        return [
+            Column(DATASET_NAMES.get(q.name, q.name), ("time",), values[:, j], q.unit, q.long_name)
+            for j, q in enumerate(accounts)
+        ]
 
     def _balances(self) -> list[Column]:
         books = self.audit

@@ -92,7 +92,7 @@ def test_a_failing_write_leaves_nothing_behind(solution, tmp_path, monkeypatch):
     def fail(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("surfacechem.solution._write_netcdf", fail)
+    monkeypatch.setattr("surfacechem.solution.write_netcdf", fail)
     with pytest.raises(OSError, match="disk full"):
         solution.write(tmp_path / "out.nc")
     assert list(tmp_path.iterdir()) == []
