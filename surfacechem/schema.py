@@ -135,7 +135,8 @@ def _mechanics() -> Schema:
 
 def _programme() -> Schema:
     value = {"anyOf": [_ref("quantity"), _object({way: _ref("quantity") for way in WAYS})]}
-    until = {"anyOf": [{"type": "string"}, {"type": "object", "additionalProperties": value}]}
+    waits = {**_object(dict.fromkeys(VARIABLES, value), patterns={NODE.pattern: value}), "maxProperties": 1}
+    until = {"anyOf": [{"type": "string"}, waits]}
     rates = {name: _quantity(f"rate of the {_variable(name)}") for name in LOADABLE}
     stage = _object({**rates, "for": _quantity("length of the stage [s]"), "until": until})
     items = {"type": "object", "additionalProperties": stage, "minProperties": 1, "maxProperties": 1}

@@ -42,8 +42,8 @@ class AnisotropicViscous(Friction):
     Dissipates :math:`t_t v + t_2 v_2 \ge 0`.
 
     >>> law = AnisotropicViscous(eta_1=0.5, eta_2=0.2)
-    >>> law.traction(g_n=1e-6, v=0.25), law.transverse(g_n=1e-6, v_2=1.0)
-    (125000.0, 200000.0)
+    >>> law.traction(g_n=0.5, v=0.25), law.transverse(g_n=0.5, v_2=1.0)
+    (0.25, 0.4)
     """
 
     positive = ("g_n",)
