@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.jumps import Jump, Jumper, Point
+from surfacechem.jumps import DRIFT, Jump, Jumper, Point
 from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.system import START, System
@@ -164,8 +164,11 @@ class Hybrid:
 
     def _settled(self, point: Point) -> Point | None:
         """The point after all transitions that are due at its own time."""
-        for _ in range(AT_ONCE):
-            due = self._due(point)
+        while not self._chatters(point.t):
+            now = self._margins(point)
+            if self._ended(now):
+                return None
+            due = self._due(now[self.first :], point)
             if due is None:
                 return point
             jumped = self._jump(due, point)
@@ -178,19 +181,35 @@ class Hybrid:
         )
         return None
 
-    def _due(self, point: Point) -> int | None:
-        """The transition whose margin is closed, or is zero and closing."""
+    def _chatters(self, t: float) -> bool:
+        """Whether more transitions have followed each other without time going on than any cause needs."""
+        return len(self.jumps) >= AT_ONCE and self.jumps[-AT_ONCE].t >= t * (1 - REACHED)
+
+    def _margins(self, point: Point) -> Array:
         if self.jumper.margins_read_rates:
             point = self._consistent(point)
         margins = self.problem.program.margins
         assert margins is not None
         now = margins(point.inputs())
         self.largest = np.maximum(self.largest, np.abs(now))
-        small = NOISE * self.largest
-        closed = now[self.first :] < -small[self.first :]
-        zero = np.abs(now[self.first :]) <= small[self.first :]
-        if zero.any():
-            closed |= zero & (self.jumper.margin_rates(self._consistent(point)) < 0)
+        return now
+
+    def _ended(self, now: Array) -> bool:
+        """Whether a jump has carried the state to where a law ends."""
+        kinds = self.problem.margins[: self.first]
+        closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < -NOISE * self.largest[i]]
+        if closed and self.jumps:
+            self.status, self.reason = Status.EVENT, self.system.moving_margins()[closed[0]].reason
+        return bool(closed and self.jumps)
+
+    def _due(self, now: Array, point: Point) -> int | None:
+        """The transition whose margin is closed, or is zero and closing; the drift of the integration is not closed."""
+        small = NOISE * self.largest[self.first :]
+        drift = np.maximum(DRIFT * self.problem.rtol * self.largest[self.first :], small)
+        closed = now < -drift
+        near = ~closed & (now <= small)
+        if near.any():
+            closed |= near & (self.jumper.margin_rates(self._consistent(point)) < 0)
         return int(closed.argmax()) if closed.any() else None
 
     def _consistent(self, point: Point) -> Point:

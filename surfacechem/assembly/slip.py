@@ -6,6 +6,7 @@ by something that depends on its rate, or rate-independent, in which case the tr
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -229,18 +230,19 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
                 f"slip {word}", margin, reason, {slip: symengine.Integer(s)}, jump, settles=settles, sinks="local"
             )
         )
-    onward = where(absolute(needed) <= limit, 0, sign(needed))
+    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
     stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
     build.transitions.append(
         Transition("stop", where(slip**2 > 0, slip * v, 1), "sliding comes to a stop", {slip: onward}, stop)
     )
 
 
-def stick_limit(build: Build, law: Friction, bound: Friction) -> None:
+def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
     if build.slip is None or not build.slip.sticks:
         return
-    at_rest = {"v": NONE, "direction": symengine.Integer(1)}
+    at_rest = {**own, "v": NONE, "direction": symengine.Integer(1)}
     kinetic = build.variables.call(bound, bound.statement, at_rest)
     if law.has_limit:
         static = build.variables.call(bound, bound.limit, at_rest)
