@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 OPEN = 1e-6
 """Relative residual above which a balance counts as open at tolerances up to 1e-9; more at looser ones."""
 
-ROUNDINGS = 10.0
+EPSILON = float(np.finfo(float).eps)
+ROUNDINGS = 50.0
 """Number of last digits that add up in a balance."""
 
 SLACK = 10.0
@@ -101,7 +102,9 @@ class _Books:
         self.trajectory = trajectory
         self.system = trajectory.model.system
         self.names = [item.name for item in self.system.outputs]
-        self.ledger = trajectory.result.ledger_outputs
+        ledger = trajectory.result.ledger_outputs
+        # Transitions at the very start come before the first output.
+        self.ledger = ledger - ledger[:1]
         self.outputs = trajectory.outputs
 
     def column(self, name: str) -> Array:
@@ -134,7 +137,7 @@ class _Books:
             energy_scale=_largest(exchanged),
             entropy_scale=_largest(turned),
             rtol=self.trajectory.run.rtol,
-            energy_rounding=self.trajectory.roundings["E_total"],
+            energy_rounding=max(self.trajectory.roundings["E_total"], EPSILON * _largest([self.column("E_total")])),
             least=low,
             largest=high,
         )

@@ -1,6 +1,5 @@
 """Random scenes of moving gaps: laws, parameters over many decades, loads and programmes, all from one seed."""
 
-import math
 import random
 
 from scenes import SITES, path, varying
@@ -23,6 +22,7 @@ from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesFlatFlat, VanDerWaalsFlatFlat
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
+from surfacechem.terms import reads
 
 
 class Dice:
@@ -77,15 +77,15 @@ def _limit(dice: Dice, strength: float) -> TensileStrength:
     )
 
 
-def history(dice: Dice, size: float):
-    """A load about a size over the run."""
+def history(dice: Dice, size: float, *, smooth: bool):
+    """A load about a size over the run; made of straight lines unless it may be smooth."""
     end = dice.end
     times = sorted(dice.random.uniform(0, end) for _ in range(5))
     pulse = times[0] + end * 1e-9
     return dice.pick(
         Hold(level=dice.signed(size)),
         Ramp(start=0.0, rate=dice.signed(size) / end),
-        Harmonic(mean=dice.pick(0.0, size), amplitude=size, frequency=dice.near(3 / end)),
+        *[Harmonic(mean=dice.pick(0.0, size), amplitude=size, frequency=dice.near(3 / end))] * smooth,
         Table(times=[0.0, *times], values=[dice.random.uniform(-size, size) for _ in range(6)]),
         Table(times=[0.0, times[0], pulse, pulse + end * 1e-9], values=[0.0, 0.0, dice.signed(size), 0.0]),
     )
@@ -136,7 +136,9 @@ def random_scene(seed: int) -> tuple[Scene, float]:
     drives = [f"w_{axis}" for axis, used in (("n", normal), ("t", sliding)) if used]
     programme = stages(dice, drives) if programmed else ()
     moved = {name for stage in programme for name in stage.rates}
-    loading |= {name: history(dice, dice.near(dice.length)) for name in drives if name not in moved}
+    loading |= {
+        name: history(dice, dice.near(dice.length), smooth=name == "w_n") for name in drives if name not in moved
+    }
     if normal:
         mounts["normal"] = mounting(dice)
         initial["g_n"] = 3e-10 if isinstance(potentials[0], LennardJonesFlatFlat) else 0.0
@@ -151,8 +153,6 @@ def random_scene(seed: int) -> tuple[Scene, float]:
 
 
 def _read(potential) -> tuple[str, ...]:
-    from surfacechem.terms import reads
-
     return reads(potential.statement)
 
 
@@ -194,4 +194,4 @@ def _varies(potential) -> bool:
 
 def _where(frictions) -> tuple:
     """Bonds form while the interface sticks, where it can."""
-    return (Linear(of="sticking", about=1.0, slope=1.0),) if frictions and math.inf else ()
+    return (Linear(of="sticking", about=1.0, slope=1.0),) if frictions else ()
