@@ -19,7 +19,7 @@ from surfacechem.jumps import Jump, Jumper, Point
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
-from surfacechem.system import START, System
+from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
@@ -297,14 +297,9 @@ class Model:
         return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 
     def _margins(self, result: Result, t: float, y: Array, ydot: Array) -> Array:
-        """Margins at a point of the last stretch; times of a scene with transitions count from its start."""
+        """Margins at a point of the last stretch."""
         assert self.program.margins is not None
-        parameters = result.problem.parameters[-1].copy()
-        start = result.problem.segments[-2] if self.jumper is not None else 0.0
-        for j, parameter in enumerate(self.system.parameters):
-            if parameter.path == START:
-                parameters[j] = start
-        return self.program.margins(np.concatenate([[t - start], y, ydot, parameters]))
+        return self.program.margins(np.concatenate([[t], y, ydot, result.problem.parameters[-1]]))
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""
