@@ -85,7 +85,8 @@ class Trajectory:
             nudged = result.outputs.copy()
             nudged[:, j] *= 1 + np.finfo(float).eps
             values = self.model.evaluate(result, result.times, nudged, self.rates)
-            worst = np.maximum(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
+            with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
+                worst = np.fmax(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
         names = [item.name for item in self.model.system.outputs]
         return dict(zip(names, worst, strict=True))
 
