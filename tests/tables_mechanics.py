@@ -173,7 +173,7 @@ def pull_off(q: dict) -> tuple[Solved, list[float]]:
         normal=Mounting(k=q["k_eff"]),
     )
     solved = solve(Model(assemble(scene)), np.linspace(0.0, 3.0, 31))
-    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.jumps]
+    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.of("snap")]
 
 
 def heating(energy) -> Solved:
@@ -263,7 +263,7 @@ def snap(q: dict) -> tuple[Solved, list[float]]:
         normal=Mounting(k=q["k_eff"]),
     )
     solved = solve(Model(assemble(scene)), np.linspace(0.0, 2.0, 21))
-    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.jumps]
+    return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.of("snap")]
 
 
 @cache

@@ -155,7 +155,7 @@ class TestCohesion:
     @each_row("h_pulloff_vs_stiffness", "k_g0_over_tmax")
     def test_pull_off_and_pull_on(self, row):
         solved, w = scenes.pull_off(row)
-        off, on = solved.jumps
+        off, on = solved.of("snap")
         found = [solved.state(off, "g_n", "before"), w[0], solved.state(off, "g_n"), off.released]
         assert_each(found, [row[name] for name in ("g_off", "w_off", "g_after", "release_off")], EVENTS)
         found = [solved.state(on, "g_n", "before"), w[1], solved.state(on, "g_n"), on.released]
@@ -167,7 +167,7 @@ class TestCohesion:
     @pytest.mark.parametrize(("energy", "column"), [(Quadratic, "T_quadratic"), (Constant, "T_constC")])
     def test_heating_by_cycles(self, energy, column):
         solved = scenes.heating(energy)
-        temperatures = [solved.state(jump, "T") for jump in solved.jumps]
+        temperatures = [solved.state(jump, "T") for jump in solved.of("snap")]
         assert_each([*temperatures[:2], *temperatures[3::2]], columns("h_pulloff_heating")[column], EVENTS)
         assert_closed(solved)
 
@@ -216,7 +216,7 @@ class TestLongRange:
     @each_row("i_lj_snap", "k_over_kmax")
     def test_snap_in_and_pull_off(self, row):
         solved, w = scenes.snap(row)
-        into, off = solved.jumps
+        into, off = solved.of("snap")
         found = [solved.state(into, "g_n", "before"), w[0], solved.state(off, "g_n", "before"), w[1]]
         assert_each(found, [row[name] for name in ("g_snap_in", "w_snap_in", "g_pull_off", "w_pull_off")], EVENTS)
         assert_closed(solved)

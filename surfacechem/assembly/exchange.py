@@ -47,9 +47,7 @@ def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
     return {"p": positive(build.variables.get("p", law))}
 
 
-def _across(
-    build: Build, law: Friction, bound: Friction, label: str, pressed: dict[str, Expression]
-) -> Expression:
+def _across(build: Build, law: Friction, bound: Friction, label: str, pressed: dict[str, Expression]) -> Expression:
     """Power of the traction across v, where the law has one."""
     if not hasattr(bound, "transverse"):
         return symengine.Integer(0)
