@@ -4,12 +4,11 @@ import random
 
 from scenes import SITES, path, varying
 
-from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bonding import BondEnergy, BondSprings
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.contact import (
     BondedContact,
-    BondSprings,
     InterfaceCapacity,
     NormalStiffness,
     Penalty,
