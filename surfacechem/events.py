@@ -140,6 +140,7 @@ class Hybrid:
         times = problem.times[self.written : last]
         local = start.parameters.copy()
         local[self.clock] = start.t
+        local[self.system.origins] -= start.t
         part = _with(
             problem,
             y0=start.y,

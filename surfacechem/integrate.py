@@ -19,7 +19,7 @@ from surfacechem.jumps import Jump, Jumper, Point
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
-from surfacechem.system import START, System
+from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
@@ -85,7 +85,8 @@ class Trajectory:
             nudged = result.outputs.copy()
             nudged[:, j] *= 1 + np.finfo(float).eps
             values = self.model.evaluate(result, result.times, nudged, self.rates)
-            worst = np.maximum(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
+            with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
+                worst = np.fmax(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
         names = [item.name for item in self.model.system.outputs]
         return dict(zip(names, worst, strict=True))
 
@@ -292,19 +293,14 @@ class Model:
             k = int(np.searchsorted(steps.t, result.problem.segments[-2]))
             k = min(k, len(steps.t) - 1)
             first = self._margins(result, steps.t[k], steps.y[k], steps.ydot[k])
-        shrink = [abs(b / a) if a and b > 0 else float(b > 0) for a, b in zip(first, last, strict=True)]
+        shrink = [0.0 if b <= 0 else abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
         order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
         return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 
     def _margins(self, result: Result, t: float, y: Array, ydot: Array) -> Array:
-        """Margins at a point of the last stretch; times of a scene with transitions count from its start."""
+        """Margins at a point of the last stretch."""
         assert self.program.margins is not None
-        parameters = result.problem.parameters[-1].copy()
-        start = result.problem.segments[-2] if self.jumper is not None else 0.0
-        for j, parameter in enumerate(self.system.parameters):
-            if parameter.path == START:
-                parameters[j] = start
-        return self.program.margins(np.concatenate([[t - start], y, ydot, parameters]))
+        return self.program.margins(np.concatenate([[t], y, ydot, result.problem.parameters[-1]]))
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""

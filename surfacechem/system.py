@@ -274,8 +274,15 @@ class System:
     def local(self, expressions: Sequence[Expression]) -> list[Expression]:
         """Expanded expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
-        shift = {self.t: self.t + start}
+        shift = {self.t: self.t + start} | {
+            self.parameters[j].symbol: self.parameters[j].symbol + start for j in self.origins
+        }
         return [symengine.sympify(self.expand(item)).subs(shift) for item in expressions]
+
+    @cached_property
+    def origins(self) -> list[int]:
+        """Columns of the times from which pieces of histories count; a stretch gives them in its own time."""
+        return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
 
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run."""

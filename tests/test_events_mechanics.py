@@ -117,7 +117,7 @@ class TestChatter:
 
     @pytest.mark.parametrize("mu_s", [None, 0.1])
     def test_limit_not_above_kinetic_friction(self, mu_s):
-        """A static limit below the sliding one is the sliding one; a mass on a spring ends up in steady motion."""
+        """A static limit below the sliding one is the sliding one; a damped mass ends up in steady motion."""
         friction = Coulomb(mu=0.4, mu_s=mu_s)
         solved = solve(slider(friction, Mounting(k=1e8, m=10.0, c_b=3e4), Ramp(rate=1e-3)), (0.0, 1.0, 2.0))
         assert solved.status == "finished"

@@ -216,7 +216,7 @@ class TestLongRange:
     @each_row("i_lj_snap", "k_over_kmax")
     def test_snap_in_and_pull_off(self, row):
         solved, w = scenes.snap(row)
-        into, off = solved.jumps
+        into, off = solved.of("snap")
         found = [solved.state(into, "g_n", "before"), w[0], solved.state(off, "g_n", "before"), w[1]]
         assert_each(found, [row[name] for name in ("g_snap_in", "w_snap_in", "g_pull_off", "w_pull_off")], EVENTS)
         assert_closed(solved)

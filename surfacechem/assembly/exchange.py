@@ -29,7 +29,7 @@ def friction(build: Build) -> None:
         build.law_margins(law, {}, met=pressed)
         traction = build.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
         v = build.variables.get("v", law)
-        power = build.stretch * traction * v + _across(build, law, bound, label)
+        power = build.stretch * traction * v + _across(build, law, bound, label, pressed)
         build.frictions.add(label)
         build.dissipation[label] = power
         if build.slip is None:
@@ -47,13 +47,13 @@ def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
     return {"p": positive(build.variables.get("p", law))}
 
 
-def _across(build: Build, law: Friction, bound: Friction, label: str) -> Expression:
+def _across(build: Build, law: Friction, bound: Friction, label: str, pressed: dict[str, Expression]) -> Expression:
     """Power of the traction across v, where the law has one."""
     if not hasattr(bound, "transverse"):
         return symengine.Integer(0)
     if build.slip is not None:
         raise InputError("a law with two directions needs both velocities prescribed, `v` and `v_2`.", law.place)
-    traction = build.variables.call(bound, bound.transverse)
+    traction = build.variables.call(bound, bound.transverse, pressed)
     quantity = Quantity(f"t_2_{label}", "Pa", f"tangential traction of {law.title} across v")
     return build.stretch * build.name(quantity, traction) * build.variables.get("v_2", law)
 
