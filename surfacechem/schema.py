@@ -50,6 +50,7 @@ def schema() -> Schema:
     for contract in CONTRACTS:
         definitions |= {_key(contract, law): _law(law) for law in laws.laws(contract).values()}
         definitions[contract.contract] = _any_law(contract)
+    definitions["loading.table"] = {"anyOf": [definitions["loading.table"], *_csv_tables()]}
     definitions["history"] = {"anyOf": [_ref("quantity"), _ref(Load.contract)]}
     definitions["temperature"] = {
         "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a history",
@@ -63,6 +64,14 @@ def schema() -> Schema:
         **_object(properties, required=("bodies", "run")),
         "$defs": definitions,
     }
+
+
+def _csv_tables() -> list[Schema]:
+    """A table from a file, or from its text."""
+    column = {"type": "string", "description": "the column of the values, if not named after the variable"}
+    texts = {"file": "a CSV file beside the case; its first line is like t [s], w_n [um]", "csv": "the text of such a file"}
+    entries = {key: {"type": "string", "description": meaning} for key, meaning in texts.items()}
+    return [_object({key: entry, "column": column}, required=(key,)) for key, entry in entries.items()]
 
 
 def text() -> str:
