@@ -9,16 +9,16 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.jumps import Jump, Jumper, Point
+from surfacechem.jumps import DRIFT, Jump, Jumper, Point
 from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
-from surfacechem.system import START, System
+from surfacechem.system import HELD, START, System
 
 Array = NDArray[np.float64]
 
@@ -31,8 +31,14 @@ REACHED = 1e-14
 LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
 
-AT_ONCE = 100
-"""Transitions at one moment above which they are chatter."""
+ATOM = 1e-20
+"""Gap [m] that counts as none where a run stalls."""
+
+AT_ONCE = 12
+"""Transitions at one moment from which on they are chatter."""
+
+HOLD, LONGEST_HOLD = 1e-9, 1e-4
+"""Parts of a run for which chatter of friction is resolved to sticking: the first time, then longer, and at most."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,9 @@ class Hybrid:
     largest: Array = field(default_factory=lambda: np.zeros(0))
     booked: Array = field(default_factory=lambda: np.zeros(0))
     """Ledger now."""
+    hold: float = HOLD
+    calm: int = 0
+    """Number of transitions before the last chatter that was resolved."""
     steps: int = 0
     written: int = 0
     """Number of outputs written."""
@@ -108,6 +117,10 @@ class Hybrid:
             if part.status is Status.FINISHED:
                 return point
             index = self._transition(part, point)
+            across = self._across_kink(part, point) if index is None else None
+            if across is not None:
+                point = across
+                continue
             if index is None:
                 self.status = part.status
                 return None
@@ -160,12 +173,23 @@ class Hybrid:
             return index if index >= 0 else None
         return self.jumper.lost_equilibrium(point, self.problem.rtol) if part.status in LOST else None
 
+    def _across_kink(self, part: Part, point: Point) -> Point | None:
+        """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
+        if part.status not in LOST:
+            return None
+        gaps = np.array([state.quantity.unit == "m" for state in self.system.states])
+        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
+
     # -- what happens at one moment -------------------------------------------------------------------------------
 
     def _settled(self, point: Point) -> Point | None:
         """The point after all transitions that are due at its own time."""
-        for _ in range(AT_ONCE):
-            due = self._due(point)
+        while not self._chatters(point.t) or self._hold(point):
+            now = self._margins(point)
+            if self._ended(now):
+                return None
+            due = self._due(now[self.first :], point)
             if due is None:
                 return point
             jumped = self._jump(due, point)
@@ -178,19 +202,47 @@ class Hybrid:
         )
         return None
 
-    def _due(self, point: Point) -> int | None:
-        """The transition whose margin is closed, or is zero and closing."""
+    def _chatters(self, t: float) -> bool:
+        """Whether more transitions have followed each other without time going on than any cause needs."""
+        recent = len(self.jumps) - self.calm
+        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t * (1 - REACHED)
+
+    def _hold(self, point: Point) -> bool:
+        """Let friction that sticks and slides without end stick for a while; whether that could be done."""
+        columns = {p.path: j for j, p in enumerate(self.system.parameters)}
+        if HELD not in columns or len(self.jumps) - self.calm > 2 * AT_ONCE or self.hold > LONGEST_HOLD:
+            return False
+        if self.jumps[-1].transition.name == "stop":
+            point.parameters[columns["mode.slip"]] = 0.0
+            point.parameters[columns[HELD]] = point.t + self.hold * self.problem.segments[-1]
+            self.hold, self.calm = 10 * self.hold, len(self.jumps)
+        return True
+
+    def _margins(self, point: Point) -> Array:
         if self.jumper.margins_read_rates:
             point = self._consistent(point)
         margins = self.problem.program.margins
         assert margins is not None
         now = margins(point.inputs())
         self.largest = np.maximum(self.largest, np.abs(now))
-        small = NOISE * self.largest
-        closed = now[self.first :] < -small[self.first :]
-        zero = np.abs(now[self.first :]) <= small[self.first :]
-        if zero.any():
-            closed |= zero & (self.jumper.margin_rates(self._consistent(point)) < 0)
+        return now
+
+    def _ended(self, now: Array) -> bool:
+        """Whether a jump has carried the state to where a law ends."""
+        kinds = self.problem.margins[: self.first]
+        closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < -NOISE * self.largest[i]]
+        if closed and self.jumps:
+            self.status, self.reason = Status.EVENT, self.system.moving_margins()[closed[0]].reason
+        return bool(closed and self.jumps)
+
+    def _due(self, now: Array, point: Point) -> int | None:
+        """The transition whose margin is closed, or is zero and closing; the drift of the integration is not closed."""
+        small = NOISE * self.largest[self.first :]
+        drift = np.maximum(DRIFT * self.problem.rtol * self.largest[self.first :], small)
+        closed = now < -drift
+        near = ~closed & (now <= small)
+        if near.any():
+            closed |= near & (self.jumper.margin_rates(self._consistent(point)) < 0)
         return int(closed.argmax()) if closed.any() else None
 
     def _consistent(self, point: Point) -> Point:

@@ -19,7 +19,7 @@ from surfacechem.jumps import Jump, Jumper, Point
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
-from surfacechem.system import System
+from surfacechem.system import START, System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
@@ -273,29 +273,38 @@ class Model:
         shrunk = self._closest_margin(result)
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"
-        if result.status is Status.NO_CONSISTENT_STATE and any(state.algebraic for state in self.system.states):
-            names = ", ".join(state.name for state in self.system.states if state.algebraic)
+        algebraic = [state for state in self.system.states if state.algebraic]
+        if result.status is Status.NO_CONSISTENT_STATE and algebraic:
+            names = ", ".join(state.name for state in algebraic)
             reason = f"ignition: no temperature {names} balances the heat that the interface produces"
+            if any(state.quantity.unit != "K" for state in algebraic):
+                reason = f"no {names} satisfies the balances that have no inertia or capacity"
             return "stopped", f"{reason} at {where}"
         return "failed", f"{REASONS[result.status]} at {where}"
 
     def _closest_margin(self, result: Result) -> str | None:
-        """Reason of the margin that has closed, or all but closed, where a run could not go on."""
-        if result.steps is None or len(result.steps.t) < 2 or self.program.margins is None:
+        """Reason of the margin that is closed, or has all but closed, where a run could not go on."""
+        if self.program.margins is None:
             return None
-        first = self._margins(result, 0)
-        last = self._margins(result, -1)
-        shrink = [0.0 if b < 0 else abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
+        last = self._margins(result, result.t, result.y, result.ydot)
+        first, steps = last, result.steps
+        if steps is not None and len(steps.t):
+            k = int(np.searchsorted(steps.t, result.problem.segments[-2]))
+            k = min(k, len(steps.t) - 1)
+            first = self._margins(result, steps.t[k], steps.y[k], steps.ydot[k])
+        shrink = [abs(b / a) if a and b > 0 else float(b > 0) for a, b in zip(first, last, strict=True)]
         order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
         return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
 
-    def _margins(self, result: Result, step: int) -> Array:
-        steps = result.steps
-        assert steps is not None
+    def _margins(self, result: Result, t: float, y: Array, ydot: Array) -> Array:
+        """Margins at a point of the last stretch; times of a scene with transitions count from its start."""
         assert self.program.margins is not None
-        parameters = result.problem.parameters[0 if step == 0 else -1]
-        inputs = np.concatenate([[steps.t[step]], steps.y[step], steps.ydot[step], parameters])
-        return self.program.margins(inputs)
+        parameters = result.problem.parameters[-1].copy()
+        start = result.problem.segments[-2] if self.jumper is not None else 0.0
+        for j, parameter in enumerate(self.system.parameters):
+            if parameter.path == START:
+                parameters[j] = start
+        return self.program.margins(np.concatenate([[t - start], y, ydot, parameters]))
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""

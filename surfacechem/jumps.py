@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
 from surfacechem.expressions import Expression, derivative
-from surfacechem.system import Equilibrium, System, Transition
+from surfacechem.system import HELD, Equilibrium, System, Transition
 
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
@@ -84,7 +84,8 @@ class Jumper:
         self.system = system
         self.states = [state.name for state in system.states]
         mode_symbols = {mode.symbol for mode in system.modes}
-        self.mode_columns = [j for j, p in enumerate(system.parameters) if p.symbol in mode_symbols]
+        kept = [p.symbol in mode_symbols or p.path == HELD for p in system.parameters]
+        self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
     @cached_property
     def _maps(self) -> list[Function]:
@@ -342,4 +343,4 @@ def _zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> fl
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300))
+    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300, disp=False))

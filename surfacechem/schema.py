@@ -204,8 +204,10 @@ def _sweep() -> Schema:
     spacing = {"enum": list(SPACINGS), "default": SPACINGS[0]}
     span = _object({**ends, "points": whole, "spacing": spacing}, required=RANGE_KEYS[:3])
     values = {"anyOf": [{"type": "array", "items": _ref("quantity"), "minItems": 1}, span]}
-    over = {"type": "object", "additionalProperties": values, "minProperties": 1, "maxProperties": 2}
-    until = {"type": "object", "additionalProperties": _ref("quantity"), "minProperties": 1, "maxProperties": 1}
+    path = rf"({'|'.join(TOP_KEYS)})(\.[^.]+)*"
+    over = {**_object({}, patterns={path: values}), "minProperties": 1, "maxProperties": 2}
+    variables = {name: _ref("quantity") for name in VARIABLES}
+    until = {**_object(variables), "minProperties": 1, "maxProperties": 1}
     texts = {"over": "values of one or two parameters, by path", "until": "a prescribed ramp and where each run ends"}
     properties = {"over": {**over, "description": texts["over"]}, "until": {**until, "description": texts["until"]}}
     assert set(properties) == set(SWEEP_KEYS)

@@ -15,6 +15,9 @@ from surfacechem.refit import Fit
 from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
 
+HELD = "run.held_until"
+"""Path of the time until which sticking is held where sliding would begin and stop without end."""
+
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
 

@@ -9,7 +9,13 @@ from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import BondedContact, BondSprings, InterfaceCapacity, NormalStiffness, TangentialStiffness
+from surfacechem.laws.contact import (
+    BondedContact,
+    BondStiffness,
+    InterfaceCapacity,
+    NormalStiffness,
+    TangentialStiffness,
+)
 from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power, Proportional
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck, Viscous
 from surfacechem.laws.kinetics import LinearAffinity
@@ -78,7 +84,7 @@ def quasi_static_gap() -> Scene:
 def dead_load() -> Scene:
     """A far-field traction alone on springs that bonds are."""
     interface = Interface(
-        "T", [BondSprings(E_b=1e13, E_n=1e14), BondEnergy(K_0=300.0)], (), [LinearAffinity(c_r=1e16)], SITES
+        "T", [BondStiffness(E_b=1e13, E_n=1e14), BondEnergy(K_0=300.0)], (), [LinearAffinity(c_r=1e16)], SITES
     )
     initial = TOGETHER | {"phi": 0.5}
     loading = {"F_n": Ramp(start=1e5, rate=1e3)}

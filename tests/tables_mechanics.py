@@ -14,7 +14,7 @@ from surfacechem.jumps import Jump
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
-from surfacechem.laws.contact import BondedContact, BondSprings, InterfaceCapacity, NormalStiffness
+from surfacechem.laws.contact import BondedContact, BondStiffness, InterfaceCapacity, NormalStiffness
 from surfacechem.laws.factors import Linear, Power
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
@@ -217,7 +217,7 @@ def damage() -> Solved:
         COLD_BODIES,
         Interface(
             Hold(level=300.0),
-            [BondSprings(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])],
+            [BondStiffness(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])],
             reactions=[LinearAffinity(c_r=1e10 * SITES.density / p["K"])],
             sites=SITES,
         ),

@@ -90,7 +90,7 @@ MISTAKES = [
     (
         "loading: {v:",
         "loading: {w:",
-        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, w_n",
+        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, v_2,",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
@@ -220,7 +220,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
 
 def test_a_missing_case():
     with pytest.raises(
-        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? Known: adia"
+        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? Known: adhesion"
     ):
         load("endotermic")
     with pytest.raises(InputError, match=r"^no file and no case 'x/endotermic.yaml'\. Did you mean 'endothermic'\?"):

@@ -46,7 +46,7 @@ def test_misspelt_keys_do_not_validate(name):
         assert not VALIDATOR.is_valid(changed), changed
 
 
-FREE = ("lower", "upper", "body", "reservoir", "cold", "hot", "coverages", "loading", "initial")
+FREE = ("lower", "upper", "body", "reservoir", "cold", "hot", "coverages", "loading", "initial", "over")
 
 
 def misspelt(value, key=""):

@@ -79,7 +79,7 @@ def test_finite_everywhere(law):
     function = symengine.Lambdify([symengine.Symbol(name) for name in names], order, backend="llvm")
     for size in sizes:
         for tangential in sizes:
-            values = {"g_n": size, "g_t": tangential, "phi": 0.5, "bonded": 1.0}
+            values = {"g_n": size, "g_t": tangential, "phi": 0.5, "bonded": 1.0, "N_c": 1e15}
             assert np.isfinite(function([values[name] for name in names])).all(), values
 
 
@@ -90,6 +90,7 @@ def test_traction_is_the_slope_of_the_energy(law):
     parameters = {symengine.Symbol(name): mpmath.mpf(getattr(given, name)) for name, _ in law.specs()}
     energy = symbolic(given.bind({str(symbol): symbol for symbol in parameters}))
     point = {g: mpmath.mpf("0.3"), g_t: mpmath.mpf("0.2"), phi: mpmath.mpf("0.5"), bonded: mpmath.mpf(1)} | parameters
+    point[symengine.Symbol("N_c")] = mpmath.mpf(3)
     step = mpmath.mpf(10) ** -25
     for x in {g, g_t, phi} & energy.free_symbols:
         slope = derivative(energy, x)

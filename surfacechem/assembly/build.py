@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -217,13 +217,13 @@ class Build:
         for name, (low, high) in law.ranges.items():
             self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
-    def law_margins(self, law: Law, own: Mapping[str, Expression]) -> None:
-        """What must stay positive for a law to hold."""
+    def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
+        """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""
         for name in law.positive:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} > 0", value, reason))
-        for name in law.nonnegative:
+        for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))

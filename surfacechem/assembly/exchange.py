@@ -12,7 +12,7 @@ from surfacechem.assembly.memory import memory
 from surfacechem.assembly.slip import stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, positive
 from surfacechem.quantities import Quantity
 from surfacechem.system import Margin
 from surfacechem.terms import Friction, HeatTransfer
@@ -24,8 +24,9 @@ def friction(build: Build) -> None:
         label = build.label(law)
         bound = build.variables.bind(law, f"interface.friction.{law.name()}")
         memory(build, law, bound)
-        traction = build.variables.call(bound, bound.statement)
-        build.law_margins(law, {})
+        pressed = _pressed(build, law)
+        traction = build.variables.call(bound, bound.statement, pressed)
+        build.law_margins(law, {}, met=pressed)
         traction = build.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
         v = build.variables.get("v", law)
         power = build.stretch * traction * v + _across(build, law, bound, label)
@@ -36,7 +37,14 @@ def friction(build: Build) -> None:
             _reversal(build)
         else:
             build.sliding_tractions.append(build.stretch * traction)
-            stick_limit(build, law, bound)
+            stick_limit(build, law, bound, pressed)
+
+
+def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
+    """The pressure for a law that needs one, where the gap may open: an open contact does not rub."""
+    if "p" not in law.nonnegative or "p" in build.scene.loading:
+        return {}
+    return {"p": positive(build.variables.get("p", law))}
 
 
 def _across(build: Build, law: Friction, bound: Friction, label: str) -> Expression:

@@ -13,8 +13,8 @@ from surfacechem.scene import Mounting
 from surfacechem.system import Account
 from surfacechem.terms import Law, Varying, reads
 
-LENGTH = 1e-9
-"""Scale of gaps [m] and of their velocities [m/s] below which errors are absolute."""
+LENGTH = 1e-6
+"""Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
 
 AXES = {"n": "normal gap", "t": "tangential displacement"}
 

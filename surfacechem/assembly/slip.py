@@ -6,6 +6,7 @@ by something that depends on its rate, or rate-independent, in which case the tr
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,8 +17,8 @@ from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, hel
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Equilibrium, Margin, State, Transition
-from surfacechem.terms import Friction, reads
+from surfacechem.system import HELD, Equilibrium, Margin, State, Transition
+from surfacechem.terms import Friction, Spec, reads
 
 NONE = symengine.Integer(0)
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
@@ -221,26 +222,28 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     breaks = any(law.breaks_bonds for law in build.interface.frictions)
     jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaks else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
+    held = build.constant("held_until", HELD, Spec("s", "time until which sticking is held"), 0.0, internal=True)
     for s, word in ((1, "forward"), (-1, "backward")):
-        margin = where(slip**2 > 0, 1, limit - s * needed)
+        margin = where(slip**2 > 0, 1, where(build.t < held, 1, limit - s * needed))
         reason = f"sticking gives way and the interface slides {word}"
         build.transitions.append(
             Transition(
                 f"slip {word}", margin, reason, {slip: symengine.Integer(s)}, jump, settles=settles, sinks="local"
             )
         )
-    onward = where(absolute(needed) <= limit, 0, sign(needed))
+    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
     stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
     build.transitions.append(
         Transition("stop", where(slip**2 > 0, slip * v, 1), "sliding comes to a stop", {slip: onward}, stop)
     )
 
 
-def stick_limit(build: Build, law: Friction, bound: Friction) -> None:
+def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
     if build.slip is None or not build.slip.sticks:
         return
-    at_rest = {"v": NONE, "direction": symengine.Integer(1)}
+    at_rest = {**own, "v": NONE, "direction": symengine.Integer(1)}
     kinetic = build.variables.call(bound, bound.statement, at_rest)
     if law.has_limit:
         static = build.variables.call(bound, bound.limit, at_rest)

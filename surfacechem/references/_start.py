@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -38,10 +39,11 @@ class Start:
 
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
-        try:
-            return float(RULES[name](self)) if name in RULES else self._plain(name)
-        except KeyError:
-            return None
+        for rule in (RULES.get(name), lambda start: start._plain(name)):
+            with suppress(KeyError):
+                if rule is not None:
+                    return float(rule(self))
+        return None
 
     def _plain(self, name: str) -> float:
         for source in (self.parameters, self.initial):
@@ -59,6 +61,10 @@ class Start:
             raise KeyError(ending)
         return found[0]
 
+    def has(self, section: str) -> bool:
+        """Whether a section of the case gives any parameter."""
+        return any(path.startswith(f"{section}.") for path in self.run.values)
+
     def ramp(self, variable: str) -> float:
         """The rate at which a variable is driven."""
         return self.at(f"loading.{variable}.ramp.rate")
@@ -66,7 +72,14 @@ class Start:
     def held_at(self, parameter: str) -> float:
         """A parameter of the mounting; of the normal gap if both directions are mounted."""
         paths = [f"mechanics.{direction}.{parameter}" for direction in ("normal", "tangential")]
-        return next(self.run.values[path] for path in (*paths, paths[0]) if path in self.run.values)
+        return self.run.values[next((path for path in paths if path in self.run.values), paths[0])]
+
+    def damping(self) -> float:
+        """Dampers of the normal gap."""
+        found = [self.run.values.get(f"mechanics.normal.{name}") for name in ("c_b", "c_g")]
+        if found == [None, None]:
+            raise KeyError("no damper")
+        return sum(value or 0.0 for value in found)
 
     def sliding(self) -> float:
         """Traction of dry sliding."""
@@ -144,7 +157,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "h_2": lambda s: s.into(2),
     "k": lambda s: s.held_at("k"),
     "m": lambda s: s.held_at("m"),
-    "c": lambda s: sum(s.run.values.get(f"mechanics.normal.{name}", 0.0) for name in ("c_b", "c_g")),
+    "c": lambda s: s.damping(),
     "V": lambda s: s.ramp("w_t"),
     "w_i": lambda s: s.named["w_n"],
     "w_dot": lambda s: s.ramp("w_n"),
@@ -155,7 +168,7 @@ RULES: dict[str, Callable[[Start], float]] = {
     "mu_k": lambda s: s.at(".mu"),
     "t_k": lambda s: s.sliding(),
     "t_s": lambda s: s.sticking(),
-    "t_n": lambda s: s.at(".t_max"),
+    "t_n": lambda s: s.named["t_n"] if s.has("loading.t_n") else s.at(".t_max"),
     "T_a": lambda s: s.named["T_a"] if "T_a" in s.named else s.named["T_2"] if "T_2" in s.named else s.named["T_1"],
 }
 """Parameters of exact solutions that are not parameters of the scene under the same name."""

@@ -9,6 +9,8 @@ from surfacechem.solvers.radau import consistent
 def output_rates(result: Result) -> Array:
     """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
     problem = result.problem
+    if not len(result.times):
+        return np.empty_like(result.outputs)
     segment = np.searchsorted(problem.segments[1:-1], result.times, side="left")
     guess = np.zeros_like(result.outputs)
     return consistent(problem.program, result.times, result.outputs, guess, problem.parameters[segment]).ydot
