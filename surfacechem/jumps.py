@@ -343,4 +343,6 @@ def _zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> fl
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300, disp=False))
+    return float(
+        brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], xtol=1e-300, rtol=8.9e-16, maxiter=300, disp=False)
+    )

@@ -69,7 +69,10 @@ def schema() -> Schema:
 def _csv_tables() -> list[Schema]:
     """A table from a file, or from its text."""
     column = {"type": "string", "description": "the column of the values, if not named after the variable"}
-    texts = {"file": "a CSV file beside the case; its first line is like t [s], w_n [um]", "csv": "the text of such a file"}
+    texts = {
+        "file": "a CSV file beside the case; its first line is like t [s], w_n [um]",
+        "csv": "the text of such a file",
+    }
     entries = {key: {"type": "string", "description": meaning} for key, meaning in texts.items()}
     return [_object({key: entry, "column": column}, required=(key,)) for key, entry in entries.items()]
 
