@@ -50,8 +50,9 @@ def schema() -> Schema:
     for contract in CONTRACTS:
         definitions |= {_key(contract, law): _law(law) for law in laws.laws(contract).values()}
         definitions[contract.contract] = _any_law(contract)
-    definitions["loading.table"] = {"anyOf": [definitions["loading.table"], *_csv_tables()]}
-    definitions["history"] = {"anyOf": [_ref("quantity"), _ref(Load.contract)]}
+    definitions["history"] = {
+        "anyOf": [_ref("quantity"), _ref(Load.contract), _object({"table": {"anyOf": _csv_tables()}})]
+    }
     definitions["temperature"] = {
         "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a history",
         "anyOf": [{"type": "string", "pattern": f"^{NODE.pattern}$"}, _ref("history")],
