@@ -9,7 +9,7 @@ from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.contact import (
     BondedContact,
-    BondSprings,
+    BondStiffness,
     InterfaceCapacity,
     NormalStiffness,
     Penalty,
@@ -61,7 +61,7 @@ def normal_laws(dice: Dice) -> tuple[list, list]:
         ([NormalStiffness(E_n=softer)], []),
         ([Penalty(E_n=softer)], []),
         ([ExponentialCohesiveZone(t_max=strong, g_0=length, E_n=dice.near(E, 2))], []),
-        ([BondSprings(E_b=E, E_n=dice.near(E)), BondEnergy(K_0=dice.near(E * length**2))], []),
+        ([BondStiffness(E_b=E, E_n=dice.near(E)), BondEnergy(K_0=dice.near(E * length**2))], []),
         ([BondedContact(E_n=E), BondEnergy(K_0=dice.near(E * length**2, 2))], [_limit(dice, strength)]),
         ([BondEnergy(K_0=dice.near(E * length**2, 2))], [_limit(dice, strength)]),
         ([LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)], []),
