@@ -50,7 +50,9 @@ def schema() -> Schema:
     for contract in CONTRACTS:
         definitions |= {_key(contract, law): _law(law) for law in laws.laws(contract).values()}
         definitions[contract.contract] = _any_law(contract)
-    definitions["history"] = {"anyOf": [_ref("quantity"), _ref(Load.contract)]}
+    definitions["history"] = {
+        "anyOf": [_ref("quantity"), _ref(Load.contract), _object({"table": {"anyOf": _csv_tables()}})]
+    }
     definitions["temperature"] = {
         "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a history",
         "anyOf": [{"type": "string", "pattern": f"^{NODE.pattern}$"}, _ref("history")],
@@ -63,6 +65,17 @@ def schema() -> Schema:
         **_object(properties, required=("bodies", "run")),
         "$defs": definitions,
     }
+
+
+def _csv_tables() -> list[Schema]:
+    """A table from a file, or from its text."""
+    column = {"type": "string", "description": "the column of the values, if not named after the variable"}
+    texts = {
+        "file": "a CSV file beside the case; its first line is like t [s], w_n [um]",
+        "csv": "the text of such a file",
+    }
+    entries = {key: {"type": "string", "description": meaning} for key, meaning in texts.items()}
+    return [_object({key: entry, "column": column}, required=(key,)) for key, entry in entries.items()]
 
 
 def text() -> str:
@@ -135,7 +148,7 @@ def _mechanics() -> Schema:
 
 def _programme() -> Schema:
     value = {"anyOf": [_ref("quantity"), _object({way: _ref("quantity") for way in WAYS})]}
-    waits = {**_object(dict.fromkeys(VARIABLES, value), patterns={NODE.pattern: value}), "maxProperties": 1}
+    waits = {"type": "object", "additionalProperties": value, "minProperties": 1, "maxProperties": 1}
     until = {"anyOf": [{"type": "string"}, waits]}
     rates = {name: _quantity(f"rate of the {_variable(name)}") for name in LOADABLE}
     stage = _object({**rates, "for": _quantity("length of the stage [s]"), "until": until})

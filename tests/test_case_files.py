@@ -47,15 +47,13 @@ def test_misspelt_keys_do_not_validate(name):
 
 
 FREE = ("lower", "upper", "body", "reservoir", "cold", "hot", "coverages", "loading", "initial", "over")
-NAMED = ("programme",)
-"""Lists whose items are called as one likes."""
 
 
 def misspelt(value, key=""):
     """The document with one key misspelt, for each key that is not a free name."""
     if isinstance(value, dict):
         for name, child in value.items():
-            if name not in FREE and key not in (*FREE, *NAMED, "bodies", "reference"):
+            if name not in FREE and key not in (*FREE, "bodies", "reference", "programme", "until"):
                 yield {f"{name}x" if k == name else k: v for k, v in value.items()}
             if key != "coverages":
                 yield from ({**value, name: changed} for changed in misspelt(child, name))

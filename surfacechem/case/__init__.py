@@ -15,6 +15,7 @@ from pathlib import Path
 
 from surfacechem import data, document, overrides, solvers
 from surfacechem.assembly import assemble
+from surfacechem.case import csvtable
 from surfacechem.case.fields import mapping, text
 from surfacechem.case.run import Reference, Run, read_reference, read_run
 from surfacechem.case.scene import SceneReader, Source
@@ -101,6 +102,9 @@ def load_text(
     if overrides:
         tree = _overridden(tree, overrides)
         text = document.dump(tree)
+    whole = csvtable.embedded(tree, str(base))
+    if whole != tree:
+        tree, text = whole, document.dump(whole)
     return _read(tree, text, name, Source({}, str(base), mechanism_text))
 
 

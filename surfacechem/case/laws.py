@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from surfacechem import laws
+from surfacechem.case.csvtable import is_csv, table
 from surfacechem.case.fields import choice, items, mapping, number, shown, text
 from surfacechem.document import Tree
 from surfacechem.errors import InputError
@@ -61,6 +62,8 @@ def build(kind: type[L], tree: Tree, units: Units, x: str = "", fields: Mapping[
 
 def history(tree: Tree, unit: str, units: Units) -> Load:
     """A prescribed history; a bare value is a constant."""
+    if is_csv(tree):
+        return table(tree, unit)
     if isinstance(tree.value, dict):
         return law(Load, tree, units, unit)  # type: ignore[type-abstract]
     hold: Any = laws.find(Load, "hold")

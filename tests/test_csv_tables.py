@@ -1,0 +1,105 @@
+"""Histories from CSV files: strict, with units, and kept in the dataset."""
+
+import jsonschema
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem import case as cases
+from surfacechem import schema
+from surfacechem.document import parse
+from surfacechem.errors import InputError
+
+CASE = """
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 1 J/m^2/K}
+  upper: {temperature: T, C: 1 J/m^2/K}
+interface: {temperature: T}
+loading: {Q_1: {table: {file: heat.csv}}}
+initial: {T: 300 K}
+run: {until: 3 s, outputs: 31}
+"""
+
+
+def load(folder, content, case=CASE, changes=()):
+    (folder / "heat.csv").write_text(content)
+    (folder / "case.yaml").write_text(case)
+    return surfacechem.load(folder / "case.yaml", changes)
+
+
+def test_columns_have_units(tmp_path):
+    given = "# measured\nt [min], Q_1 [mW/m^2], other [K]\n0, 0, 1\n0.05, 6000, 2\n"
+    table = load(tmp_path, given).case.scene.loading["Q_1"]
+    assert table.times == [0.0, 3.0]
+    assert table.values == [0.0, 6.0]
+
+
+def test_a_column_is_chosen_by_name_and_the_only_one_without(tmp_path):
+    by_name = load(tmp_path, "t [s], a [W/m^2], b [W/m^2]\n0,1,2\n3,1,2\n", changes=["loading.Q_1.table.column=b"])
+    assert by_name.case.scene.loading["Q_1"].values == [2.0, 2.0]
+    only = load(tmp_path, "power [W/m^2], t [s]\n5, 0\n5, 3\n")
+    assert only.case.scene.loading["Q_1"].values == [5.0, 5.0]
+
+
+def test_it_is_the_table_written_into_the_case(tmp_path):
+    from_file = load(tmp_path, "t [s], Q_1 [W/m^2]\n0, 0\n1, 6\n3, 0\n").run()
+    written = CASE.replace("{file: heat.csv}", "{times: [0, 1, 3], values: [0, 6, 0]}")
+    assert np.array_equal(from_file.dataset.T, surfacechem.load(_write(tmp_path, written)).run().dataset.T)
+
+
+def _write(folder, text):
+    path = folder / "written.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_the_text_is_kept(tmp_path):
+    case = load(tmp_path, "t [s], Q_1 [W/m^2]\n0, 0\n1, 6\n").case
+    (tmp_path / "heat.csv").unlink()
+    again = cases.load_text(case.text)
+    assert again.scene.loading["Q_1"].values == case.scene.loading["Q_1"].values
+    assert again.text == case.text
+
+
+@pytest.mark.parametrize("table", [{"file": "heat.csv"}, {"csv": "t [s]", "column": "Q_1"}])
+def test_editors_know_both_ways(table):
+    validator = jsonschema.Draft202012Validator(schema.schema())
+    document = parse(CASE).plain()
+    document["loading"]["Q_1"]["table"] = table
+    assert not list(validator.iter_errors(document))
+    table["rows"] = 3
+    assert list(validator.iter_errors(document))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t [s], Q_1 [W/m^2]\n0, 0\n1, x\n", r"heat.csv:3: 'x W/m\^2' is not a number with a unit; Q_1 needs"),
+        ("t [s], Q_1 [K]\n0, 0\n1, 1\n", r"heat.csv:2: 0 K is a temperature; Q_1 needs"),
+        ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: 't' is no name with a unit"),
+        ("t [s], Q_1 [W/m^2]\n0, 0\n1, 1, 1\n", r"heat.csv:3: 3 values for 2 columns"),
+        ("t [s], Q_1 [W/m^2]\n\n2, 0\n1, 1\n", r"heat.csv:4: times must never decrease"),
+        ("t [s], Q_2 [W], Q_3 [W]\n0, 0, 0\n1, 1, 1\n", r"heat.csv:1: no column 'Q_1'. Did you mean"),
+        ("t [s], Q_1 [W/m^2], Q_1 [W/m^2]\n0, 0, 0\n1, 1, 1\n", r"heat.csv:1: the column Q_1 is there 2 times"),
+        ("t [s], Q_1 [W/m^2]\n0, 0\n", r"heat.csv: a table needs as many times \(1\)"),
+        ("# nothing\n", r"heat.csv: the table is empty"),
+        ("t [s], Q_1 [W/m^2]\n0, nan\n1, 1\n", r"heat.csv:2: .*nan"),
+    ],
+)
+def test_bad_files_are_refused_by_line(tmp_path, content, message):
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, content)
+
+
+def test_a_table_in_the_case_has_its_lines(tmp_path):
+    inline = CASE.replace("{file: heat.csv}", '{csv: "t [s], Q_1 [W/m^2]\\n0, 0\\n1, x"}')
+    with pytest.raises(InputError, match=r"written.yaml:7: loading.Q_1.table.csv: line 3 of the table: 'x W/m\^2'"):
+        surfacechem.load(_write(tmp_path, inline))
+
+
+def test_a_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"loading.Q_1.table.file: no file heat.csv beside the case"):
+        surfacechem.load(_write(tmp_path, CASE))
+    with pytest.raises(InputError, match="two roles: give `file` or `csv`"):
+        surfacechem.load(_write(tmp_path, CASE.replace("heat.csv", 'heat.csv, csv: "t [s]"')))
