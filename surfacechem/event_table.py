@@ -71,6 +71,11 @@ def event_findings(jumps: Sequence[Jump]) -> list[str]:
     ]
 
 
+def event_violations(jumps: Sequence[Jump]) -> list[str]:
+    """Names of the transitions that have destroyed entropy, or would have."""
+    return list(dict.fromkeys(jump.transition.name for jump in jumps if jump.verdict != ADMISSIBLE))
+
+
 def event_summary(jumps: Sequence[Jump]) -> str:
     """The transitions of a run in one line."""
     names = [jump.transition.name for jump in jumps]

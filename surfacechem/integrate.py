@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,6 +34,9 @@ ABSOLUTE = 1e-6
 
 STATE = Spec("", "initial value")
 """Initial values need only be finite here; margins say where they may be."""
+
+PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
+"""Parts into which the period of a load is cut, and the number of them above which it is left to the steps."""
 
 LARGEST_SLACK = 1e-3
 """How far bonding may stray beyond its bounds at most, however loose the tolerance."""
@@ -156,13 +160,22 @@ class Model:
             values[path] = float(value)
         return values
 
+    def _segments(self, end: float, values: Mapping[str, float]) -> Array:
+        """Pieces of time: between breakpoints, and parts of the period of a load where the state may be at rest."""
+        inside = [t for t in self.system.breakpoints if 0 < t < end]
+        for path in self.system.cycles:
+            count = math.floor(PARTS_OF_A_PERIOD * values[path] * end)
+            if count <= MOST_PARTS:
+                inside += [k / (PARTS_OF_A_PERIOD * values[path]) for k in range(1, count + 1)]
+        return np.unique([0.0, *(t for t in inside if t < end), end])
+
     def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible."""
         system = self.system
         initial = {state.name: values[f"initial.{state.name}"] for state in system.states}
         check_start(system, values, initial)
         end = run.times[-1]
-        segments = np.array([0.0, *(t for t in system.breakpoints if 0 < t < end), end])
+        segments = self._segments(end, values)
         scales = np.array([state.scale for state in system.states])
         parameters = self._segment_parameters(segments[:-1], run, values)
         self._start_modes(parameters, values)

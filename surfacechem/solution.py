@@ -20,7 +20,7 @@ import numpy as np
 from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.errors import InputError, Place
-from surfacechem.event_table import event_columns, event_findings
+from surfacechem.event_table import event_columns, event_findings, event_violations
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.solvers.contract import Status
 
@@ -256,7 +256,7 @@ class Solution:
             "energy_error": books.energy_error,
             "entropy_error": books.entropy_error,
             "site_error": books.site_error,
-            "entropy_violations": ", ".join(books.violations) or "none",
+            "entropy_violations": ", ".join((*books.violations, *event_violations(self.trajectory.jumps))) or "none",
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": versions(),
         }

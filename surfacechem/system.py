@@ -234,6 +234,8 @@ class System:
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()
+    cycles: tuple[str, ...] = ()
+    """Frequencies, by path, of loads under which the state may rest: their work still has to be followed."""
     modes: tuple[Mode, ...] = ()
     transitions: tuple[Transition, ...] = ()
     equilibria: tuple[Equilibrium, ...] = ()

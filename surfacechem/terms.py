@@ -347,6 +347,8 @@ class Load(Law):
 
     local: ClassVar[dict[str, str]] = {}
     """Names and units of fields whose values change from one piece of the history to the next."""
+    cycle: ClassVar[str] = ""
+    """Field that is the frequency of a history that repeats itself."""
 
     @abstractmethod
     def value(self, t: Expression) -> Expression:

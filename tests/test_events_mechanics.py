@@ -250,7 +250,6 @@ class TestJumps:
             assert solved["g_n"][10] == pytest.approx(-1e-8 / 11, rel=1e-2)
 
 
-@pytest.mark.xfail(strict=True, reason="the ledger is outside the error norm: at rest nothing bounds the steps")
 def test_work_on_a_contact_at_rest():
     """A smooth drive that never slides takes back what it gives."""
     drive = Harmonic(amplitude=1e-4, frequency=1.3)

@@ -78,6 +78,7 @@ def assemble(scene: Scene) -> System:
         pairs=tuple(build.pairs),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
+        cycles=tuple(build.cycles) if build.transitions else (),
         modes=tuple(build.modes),
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),

@@ -74,6 +74,8 @@ class Build:
         self.into_interface: list[Expression] = []
         """Power and heat that flow into the interface [W/m^2]."""
         self.breakpoints: set[float] = set()
+        self.cycles: list[str] = []
+        """Paths of the frequencies of histories that repeat themselves."""
         self.ranges: list[Range] = []
         self.modes: list[Mode] = []
         self.transitions: list[Transition] = []
@@ -122,7 +124,10 @@ class Build:
         """A prescribed history as an expression of time; its breakpoints will end a step."""
         self.breakpoints.update(load.breakpoints())
         self.loads[name] = load
-        return self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t)
+        bound = self.variables.bind(load, f"loading.{name}", unit=unit_of(name))
+        if load.cycle:
+            self.cycles.append(f"{bound.path}.{load.cycle}")
+        return bound.value(self.t)
 
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
         """Make a prescribed variable a named quantity."""

@@ -61,6 +61,8 @@ class Harmonic(Load):
     1.5
     """
 
+    cycle = "frequency"
+
     mean: float = parameter("[x]", "mean value", default=0.0, varies=False)
     amplitude: float = parameter("[x]", "amplitude", varies=False)
     frequency: float = parameter("1/s", "frequency", above=0, varies=False)
