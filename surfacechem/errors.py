@@ -25,16 +25,25 @@ class SurfacechemError(Exception):
 
 
 class InputError(SurfacechemError):
-    """The input is wrong; nothing was computed."""
+    """The input is wrong; nothing was computed. The message is one line, whatever of the input it quotes."""
 
     def __init__(self, message: str, place: Place | None = None) -> None:
-        self.message = message
+        self.message = printable(message)
         self.place = place
-        super().__init__(f"{place}: {message}" if place and str(place) else message)
+        super().__init__(printable(f"{place}: {message}" if place and str(place) else message))
 
     def at(self, place: Place) -> InputError:
         """The same error with its place, unless it already knows one."""
         return self if self.place else type(self)(self.message, place)
+
+
+def printable(text: str) -> str:
+    r"""The text with line breaks and control characters as their escapes.
+
+    >>> print(printable("unknown key 'load\ning'"))
+    unknown key 'load\ning'
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -7,10 +7,13 @@ from itertools import combinations_with_replacement
 import cantera as ct
 import symengine
 from hypothesis import strategies as st
+from ruamel.yaml import YAML
 
 from surfacechem.data import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.bonds import LoadedReaction
+from surfacechem.mechanism.kinds import kind_of
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.terms import reads
 
@@ -23,12 +26,68 @@ def load(name, bonds=None):
 
 
 def cantera_of(mechanism):
-    return ct.Interface(yaml=mechanism.text, name=mechanism.phase)
+    """Cantera's surface, without what a load does."""
+    return ct.Interface(yaml=without_load(mechanism.text), name=mechanism.phase)
 
 
-def values(mechanism, T, coverages, stretch=1.0):
-    """What the laws read, at a temperature and coverages in the order of the species."""
-    point = {"T_c": T}
+def without_load(text):
+    """A mechanism whose loaded rates are the Arrhenius rates that they are without load; others stay as written."""
+    plain = YAML(typ="safe").load(text)
+    types = {entry["type"]: kind_of(entry["type"]) for entry in plain["reactions"] if "type" in entry}
+    loaded = {name: law for name, law in types.items() if not law.native}
+    for entry in plain["reactions"]:
+        if entry.get("type") in loaded:
+            for key in loaded[entry.pop("type")].own_keys():
+                entry.pop(key, None)
+    return json.dumps(plain) if loaded else text
+
+
+def pulled(mechanism, T, gap, force):
+    """Cantera's surface of a mechanism under load: elastic energy as enthalpy, factors of rates as multipliers."""
+    surface = cantera_of(mechanism)
+    for k, item in enumerate(species_of(mechanism)):
+        if item.spring:
+            add_enthalpy(surface, k, item.spring.energy(gap) * KMOL)
+    point = values(mechanism, T, [1.0] * surface.n_species, gap=gap, force=force)
+    for i, law in enumerate(mechanism.reactions):
+        if isinstance(law, LoadedReaction):
+            surface.set_multiplier(math.exp(call(law.log_factor, point | {"f": point[law.load]})), i)
+    surface.TP = T, ct.one_atm
+    return surface
+
+
+def add_enthalpy(surface, k, energy):
+    """Shift the enthalpy [J/kmol] of a species of constant heat capacity."""
+    species = surface.species(k)
+    thermo = species.thermo
+    assert isinstance(thermo, ct.ConstantCp)
+    T_0, h, s, cp = thermo.coeffs
+    species.thermo = ct.ConstantCp(
+        thermo.min_temp, thermo.max_temp, thermo.reference_pressure, [T_0, h + energy, s, cp]
+    )
+    surface.modify_species(k, species)
+
+
+def species_of(mechanism):
+    """Species in the order of the coverages, with their springs."""
+    (mixture,) = mechanism.potentials
+    return mixture.species
+
+
+def loading_read(mechanism):
+    """Which loads a mechanism reads: the gap that stretches its bonds or the force that they share."""
+    formulas = [law.energy for law in mechanism.potentials] + [law.rate for law in mechanism.reactions]
+    return {name for formula in formulas for name in reads(formula)} & {"g_n", "f"}
+
+
+def values(mechanism, T, coverages, stretch=1.0, gap=0.0, force=0.0):
+    """What the laws read at a temperature, coverages in the order of the species, a gap and a force that bonds
+    without a spring share.
+    """
+    point = {"T_c": T, "g_n": gap, "f": force}
+    for item in species_of(mechanism):
+        if item.spring:
+            point[f"f_{item.variable}"] = item.spring.stiffness * (gap - item.spring.rest_length)
     for variable, theta in zip(mechanism.variables, coverages, strict=True):
         point |= {
             variable.name: theta,
@@ -154,3 +213,7 @@ def states(draw, n):
     T = draw(st.floats(300.0, 1200.0))
     weights = [math.exp(-12 * abs(draw(number))) for _ in range(n)]
     return T, [weight / sum(weights) for weight in weights]
+
+
+loads = st.fixed_dictionaries({"gap": st.floats(-1e-9, 8e-9), "force": st.floats(-20e-12, 60e-12)})
+"""Gaps [m] and forces per bond [N] of single molecules."""

@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -95,7 +96,27 @@ def loads_or_is_refused(text):
     error = refusal(text)
     if error is not None:
         assert error.place.file.endswith(".yaml"), error  # the mechanism's, where the mistake is in there
-        assert "\n" not in str(error)
+        assert str(error).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('"lo\\nading": {}', r"fuzz.yaml:1: unknown key 'lo\nading'. Did you mean 'loading'? Known: "),
+        ("? |\n  bodies\n: {}", r"fuzz.yaml:1: unknown key 'bodies\n'. Did you mean 'bodies'? Known: "),
+        (
+            'run: {until: 1 s}\nbodies: "lower:\n\n  1"',
+            r"fuzz.yaml:2: bodies: this must be a mapping, not 'lower:\n1'.",
+        ),
+        ('"T\\e[2J\\u2028": 3', r"fuzz.yaml:1: unknown key 'T\x1b[2J\u2028'. Known: "),
+        ('title: "\\ud800"\n"\\ud800": 1', r"unknown key '\ud800'"),
+    ],
+)
+def test_a_message_is_one_line_whatever_it_quotes(text, message):
+    error = refusal(text)
+    assert message in str(error)
+    assert str(error).isprintable()
+    assert error.message.isprintable()
 
 
 @given(name=st.sampled_from(SAMPLES), data=st.data())

@@ -1,5 +1,7 @@
 """Mechanisms give Cantera's own rates and thermodynamics, at any temperature and coverages."""
 
+import math
+
 import cantera as ct
 import numpy as np
 import pytest
@@ -13,8 +15,10 @@ from mechanisms import (
     cantera_of,
     heat_capacity,
     load,
+    loads,
     mechanism_texts,
     partial_molar,
+    pulled,
     states,
     values,
 )
@@ -24,6 +28,7 @@ from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rates import InterfaceArrhenius
 
 TOLERANCE = 1e-12
+KT = 1.380649e-23 * 298.15
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -34,12 +39,11 @@ def _quiet():
     ct.suppress_thermo_warnings(False)
 
 
-def compare(mechanism, T, coverages):
-    surface = cantera_of(mechanism)
-    surface.TP = T, ct.one_atm
+def compare(mechanism, T, coverages, gap=0.0, force=0.0):
+    surface = pulled(mechanism, T, gap, force)
     surface.coverages = coverages
     coverages = surface.coverages.tolist()
-    point = values(mechanism, T, coverages)
+    point = values(mechanism, T, coverages, gap=gap, force=force)
     compare_rates(mechanism, surface, point)
     compare_thermo(mechanism, surface, point)
 
@@ -91,11 +95,11 @@ def compare_thermo(mechanism, surface, point):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-@given(data=st.data())
+@given(data=st.data(), under=loads)
 @settings(max_examples=20)
-def test_shipped_mechanisms_agree_with_cantera(name, data):
+def test_shipped_mechanisms_agree_with_cantera(name, data, under):
     mechanism = load(name)
-    compare(mechanism, *data.draw(states(len(mechanism.variables))))
+    compare(mechanism, *data.draw(states(len(mechanism.variables))), **under)
 
 
 @pytest.fixture(scope="module")
@@ -112,16 +116,15 @@ def test_random_mechanisms_agree_with_cantera(file, data):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-@given(stretch=st.floats(0.5, 2.0), data=st.data())
+@given(stretch=st.floats(0.5, 2.0), data=st.data(), under=loads)
 @settings(max_examples=10)
-def test_a_stretched_surface_is_one_with_fewer_sites(name, stretch, data):
+def test_a_stretched_surface_is_one_with_fewer_sites(name, stretch, data, under):
     mechanism = load(name)
     T, coverages = data.draw(states(len(mechanism.variables)))
-    surface = cantera_of(mechanism)
-    surface.TP = T, ct.one_atm
+    surface = pulled(mechanism, T, **under)
     surface.site_density = surface.site_density / stretch
     surface.coverages = coverages
-    point = values(mechanism, T, surface.coverages.tolist(), stretch)
+    point = values(mechanism, T, surface.coverages.tolist(), stretch, **under)
     for i, law in enumerate(mechanism.reactions):
         assert call(law.forward, point) == pytest.approx(surface.forward_rates_of_progress[i] * KMOL, rel=TOLERANCE)
         assert call(law.reverse, point) == pytest.approx(surface.reverse_rates_of_progress[i] * KMOL, rel=TOLERANCE)
@@ -168,6 +171,22 @@ def test_literature_numbers_come_back():
     assert tethers.equilibrium_constants[0] == pytest.approx(K * 5e-3, rel=1e-6)
     assert film.equilibrium_constants[0] == pytest.approx(K / (10e-6 * 1.0), rel=1e-6)  # m^2/kmol
     assert selectin.reverse_rate_constants[0] == pytest.approx(4.4e6 * 320e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "length"), [("l-selectin.yaml", 3.0, 4e-10), ("selectin-pulled.yaml", 0.02, 2.5e-10)]
+)
+@pytest.mark.parametrize("f", [0.0, 10e-12, 40e-12])
+def test_measured_rates_under_force_come_back(name, rate, length, f):
+    """Rupture of one bond at 298.15 K, and the equilibrium of ten bonds per open site that the spring shifts."""
+    mechanism = load(name, ["bond(s)"])
+    (law,) = mechanism.reactions
+    point = values(mechanism, 298.15, [1.0, 1.0], gap=f / 5.3e-3, force=f)
+    n = point["n_theta_bond_s"]
+    assert call(law.forward, point) == pytest.approx(n * rate * math.exp(f * length / KT), rel=1e-12)
+    if law.reversible:
+        constant = 10 * math.exp(-(f**2) / (2 * 5.3e-3 * KT))
+        assert call(law.reverse, point) == pytest.approx(constant * call(law.forward, point), rel=1e-6)
 
 
 def test_coverages_sum_to_one():

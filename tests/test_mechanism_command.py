@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from mechanisms import KMOL, SHIPPED, cantera_of, load, mechanism_texts
+from mechanisms import KMOL, SHIPPED, cantera_of, load, mechanism_texts, pulled, species_of
 from surfacechem import rateplots
 from surfacechem.cli import app
 from surfacechem.errors import InputError
@@ -58,6 +58,33 @@ def test_numbers_are_cantera_s(name):
     compare(load(name), 311.0)
 
 
+def at_force(mechanism, force):
+    """The load at which the first elastic bond, or every bond, carries a force."""
+    spring = next((item.spring for item in species_of(mechanism) if item.spring), None)
+    return {"gap": spring.rest_length + force / spring.stiffness if spring else 0.0, "force": force}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("force", [0.0, 15e-12, 60e-12])
+def test_numbers_under_force_are_cantera_s(name, force):
+    """Rates per possible bond at coverages of one, and the constant that the elastic energy shifts."""
+    mechanism = load(name)
+    surface, curves = pulled(mechanism, 311.0, **at_force(mechanism, force)), Curves(mechanism)
+    surface.set_unnormalized_coverages(np.ones(surface.n_species))
+    at = np.array([311.0]), np.array([force])
+    for i, (label, law) in enumerate(curves.laws.items()):
+        bond = min(full(surface, law).values())
+        for curve, rates in (
+            (curves.log_forward, surface.forward_rates_of_progress),
+            (curves.log_reverse, surface.reverse_rates_of_progress),
+        ):
+            got = curve(label, *at)
+            assert rates[i] == 0 if got is None else got == pytest.approx(math.log(rates[i] * KMOL / bond), rel=1e-10)
+        log_K = sum(nu * math.log(KMOL / full(surface, law)[x]) for x, nu in law.change.items())
+        log_K += math.log(surface.equilibrium_constants[i])
+        assert curves.log_equilibrium(label, *at) == pytest.approx(log_K, rel=1e-9, abs=1e-9)
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
@@ -78,8 +105,13 @@ def test_numbers_of_random_mechanisms_are_cantera_s(file, text, temperature):
 def test_forward_over_reverse_is_the_constant(name):
     curves = Curves(load(name))
     temperatures = T.values(7)
-    for label in curves.laws:
-        ratio = curves.log_forward(label, temperatures, NONE) - curves.log_reverse(label, temperatures, NONE)
+    for label, law in curves.laws.items():
+        reverse = curves.log_reverse(label, temperatures, NONE)
+        if not law.reversible:
+            assert reverse is None
+            assert verdict(curves, label, T, F).startswith("runs one way only")
+            continue
+        ratio = curves.log_forward(label, temperatures, NONE) - reverse
         np.testing.assert_allclose(ratio, curves.log_equilibrium(label, temperatures, NONE), rtol=1e-12)
         assert verdict(curves, label, T, F).startswith("consistent by construction")
 
