@@ -111,8 +111,13 @@ def debonding(k, path):
     return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, len(path) - 1.0, 41)))
 
 
+def debonded(trajectory):
+    """The jumps, without touch and release, which rounding decides at a gap of zero."""
+    return [jump for jump in trajectory.jumps if jump.transition.name not in ("touch", "release")]
+
+
 def names(trajectory):
-    return [jump.transition.name for jump in trajectory.jumps]
+    return [jump.transition.name for jump in debonded(trajectory)]
 
 
 def test_a_stiff_mounting_follows_the_falling_line_and_unloads_to_the_origin():
@@ -121,14 +126,14 @@ def test_a_stiff_mounting_follows_the_falling_line_and_unloads_to_the_origin():
     work = trajectory.result.ledger[[a.quantity.name for a in trajectory.model.system.ledger].index("W_n")]
     assert work == pytest.approx(0.5 * 1e6 * 5e-8, rel=1e-9), "the work of separation is dissipated"
     assert audit(trajectory).energy_error < 1e-9
-    unloaded = trajectory.jumps[1].before.y
-    assert trajectory.jumps[2].t == pytest.approx(3 + (unloaded[1] * (1 + unloaded[0])) / 1.4e-7, rel=1e-9)
+    unloaded = debonded(trajectory)[1].before.y
+    assert debonded(trajectory)[2].t == pytest.approx(3 + (unloaded[1] * (1 + unloaded[0])) / 1.4e-7, rel=1e-9)
 
 
 def test_a_soft_mounting_tears_the_interface_open():
     trajectory = debonding(1e13, [0.0, 2e-7])
     assert names(trajectory)[-2:] == ["soften", "tear"]
-    jump = trajectory.jumps[-1]
+    jump = debonded(trajectory)[-1]
     assert jump.released == pytest.approx(0.5 * 1e6**2 * (1 / 1e13 + 1 / 1e14), rel=1e-9)
     assert jump.verdict == "admissible"
 

@@ -38,7 +38,7 @@ class Spring:
     def energy(self, g_n: Expression) -> Expression:
         """Elastic energy [J] of one bond.
 
-        >>> Spring(stiffness=1e-3).energy(2e-9)
+        >>> round(Spring(stiffness=1e-3).energy(2e-9), 33)
         2e-21
         """
         return self.stiffness * (g_n - self.rest_length) ** 2 / 2

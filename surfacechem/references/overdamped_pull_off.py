@@ -112,7 +112,8 @@ class OverdampedPullOff(Reference):
         """Driving traction [Pa] at a distance from the gap of the fold."""
         y, x = distance / self.g_0, self._x
         near = np.where(np.abs(y) < SERIES_LIMIT, y, 0.0)
-        series = sum((-1) ** n * (n - 1 - x) * near**n / math.factorial(n) for n in range(2, 20))
+        coefficients = [0.0, 0.0, *((-1) ** n * (n - 1 - x) / math.factorial(n) for n in range(2, 20))]
+        series = np.polynomial.polynomial.polyval(near, coefficients)
         far = -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y)
         shape = np.where(np.abs(y) < SERIES_LIMIT, series, far)
         return np.asarray(self.k * self.delta_w + self.t_max * math.exp(-x) * shape)
