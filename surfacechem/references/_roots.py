@@ -12,13 +12,21 @@ ROUNDING = 4.0 * np.finfo(np.float64).eps
 ITERATIONS = 400
 
 
-def increasing_root(function: Callable[[Array], tuple[Array, Array]], target: Array, low: Array, high: Array) -> Array:
-    """Where `function`, which gives value and slope and increases on [low, high], reaches `target`; starts at `low`.
+def increasing_root(
+    function: Callable[[Array], tuple[Array, Array]],
+    target: Array,
+    low: Array,
+    high: Array,
+    start: Array | None = None,
+) -> Array:
+    """Where `function`, which gives value and slope and increases on [low, high], reaches `target`.
+
+    It starts at `low` unless a better guess is given.
 
     >>> increasing_root(lambda x: (x**2, 2 * x), np.array([2.0]), np.array([1.0]), np.array([2.0]))
     array([1.41421356])
     """
-    x = low
+    x = low if start is None else np.clip(start, low, high)
     for _ in range(ITERATIONS):
         value, slope = function(x)
         error = value - target

@@ -13,6 +13,9 @@ from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
 from surfacechem.terms import parameter
 
+GRID = 200
+"""Gaps whose times give the first guess of the gap at a time."""
+
 PANEL = 0.25
 SERIES_LIMIT = 0.5
 
@@ -90,8 +93,15 @@ class OverdampedPullOff(Reference):
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         low, high = np.full_like(t, self.g_i), np.full_like(t, self.end_gap)
-        g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self._x_gap)), t, low, high)
+        grid = self._x_gap + self.width * np.sinh(np.linspace(*self._ends(), GRID))
+        guess = np.where(t > 0, np.interp(t, self._times(grid), grid), low)
+        g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self._x_gap)), t, low, high, guess)
         return {"g_n": g, "t_n": self.bodies.traction(g), "v_n": self._force(g - self._x_gap) / self.c}
+
+    def _ends(self) -> tuple[float, float]:
+        """Both ends of the passage in arsinh of the distance from the fold."""
+        first, last = ((g - self._x_gap) / self.width for g in (self.g_i, self.end_gap))
+        return math.asinh(first), math.asinh(last)
 
     @property
     def _x_gap(self) -> float:
