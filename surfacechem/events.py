@@ -6,9 +6,7 @@ reaches zero the stretch ends, the jump is made, and the next one starts from th
 
 from __future__ import annotations
 
-import copy
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -16,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.jumps import DRIFT, Jump, Jumper, Point
-from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Solver, Status
+from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
+from surfacechem.stretches import Part, all_counters, all_events, all_steps, changed, joined
 from surfacechem.system import HELD, START, System
 
 Array = NDArray[np.float64]
@@ -39,21 +38,6 @@ AT_ONCE = 12
 
 HOLD, LONGEST_HOLD = 1e-9, 1e-4
 """Parts of a run for which chatter of friction is resolved to sticking: the first time, then longer, and at most."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """A stretch as it was solved, in its own time and with its own ledger."""
-
-    result: Result
-    start: Point
-    end: float
-    """Time reached [s]."""
-    status: Status
-    times: Array
-    """Output times reached [s]."""
-    booked: Array
-    """Ledger at its start."""
 
 
 @dataclass
@@ -141,7 +125,7 @@ class Hybrid:
         local = start.parameters.copy()
         local[self.clock] = start.t
         local[self.system.origins] -= start.t
-        part = _with(
+        part = changed(
             problem,
             y0=start.y,
             times=np.clip(times - start.t, 0.0, end - start.t),
@@ -293,7 +277,7 @@ class Hybrid:
     def _merged(self) -> Result:
         parts, problem = self.parts, self.problem
         last = parts[-1].result if parts else None
-        merged = _with(
+        merged = changed(
             problem,
             segments=np.array([*(part.start.t for part in parts), problem.segments[-1]]) if parts else problem.segments,
             parameters=np.array([part.start.parameters for part in parts]) if parts else problem.parameters,
@@ -309,48 +293,10 @@ class Hybrid:
             ydot=last.ydot if last else np.zeros(n),
             ledger=self.booked,
             margins=last.margins if last else np.zeros(0),
-            times=_joined([part.times for part in parts], 0),
-            outputs=_joined([part.result.outputs for part in parts], n),
-            ledger_outputs=_joined([part.result.ledger_outputs + part.booked for part in parts], q),
-            events=_events(parts, n, q),
-            counters=Counters(*(int(sum(c)) for c in zip(*(part.result.counters for part in parts), strict=True)))
-            if parts
-            else Counters(),
-            steps=_steps(parts) if problem.record_steps and parts else None,
+            times=joined([part.times for part in parts], 0),
+            outputs=joined([part.result.outputs for part in parts], n),
+            ledger_outputs=joined([part.result.ledger_outputs + part.booked for part in parts], q),
+            events=all_events(parts, n, q),
+            counters=all_counters(parts),
+            steps=all_steps(parts) if problem.record_steps and parts else None,
         )
-
-
-def _with(problem: Problem, **changes: object) -> Problem:
-    """The problem over a stretch; what was checked of the whole run is not checked again."""
-    changed = copy.copy(problem)
-    for name, value in changes.items():
-        object.__setattr__(changed, name, value)
-    return changed
-
-
-def _joined(blocks: Sequence[Array], width: int) -> Array:
-    if blocks:
-        return np.concatenate(blocks)
-    return np.empty((0, width)) if width else np.empty(0)
-
-
-def _events(parts: Sequence[Part], n: int, q: int) -> Events:
-    found = [(part, part.result.events) for part in parts if len(part.result.events.t)]
-    return Events(
-        _joined([part.start.t + events.t for part, events in found], 0),
-        _joined([events.y for _, events in found], n),
-        _joined([events.ydot for _, events in found], n),
-        _joined([part.booked + events.ledger for part, events in found], q),
-        index=np.concatenate([events.index for _, events in found]) if found else np.empty(0, np.int64),
-    )
-
-
-def _steps(parts: Sequence[Part]) -> Points:
-    """All steps; the start of a stretch, which is the end of the one before in other modes, only once."""
-    found = [(part, part.result.steps, int(k > 0)) for k, part in enumerate(parts) if part.result.steps is not None]
-    return Points(
-        np.concatenate([part.start.t + steps.t[skip:] for part, steps, skip in found]),
-        np.concatenate([steps.y[skip:] for _, steps, skip in found]),
-        np.concatenate([steps.ydot[skip:] for _, steps, skip in found]),
-        np.concatenate([part.booked + steps.ledger[skip:] for part, steps, skip in found]),
-    )

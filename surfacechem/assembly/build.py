@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import symengine
@@ -32,6 +32,25 @@ class Bond:
     symbol: Any
     dot: Any
     density: Expression
+
+
+@dataclass
+class Motion:
+    """What the stages that let the gap and the interface move leave for each other."""
+
+    mechanical: list[Expression] = field(default_factory=list)
+    """Elastic and kinetic energies of the bodies [J/m^2]."""
+    far_fields: dict[str, Any] = field(default_factory=dict)
+    """Mountings with their symbols, by direction."""
+    drives: dict[str, Expression] = field(default_factory=dict)
+    """Rates of the variables that a programme moves."""
+    slip: Any = None
+    """What determines the tangential motion, where it moves by a balance."""
+    sliding_tractions: list[Expression] = field(default_factory=list)
+    stick_limit: Expression | None = None
+    """Tangential traction that sticking can bear."""
+    gap_rates: dict[str, Expression] = field(default_factory=dict)
+    """Rates of the gaps that move by a balance."""
 
 
 class Build:
@@ -80,19 +99,7 @@ class Build:
         self.modes: list[Mode] = []
         self.transitions: list[Transition] = []
         self.equilibria: list[Equilibrium] = []
-        self.mechanical: list[Expression] = []
-        """Elastic and kinetic energies of the bodies [J/m^2]."""
-        self.far_fields: dict[str, Any] = {}
-        """Mountings with their symbols, by direction."""
-        self.drives: dict[str, Expression] = {}
-        """Rates of the variables that a programme moves."""
-        self.slip: Any = None
-        """What determines the tangential motion, where it moves by a balance."""
-        self.sliding_tractions: list[Expression] = []
-        self.stick_limit: Expression | None = None
-        """Tangential traction that sticking can bear."""
-        self.gap_rates: dict[str, Expression] = {}
-        """Rates of the gaps that move by a balance."""
+        self.motion = Motion()
         self.pairs: list[Pair] = []
         self.conductances: dict[tuple[str, str], list[Expression]] = {}
         """Conductances in parallel between two ends [W/(m^2 K)]."""
@@ -135,15 +142,15 @@ class Build:
 
     def slope_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable between its jumps."""
-        if name in self.drives:
-            return self.drives[name]
+        if name in self.motion.drives:
+            return self.motion.drives[name]
         expression = next(item.expression for item in self.named if item.name == name)
         return derivative(expression, self.t)
 
     def rate_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable that stores energy, which must not jump."""
-        if name in self.drives:
-            return self.drives[name]
+        if name in self.motion.drives:
+            return self.motion.drives[name]
         load = self.loads[name]
         if load.jumps():
             raise InputError(

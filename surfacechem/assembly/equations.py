@@ -66,10 +66,10 @@ def _gaps(build: Build) -> dict[Any, Expression]:
         symbol = symengine.Symbol(gap)
         if not depends(build.psi, symbol):
             continue
-        rates[symbol] = build.gap_rates[gap] if gap in build.gap_rates else build.rate_of(gap)
+        rates[symbol] = build.motion.gap_rates[gap] if gap in build.motion.gap_rates else build.rate_of(gap)
         power = derivative(build.psi, symbol) * rates[symbol]
         if power != 0:
-            if gap not in build.gap_rates:
+            if gap not in build.motion.gap_rates:
                 build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
             _give_power(build, power)
     return rates

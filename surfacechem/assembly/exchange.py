@@ -32,11 +32,11 @@ def friction(build: Build) -> None:
         power = build.stretch * traction * v + _across(build, law, bound, label, pressed)
         build.frictions.add(label)
         build.dissipation[label] = power
-        if build.slip is None:
+        if build.motion.slip is None:
             build.supply(f"W_{label}", f"work done against {law.title}", power, None)
             _reversal(build)
         else:
-            build.sliding_tractions.append(build.stretch * traction)
+            build.motion.sliding_tractions.append(build.stretch * traction)
             stick_limit(build, law, bound, pressed)
 
 
@@ -51,7 +51,7 @@ def _across(build: Build, law: Friction, bound: Friction, label: str, pressed: d
     """Power of the traction across v, where the law has one."""
     if not hasattr(bound, "transverse"):
         return symengine.Integer(0)
-    if build.slip is not None:
+    if build.motion.slip is not None:
         raise InputError("a law with two directions needs both velocities prescribed, `v` and `v_2`.", law.place)
     traction = build.variables.call(bound, bound.transverse, pressed)
     quantity = Quantity(f"t_2_{label}", "Pa", f"tangential traction of {law.title} across v")

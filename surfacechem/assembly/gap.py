@@ -33,13 +33,13 @@ def _moving(build: Build, mount: Held) -> Expression:
     symbol, dot = symengine.symbols("g_n dg_n_dt")
     initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
     build.states.append(State(VARIABLES["g_n"], symbol, dot, initial, LENGTH, algebraic=False))
-    build.gap_rates["g_n"] = dot
+    build.motion.gap_rates["g_n"] = dot
     if mount.inertial:
         velocity, change = symengine.symbols("v_n dv_n_dt")
         start = build.scene.initial.get("v_n", 0.0)
         build.states.append(State(VARIABLES["v_n"], velocity, change, start, LENGTH, algebraic=False))
         build.variables.define("v_n", lambda: velocity, "evolved", mount.by)
-        build.gap_rates["g_n"] = velocity
+        build.motion.gap_rates["g_n"] = velocity
     return symbol
 
 
@@ -75,11 +75,11 @@ def normal_motion(build: Build) -> None:
         return
     g = build.variables.get("g_n", "the mechanics")
     far = far_field(build, mount)
-    if "g_n" not in build.gap_rates:
+    if "g_n" not in build.motion.gap_rates:
         rate = build.total_derivative(g)
         far.book(build, g, rate)
         return
-    rate = build.gap_rates["g_n"]
+    rate = build.motion.gap_rates["g_n"]
     t_n = derivative(build.psi, g)
     far.book(build, g, rate)
     if mount.inertial:

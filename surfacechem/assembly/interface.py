@@ -166,7 +166,7 @@ def _sides_of_touch(build: Build) -> None:
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
     conditions = {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
     psi = symengine.sympify(build.psi).xreplace(conditions)
-    if "g_n" not in build.gap_rates or not depends(psi, side):
+    if "g_n" not in build.motion.gap_rates or not depends(psi, side):
         return
     build.psi = psi
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))

@@ -90,7 +90,7 @@ class FarField:
         ):
             if energy != 0:
                 quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
-                build.mechanical.append(build.name(quantity, energy))
+                build.motion.mechanical.append(build.name(quantity, energy))
         bulk = self.w_dot - rate
         power = (self.k * (self.w - g) + self.c_b * bulk) * self.w_dot + self.F * rate
         if power != 0:
@@ -121,7 +121,7 @@ def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
 
 def far_field(build: Build, mount: Held) -> FarField:
     """The mounting with symbols for its parameters; made once."""
-    if mount.axis not in build.far_fields:
+    if mount.axis not in build.motion.far_fields:
         law = build.variables.bind(
             mount.law, f"mechanics.{'normal' if mount.axis == 'n' else 'tangential'}", f"_{mount.axis}"
         )
@@ -131,8 +131,8 @@ def far_field(build: Build, mount: Held) -> FarField:
         drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
         force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
         w_dot = build.rate_of(w) if needed and given else symengine.Integer(0)
-        build.far_fields[mount.axis] = FarField(
+        build.motion.far_fields[mount.axis] = FarField(
             mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, drive, w_dot, force
         )
-    far: FarField = build.far_fields[mount.axis]
+    far: FarField = build.motion.far_fields[mount.axis]
     return far

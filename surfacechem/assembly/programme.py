@@ -46,7 +46,7 @@ def _driven(build: Build, name: str, stage: Expression) -> Expression:
     start = build.scene.initial.get(name, 0.0)
     build.states.append(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
     build.rows[name] = dot - rate
-    build.drives[name] = rate
+    build.motion.drives[name] = rate
     return symbol
 
 

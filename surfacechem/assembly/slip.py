@@ -59,7 +59,7 @@ def _kind(build: Build) -> Kind | None:
 
 def tangential_gap(build: Build) -> None:
     """States and modes of the tangential motion."""
-    build.slip = kind = _kind(build)
+    build.motion.slip = kind = _kind(build)
     if kind is None:
         if build.variables.has("v"):
             build.variables.define("direction", lambda: sign(build.variables.get("v", "the friction")), "internal", "v")
@@ -94,20 +94,20 @@ def _state(build: Build, name: str, *, algebraic: bool = False) -> Expression:
 def _displacement(build: Build, kind: Kind) -> None:
     u = _state(build, "u_t")
     build.variables.define("u_t", lambda: u, "evolved", "mechanics.tangential")
-    build.gap_rates["u_t"] = symengine.Symbol("du_t_dt")
+    build.motion.gap_rates["u_t"] = symengine.Symbol("du_t_dt")
     if kind.inertial:
         name = "v_t" if kind.elastic else "v"
         velocity = _state(build, name)
         build.variables.define(name, lambda: velocity, "evolved", "mechanics.tangential")
-        build.gap_rates["u_t"] = velocity
+        build.motion.gap_rates["u_t"] = velocity
 
 
 def _elastic_gap(build: Build, kind: Kind) -> None:
     g = _state(build, "g_t")
     build.variables.define("g_t", lambda: g, "evolved", "elastic sticking")
-    build.gap_rates["g_t"] = symengine.Symbol("dg_t_dt")
+    build.motion.gap_rates["g_t"] = symengine.Symbol("dg_t_dt")
     if kind.mount is None:
-        build.gap_rates["u_t"] = (
+        build.motion.gap_rates["u_t"] = (
             build.rate_of("u_t") if build.variables.get("u_t", "the elastic gap") is not None else NONE
         )
 
@@ -115,21 +115,21 @@ def _elastic_gap(build: Build, kind: Kind) -> None:
 def _sliding_velocity(build: Build, kind: Kind) -> Expression:
     if not kind.slides:
         return NONE
-    rate = build.gap_rates["u_t"]
+    rate = build.motion.gap_rates["u_t"]
     if kind.elastic:
-        rate = rate - build.gap_rates["g_t"]
+        rate = rate - build.motion.gap_rates["g_t"]
     slip = build.variables.get("direction", "sliding")
     return build.name(VARIABLES["v"], slip**2 * rate)
 
 
 def tangential_motion(build: Build) -> None:
     """Balance of the tangential tractions, and the transitions between sticking and sliding."""
-    kind = build.slip
+    kind = build.motion.slip
     if kind is None:
         return
     far = far_field(build, kind.mount) if kind.mount else None
-    v, rate = build.variables.get("v", "the friction"), build.gap_rates["u_t"]
-    t_f = sum(build.sliding_tractions, NONE)
+    v, rate = build.variables.get("v", "the friction"), build.motion.gap_rates["u_t"]
+    t_f = sum(build.motion.sliding_tractions, NONE)
     t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
     carried = t_e if t_e is not None else t_f
     needed = t_e if t_e is not None else far.force(symengine.Symbol("u_t"), NONE)  # type: ignore[union-attr]
@@ -154,7 +154,7 @@ def _name_traction(build: Build, slides: Expression, carried: Expression, needed
 def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: Expression, carried: Expression) -> None:
     """Row of the displacement, and of its velocity where that is a variable of its own."""
     u, du = symengine.symbols("u_t du_t_dt")
-    rate = build.gap_rates["u_t"]
+    rate = build.motion.gap_rates["u_t"]
     if kind.inertial:
         name = "v_t" if kind.elastic else "v"
         moves = symengine.Integer(1) if kind.elastic else slides
@@ -191,7 +191,7 @@ def _elastic_rows(
     build: Build, kind: Kind, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
 ) -> None:
     g, dg = symengine.symbols("g_t dg_t_dt")
-    rate = build.gap_rates["u_t"]
+    rate = build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows["g_t"] = dg - (rate - v)
         driving = t_e - t_f
@@ -217,7 +217,7 @@ def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Ex
 
 def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
-    limit = build.stick_limit
+    limit = build.motion.stick_limit
     assert limit is not None
     breaks = any(law.breaks_bonds for law in build.interface.frictions)
     jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaks else {}
@@ -241,11 +241,11 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
 
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
-    if build.slip is None or not build.slip.sticks:
+    if build.motion.slip is None or not build.motion.slip.sticks:
         return
     at_rest = {**own, "v": NONE, "direction": symengine.Integer(1)}
     kinetic = build.variables.call(bound, bound.statement, at_rest)
     if law.has_limit:
         static = build.variables.call(bound, bound.limit, at_rest)
         kinetic = static if static == kinetic else where(static > kinetic, static, kinetic)
-    build.stick_limit = kinetic if build.stick_limit is None else build.stick_limit + kinetic
+    build.motion.stick_limit = kinetic if build.motion.stick_limit is None else build.motion.stick_limit + kinetic

@@ -17,7 +17,7 @@ from surfacechem.terms import RateLaw
 def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:
     """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
     mount = held(build, "n")
-    if mount is None or not mount.quasi_static or "g_n" not in build.gap_rates:
+    if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
         return []
     g, k = symengine.Symbol("g_n"), far_field(build, mount).k
     slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
@@ -38,7 +38,7 @@ def softening_mode(build: Build) -> None:
 
 
 def _velocity(build: Build) -> Expression:
-    rate = build.gap_rates["g_n"] if "g_n" in build.gap_rates else build.rate_of("g_n")
+    rate = build.motion.gap_rates["g_n"] if "g_n" in build.motion.gap_rates else build.rate_of("g_n")
     return build.name(VARIABLES["v_n"], rate)
 
 

@@ -64,4 +64,6 @@ def _reaction(build: Build, T: Expression) -> Expression:
 def _exchanges(build: Build) -> bool:
     """Whether anything but friction and reactions brings heat to the bodies and the interface."""
     supplied = any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
-    return bool(build.scene.heat) or supplied or any(str(x) in GAPS for x in build.rates) or bool(build.far_fields)
+    return (
+        bool(build.scene.heat) or supplied or any(str(x) in GAPS for x in build.rates) or bool(build.motion.far_fields)
+    )

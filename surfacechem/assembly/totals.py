@@ -26,7 +26,7 @@ def totals(build: Build) -> None:
         if node and derivative(F, node.T) != 0:
             quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, balances.entropy(F, node.T)))
-    energies += build.mechanical
+    energies += build.motion.mechanical
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
@@ -104,7 +104,7 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     if not build.transitions:
         return {}
     _jump_accounts(build)
-    mounts = list(build.far_fields.values())
+    mounts = list(build.motion.far_fields.values())
     first = mounts[0].beta_1 if mounts else symengine.Rational(1, 2)
     bodies = _merged([(build.node_of[b.name], s) for b, s in zip(build.scene.bodies, (first, 1 - first), strict=True)])
     centre = build.node_of.get("interface")

@@ -1,0 +1,75 @@
+"""Stretches of a run between events, and how they join to one result."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.jumps import Point
+from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch as it was solved, in its own time and with its own ledger."""
+
+    result: Result
+    start: Point
+    end: float
+    """Time reached [s]."""
+    status: Status
+    times: Array
+    """Output times reached [s]."""
+    booked: Array
+    """Ledger at its start."""
+
+
+def changed(problem: Problem, **changes: object) -> Problem:
+    """The problem over a stretch; what was checked of the whole run is not checked again."""
+    other = copy.copy(problem)
+    for name, value in changes.items():
+        object.__setattr__(other, name, value)
+    return other
+
+
+def joined(blocks: Sequence[Array], width: int) -> Array:
+    """Blocks of rows after each other; no rows of that width where there are no blocks."""
+    if blocks:
+        return np.concatenate(blocks)
+    return np.empty((0, width)) if width else np.empty(0)
+
+
+def all_events(parts: Sequence[Part], n: int, q: int) -> Events:
+    """The events of all stretches, in the time and with the ledger of the run."""
+    found = [(part, part.result.events) for part in parts if len(part.result.events.t)]
+    return Events(
+        joined([part.start.t + events.t for part, events in found], 0),
+        joined([events.y for _, events in found], n),
+        joined([events.ydot for _, events in found], n),
+        joined([part.booked + events.ledger for part, events in found], q),
+        index=np.concatenate([events.index for _, events in found]) if found else np.empty(0, np.int64),
+    )
+
+
+def all_steps(parts: Sequence[Part]) -> Points:
+    """All steps; the start of a stretch, which is the end of the one before in other modes, only once."""
+    found = [(part, part.result.steps, int(k > 0)) for k, part in enumerate(parts) if part.result.steps is not None]
+    return Points(
+        np.concatenate([part.start.t + steps.t[skip:] for part, steps, skip in found]),
+        np.concatenate([steps.y[skip:] for _, steps, skip in found]),
+        np.concatenate([steps.ydot[skip:] for _, steps, skip in found]),
+        np.concatenate([part.booked + steps.ledger[skip:] for part, steps, skip in found]),
+    )
+
+
+def all_counters(parts: Sequence[Part]) -> Counters:
+    """What all stretches cost together."""
+    if not parts:
+        return Counters()
+    return Counters(*(int(sum(counts)) for counts in zip(*(part.result.counters for part in parts), strict=True)))
