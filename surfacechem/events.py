@@ -263,7 +263,7 @@ class Hybrid:
             j = self.jumper.states.index(law)
             return float(jump.after.y[j] - jump.before.y[j])
         if law != "events":
-            return 0.0
+            return jump.work.get(name, 0.0)
         amounts = {
             "dissipation": jump.released,
             "entropy production": jump.entropy,

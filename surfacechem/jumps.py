@@ -5,8 +5,8 @@ Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (202
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -27,6 +27,10 @@ ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible
 
 ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
+
+SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
+"""Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
+least a nanometre."""
 
 CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "disp": False}
 """How closely a root of the tractions is found: to rounding."""
@@ -71,6 +75,8 @@ class Jump:
     verdict: str
     since: float = 0.0
     """Time since the transition before [s], sharper than the difference of their times late in a run."""
+    work: Mapping[str, float] = field(default_factory=dict)
+    """Work of the far-field tractions [J/m^2], by account."""
     heat_out: float = 0.0
     """Heat passed to prescribed temperatures [J/m^2]."""
     entropy_out: float = 0.0
@@ -130,16 +136,17 @@ class Jumper:
 
     @cached_property
     def _books(self) -> Function:
-        """Total energy and entropy."""
-        totals = [self.system.find(name).expression for name in ("E_total", "S_total")]
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in totals])
+        """What a jump conserves, the total entropy, and the potentials of the far-field tractions."""
+        system = self.system
+        books = [system.jump_energy, system.find("S_total").expression, *system.given.values()]
+        return compile_function(system.inputs, [system.expand(item) for item in books])
 
     def _sink_function(self, kind: str) -> Function:
-        """Total energy; then temperature, share, energy and capacity of each sink."""
+        """What a jump conserves; then temperature, share, energy and capacity of each sink."""
         if kind not in self._sink_functions:
             sinks = self.system.sinks[kind]
             columns = [item for s in sinks for item in (s.T, s.share, s.energy, derivative(s.energy, s.T))]
-            expressions = [self.system.expand(item) for item in (self.system.find("E_total").expression, *columns)]
+            expressions = [self.system.expand(item) for item in (self.system.jump_energy, *columns)]
             self._sink_functions[kind] = compile_function(self.system.inputs, expressions)
         return self._sink_functions[kind]
 
@@ -238,7 +245,8 @@ class Jumper:
         parameters = before.parameters.copy()
         parameters[self.mode_columns] = values[n:]
         start = Point(before.t, values[:n], np.zeros(n), parameters)
-        energy, entropy = self._books(before.inputs())
+        books = self._books(before.inputs())
+        energy = float(books[0])
         after: Point | None = start
         if item.settles:
             direction = 0.0
@@ -247,23 +255,38 @@ class Jumper:
                 if found is not None:
                     before, direction = found
                     after = Point(start.t, before.y, start.ydot, parameters)
-            for e in self.system.equilibria:
-                after = after and self._next_equilibrium(after, e, item.sinks, energy, direction)
+            after = self._settled(after, item, energy, direction)
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since)
         final, released, out, taken = heated
         return self._judged(
-            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, out, taken),
-            float(entropy),
+            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),
+            books,
         )
 
-    def _judged(self, jump: Jump, before: float) -> Jump:
-        """The jump with the entropy it produces, and what the second law says of that."""
-        after = float(self._books(jump.after.inputs())[1])
+    def _settled(self, point: Point | None, item: Transition, energy: float, direction: float) -> Point | None:
+        """The point with all quasi-static gaps in equilibrium; each may move the others through pressure and heat."""
+        moved: Point | None = point
+        for sweep in range(SWEEPS):
+            last = moved
+            for e in self.system.equilibria:
+                own = sweep == 0 and item.fold is not None and e.state == item.fold.state
+                moved = moved and self._next_equilibrium(moved, e, item.sinks, energy, direction if own else 0.0)
+            if moved is None or last is None:
+                return None
+            if len(self.system.equilibria) < 2 or np.all(np.abs(moved.y - last.y) <= STILL * (np.abs(moved.y) + TINY)):
+                return moved
+        return None
+
+    def _judged(self, jump: Jump, books: Array) -> Jump:
+        """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
+        now = self._books(jump.after.inputs())
+        before, after = float(books[1]), float(now[1])
         gain = after - before + jump.entropy_out
         size = max(abs(before), abs(after), abs(jump.entropy_out))
-        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -ROUNDING * size else VIOLATES)
+        work = dict(zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True))
+        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -ROUNDING * size else VIOLATES, work=work)
 
     def _heated(self, point: Point, kind: str, energy: float) -> tuple[Point, float, float, float] | None:
         """The point with the released energy in its sinks: point, energy, heat and entropy passed to reservoirs."""

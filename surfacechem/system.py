@@ -241,6 +241,8 @@ class System:
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the energy that a jump releases, by the kind of the jump."""
+    given: Mapping[str, Expression] = field(default_factory=dict)
+    """Tractions of the far field times their gaps [J/m^2], by the account of their work."""
     pairs: tuple[Pair, ...] = ()
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
@@ -290,6 +292,11 @@ class System:
         """The margins that change in the course of a run."""
         moving = {self.t, *(x for state in self.states for x in (state.symbol, state.dot))}
         return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving)
+
+    @property
+    def jump_energy(self) -> Expression:
+        """What a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2]."""
+        return self.find("E_total").expression - sum(self.given.values(), symengine.Integer(0))
 
     def find(self, name: str) -> Named:
         """The named quantity of that name."""

@@ -83,6 +83,7 @@ def assemble(scene: Scene) -> System:
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),
         sinks=taking,
+        given=dict(build.motion.given),
         fit=build.fit() if build.fit else None,
         warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
         outside=_outside(build),

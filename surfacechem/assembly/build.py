@@ -40,6 +40,8 @@ class Motion:
 
     mechanical: list[Expression] = field(default_factory=list)
     """Elastic and kinetic energies of the bodies [J/m^2]."""
+    given: dict[str, Expression] = field(default_factory=dict)
+    """Potentials of the far-field tractions [J/m^2], which do work in a jump, by the account of that work."""
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)

@@ -40,16 +40,22 @@ def limits(build: Build) -> None:
 
 def _limit(build: Build, law: Limit, closed: Expression | None) -> None:
     bound = build.variables.bind(law, f"interface.limits.{law.name()}")
+    if build.interface.bonds:
+        raise InputError(f"{law.name()} breaks bonds at once, which the species of a mechanism cannot.", law.place)
     strength = build.variables.call(bound, bound.statement)
     t_n = _traction(build, law)
-    active = closed if closed is not None else build.variables.get("bonded", law)
+    bonded = build.variables.get("bonded", law)
+    none = symengine.Integer(0)
+    # Closed again, a rigid interface that has debonded bears pressure only.
+    holds = bonded if closed is None else closed
+    strength = strength if closed is None else bonded * strength
     build.transitions.append(
         Transition(
             "debond",
-            where(active > 0, strength - t_n, 1),
+            where(holds > 0, strength - t_n, 1),
             OPEN,
-            {active: symengine.Integer(0)},
-            {bond.symbol: symengine.Integer(0) for name, bond in build.bonding.items() if name == "phi"},
+            {mode: none for mode in (bonded, closed) if mode is not None},
+            {bond.symbol: none for name, bond in build.bonding.items() if name == "phi"},
             settles=True,
             sinks=law.release,
             violation=law.violation,

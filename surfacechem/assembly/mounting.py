@@ -95,6 +95,8 @@ class FarField:
         power = (self.k * (self.w - g) + self.c_b * bulk) * self.w_dot + self.F * rate
         if power != 0:
             build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
+        if self.F != 0:
+            build.motion.given[f"W_{self.axis}"] = self.F * g
         if self.c_b != 0:
             _bulk_damper(build, self, self.c_b * bulk**2)
         if self.c_g != 0:

@@ -219,8 +219,11 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     slip = build.variables.get("direction", "sliding")
     limit = build.motion.stick_limit
     assert limit is not None
-    breaks = any(law.breaks_bonds for law in build.interface.frictions)
-    jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaks else {}
+    breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
+    if breaking is not None and build.interface.bonds:
+        message = f"{breaking.name()} breaks bonds as sliding starts, which the species of a mechanism cannot."
+        raise InputError(message, breaking.place)
+    jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
     held = build.constant("held_until", HELD, Spec("s", "time until which sticking is held"), 0.0, internal=True)
     for s, word in ((1, "forward"), (-1, "backward")):
@@ -248,4 +251,5 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
     if law.has_limit:
         static = build.variables.call(bound, bound.limit, at_rest)
         kinetic = static if static == kinetic else where(static > kinetic, static, kinetic)
+    kinetic = build.stretch * kinetic
     build.motion.stick_limit = kinetic if build.motion.stick_limit is None else build.motion.stick_limit + kinetic
