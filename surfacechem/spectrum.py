@@ -57,10 +57,25 @@ def _is_line(expression: Expression, t: Any) -> bool:
     return slope != 0 and t not in slope.free_symbols
 
 
-def breaks_bonds(system: System) -> bool:
-    """Whether bonds evolve that can break."""
+def evolves_bonds(system: System) -> bool:
+    """Whether bonds evolve."""
     phi = symengine.Symbol("phi")
     return bool(system.expand(phi).free_symbols & {state.symbol for state in system.states})
+
+
+def breaks_bonds(system: System) -> bool:
+    """Whether bonds evolve that only break, so that each has one force at which it does."""
+    return evolves_bonds(system) and not _forms_bonds(system)
+
+
+def _forms_bonds(system: System) -> bool:
+    """Whether bonds form where there are none: then the loss of bonds is no count of ruptures."""
+    names = {state.symbol for state in system.states if state.name == "phi" or state.name.startswith("theta_")}
+    gone = _total(system, system.expand(symengine.Symbol("phi"))).subs(dict.fromkeys(names, 0))
+    point = {p.symbol: p.at(0.0) for p in system.parameters} | {s.symbol: s.initial for s in system.states}
+    point |= {s.dot: 0 for s in system.states} | {system.t: 0}
+    value = symengine.sympify(gone).subs(point)
+    return bool(names) and not value.free_symbols and float(value) > 0
 
 
 def with_rupture(system: System, variable: str) -> System:

@@ -77,7 +77,12 @@ def prepared(system: System, plan: Plan) -> System:
     if plan.until is None:
         return system
     spectrum.history(system, plan.until[0])
-    return spectrum.with_rupture(system, plan.until[0]) if spectrum.breaks_bonds(system) else system
+    if spectrum.breaks_bonds(system):
+        return spectrum.with_rupture(system, plan.until[0])
+    if spectrum.evolves_bonds(system):
+        warning = "bonds can form again, so that their loss is no spectrum of rupture forces: none is given."
+        return replace(system, warnings=(*system.warnings, warning))
+    return system
 
 
 @dataclass(frozen=True)

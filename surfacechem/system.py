@@ -81,7 +81,8 @@ class Named:
 class Account:
     """A line of the ledger, integrated beside the state.
 
-    ``kind`` is 'energy supply', 'entropy supply' or 'entropy production'; ``law`` names what produces it.
+    ``kind`` is 'energy supply', 'entropy supply', 'entropy production', 'dissipation', 'heat', 'bonds' or 'statistics';
+    ``law`` names what it belongs to.
     """
 
     quantity: Quantity
@@ -171,8 +172,6 @@ class Sink:
     """Internal energy of the node [J/m^2]."""
     share: Expression
     prescribed: bool
-    account: str = ""
-    """Account of the heat that a prescribed node exchanges with the outside."""
 
 
 @dataclass(frozen=True)
@@ -301,7 +300,3 @@ class System:
     def find(self, name: str) -> Named:
         """The named quantity of that name."""
         return next(item for item in self.named if item.name == name)
-
-    def segment_parameters(self, starts: Sequence[float]) -> list[list[float]]:
-        """A parameter vector for each piece of time."""
-        return [[parameter.at(start) for parameter in self.parameters] for start in starts]

@@ -121,4 +121,12 @@ def _slope(build: Build, t_n: Expression, g: Expression) -> Expression:
     if node is None or node.prescribed:
         return slope
     coupling = derivative(t_n, node.T)
-    return slope + node.T * coupling**2 / node.capacity() if coupling != 0 else slope
+    if coupling == 0:
+        return slope
+    capacity = node.capacity()
+    if capacity == 0:
+        raise InputError(
+            f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the interface "
+            "one, or mount the bodies with a damper or a mass."
+        )
+    return slope + node.T * coupling**2 / capacity

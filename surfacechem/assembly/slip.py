@@ -142,7 +142,7 @@ def tangential_motion(build: Build) -> None:
     if kind.elastic:
         _elastic_rows(build, kind, slides, t_f, t_e, v)
     _name_traction(build, slides, carried, needed)
-    if kind.sticks:
+    if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
         _transitions(build, kind, needed, v)
 
 
@@ -171,9 +171,22 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         _stable_sliding(build, slides, driving, v)
     else:
         driving = far.force(u, NONE) - t_f
+        if far.k == 0:
+            _held_by_friction(build, driving, du)
+            return
         build.rows["u_t"] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
         build.equilibria.append(Equilibrium("u_t", slides * driving, size))
+
+
+def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None:
+    """Under a dead load alone an interface that sticks does not move, and nothing holds one that slides."""
+    build.rows["u_t"] = du
+    limit = build.motion.stick_limit
+    if limit is None:
+        raise InputError("nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper.")
+    reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
+    build.margins.append(Margin("sticks", limit - absolute(driving), reason))
 
 
 def _elastic_balance(build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression) -> None:

@@ -39,7 +39,7 @@ def read_sweep(tree: Tree, usual: Section | None = None) -> Section:
     over = mapping(fields.get("over"))
     if not over:
         raise tree.error(
-            "a sweep needs `over`, for example `over: {loading.f.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`."
+            "a sweep needs `over`, for example `over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`."
         )
     for values in over.values():
         if isinstance(values.value, dict):

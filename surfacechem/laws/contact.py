@@ -48,7 +48,8 @@ class TangentialStiffness(Potential):
 
     .. math:: \Psi = \tfrac12 E_t g_t^2, \quad t_t = E_t g_t
 
-    It carries its traction beside that of a friction law, as two elements in parallel.
+    Where the elastic gap is prescribed it carries its traction beside that of friction; where it moves, in series
+    with it: elastic sticking.
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any g_t.
 
     >>> TangentialStiffness(E_t=1e12).energy(g_t=1e-6)

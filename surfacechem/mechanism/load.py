@@ -207,6 +207,10 @@ def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: t
     variables = {item.name: item.variable for item in species}
     if is_foreign(entry):
         change = _change(reaction, variables)
+        elastic = [s.name for s in species if change.get(s.variable) and s.spring is not None]
+        if reaction.reversible and elastic:
+            message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
+            raise InputError(f"{message}does not know. Write two one-way reactions.", place)
         return EvaluatedReaction(number=number, equation=reaction.equation, change=change, value=0.0, place=place)
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:
