@@ -198,9 +198,11 @@ class Model:
         """Modes that follow from the initial state."""
         symbols = [p.symbol for p in self.system.parameters]
         initial = {state.symbol: values[f"initial.{state.name}"] for state in self.system.states}
+        initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {self.system.t: 0}
         for mode in self.system.modes:
             if mode.start is not None:
-                parameters[:, symbols.index(mode.symbol)] = float(mode.start.subs(initial))
+                start = float(self.system.expand(mode.start).subs(initial))
+                parameters[:, symbols.index(mode.symbol)] = start
 
     def _start(self, y: Array, parameters: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import stat
@@ -31,6 +32,9 @@ CONVENTIONS = "CF-1.11"
 
 LOST = 1e-4
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
+
+LOST_HEAT = 1e-9
+"""Heat that rounding of a flux may carry in a run, relative to the total energy."""
 
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
@@ -144,8 +148,11 @@ class Solution:
     def _lost_fluxes(self) -> list[str]:
         """Fluxes through conductances so large that the temperature difference is rounding."""
         fluxes = {name: size for name, size in self.trajectory.roundings.items() if name.startswith("q_")}
-        largest = max((float(np.max(np.abs(self.trajectory.everywhere[name]))) for name in fluxes), default=0.0)
-        lost = [name for name, size in fluxes.items() if size > LOST * largest]
+        everywhere, duration = self.trajectory.everywhere, self.trajectory.result.t
+        largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
+        # What rounding alone carries over the whole run counts against the heat that there is.
+        felt = LOST_HEAT * _largest(everywhere["E_total"])
+        lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
         advice = "let the two share one temperature, or use the heat_into variables, which are exact"
         return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
 
@@ -154,7 +161,7 @@ class Solution:
         found = []
         for limit in self.trajectory.model.system.ranges:
             values = self.trajectory.everywhere[limit.variable]
-            low, high = float(np.min(values)), float(np.max(values))
+            low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
             if low < limit.low or high > limit.high:
                 span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
                 found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
@@ -287,6 +294,10 @@ class Solution:
         with replacing(target) as temporary:
             write_netcdf(temporary, self.columns, self.attributes)
         return target
+
+
+def _largest(values: Any) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
 
 
 @cache

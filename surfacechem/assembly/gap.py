@@ -47,10 +47,17 @@ def _rigid(build: Build, mount: Held) -> None:
     """An interface that no potential lets open: closed it carries any traction, open it carries none."""
     if not mount.law.k:
         raise InputError("a rigid interface under dead load has no opening. Give the mounting a stiffness k.")
-    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"})
+    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, starts_closed(build, mount))
     build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
     build.variables.define("t_n", partial(_reaction, build, mount, closed), "derived", "equilibrium with the far field")
     build.variables.define("p", partial(_pressure, build), "derived", "equilibrium with the far field")
+
+
+def starts_closed(build: Build, mount: Held) -> Expression:
+    """Whether a rigid interface is closed at the start: it is where bonds hold it, or the far field does not pull."""
+    far = far_field(build, mount)
+    bonds = symengine.Symbol("phi") if "phi" in build.bonding else symengine.Integer(1 if build.interface.limits else 0)
+    return where(bonds > 0, 1, where(far.k * far.w + far.F > 0, 0, 1))
 
 
 def _rigid_gap(build: Build, mount: Held, closed: Expression) -> Expression:

@@ -6,7 +6,7 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, where
+from surfacechem.expressions import Expression, depends, where
 from surfacechem.system import Transition
 from surfacechem.terms import Limit
 
@@ -17,17 +17,29 @@ def bonded_mode(build: Build) -> None:
     """Whether the interface is bonded, for the potentials that ask; it is, where nothing limits it."""
     if build.interface.limits:
         words = {0.0: "debonded", 1.0: "bonded"}
-        build.variables.define("bonded", lambda: build.mode("bonded", 1.0, words), "mode", "interface.limits")
+        start = _starts_bonded(build)
+        build.variables.define("bonded", lambda: build.mode("bonded", 1.0, words, start), "mode", "interface.limits")
     else:
         build.variables.define("bonded", lambda: symengine.Integer(1), "internal", "no limit of the traction")
+
+
+def _starts_bonded(build: Build) -> Expression | None:
+    """An open gap without bonds is not bonded."""
+    closed = next((mode.start for mode in build.modes if mode.name == "closed"), None)
+    if closed is not None or "phi" not in build.bonding or "g_n" not in build.motion.gap_rates:
+        return closed
+    return where(symengine.Symbol("phi") > 0, 1, where(symengine.Symbol("g_n") > 0, 0, 1))
 
 
 def limits(build: Build) -> None:
     """Where a limit is reached bonds break; a rigid interface opens, and closes where the gap has closed."""
     closed = next((mode.symbol for mode in build.modes if mode.name == "closed"), None)
-    for law in build.interface.limits:
-        _limit(build, law, closed)
+    heals = [_limit(build, law, closed) for law in build.interface.limits]
+    again: dict[Expression, Expression] = {}
+    if heals and all(heals):
+        again = {build.variables.get("bonded", "the limit"): symengine.Integer(1)}
     if closed is None:
+        _rebond(build, again)
         return
     if not build.interface.limits:
         t_n = build.variables.get("t_n", "the rigid interface")
@@ -35,10 +47,20 @@ def limits(build: Build) -> None:
         build.transitions.append(Transition("open", margin, "the interface opens", {closed: symengine.Integer(0)}))
     gap = build.variables.get("g_n", "the rigid interface")
     margin = where(closed > 0, 1, gap)
-    build.transitions.append(Transition("touch", margin, "the gap closes", {closed: symengine.Integer(1)}))
+    build.transitions.append(Transition("touch", margin, "the gap closes", {closed: symengine.Integer(1), **again}))
 
 
-def _limit(build: Build, law: Limit, closed: Expression | None) -> None:
+def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
+    """An elastic interface whose strength is that of its bonds can bond again where the gap has closed."""
+    if not again or "g_n" not in build.motion.gap_rates:
+        return
+    (bonded,) = again
+    margin = where(bonded > 0, 1, build.variables.get("g_n", "the limit"))
+    build.transitions.append(Transition("rejoin", margin, "the gap closes, so that bonds can hold again", again))
+
+
+def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
+    """State a limit; whether its strength is that of the bonds, so that it can come back with them."""
     bound = build.variables.bind(law, f"interface.limits.{law.name()}")
     if build.interface.bonds:
         raise InputError(f"{law.name()} breaks bonds at once, which the species of a mechanism cannot.", law.place)
@@ -61,6 +83,7 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> None:
             violation=law.violation,
         )
     )
+    return depends(build.expanded(strength), symengine.Symbol("phi"))
 
 
 def _traction(build: Build, law: Limit) -> Expression:

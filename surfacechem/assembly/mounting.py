@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import symengine
 
 from surfacechem.assembly.build import Build
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
@@ -45,6 +46,8 @@ def held(build: Build, axis: str) -> Held | None:
     scene = build.scene
     law = scene.normal if axis == "n" else scene.tangential
     if law is not None:
+        if not (law.k or law.m or law.c_b or law.c_g or f"F_{axis}" in scene.loading):
+            raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
         return Held(law, axis, law.path)
     if f"F_{axis}" in scene.loading:
         return Held(Mounting(), axis, f"loading.F_{axis}")

@@ -46,6 +46,8 @@ class RarefiedFilm(HeatTransfer):
     21328.612
     """
 
+    nonnegative = ("d_m",)
+
     channel = "film"
 
     alpha_1: float = parameter("1", "thermal accommodation at the first end", default=1.0, above=0, at_most=1)
