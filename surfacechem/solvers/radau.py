@@ -30,6 +30,9 @@ CHUNK = 256
 """Runs a thread takes at a time."""
 END, OUTPUTS, EVENTS, RECORDS = range(4)
 _STATUSES = tuple(Status)
+LOOSEST = 3e-5
+"""Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
+
 TIMES = 10
 """Where segments and output times stand among the arguments of the compiled entry point."""
 
@@ -70,7 +73,7 @@ class _Tables:
             q,
             max_steps,
             self.stop,
-            rtol,
+            min(rtol, LOOSEST),
             atol,
             _kinds(margins),
             y0,
