@@ -5,20 +5,19 @@ Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (202
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
 from surfacechem.expressions import Expression, derivative
+from surfacechem.marching import march, zero_ahead
 from surfacechem.system import HELD, Equilibrium, System, Transition
 
 Array = NDArray[np.float64]
-Curve = Callable[[Sequence[float] | Array], Array]
 
 DRIFT = 100.0
 """Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
@@ -32,19 +31,10 @@ SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
 """Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
 least a nanometre."""
 
-CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "disp": False}
-"""How closely a root of the tractions is found: to rounding."""
-
 NEWTON = 60
 POLISH = 3
 DRIFTED = 1e-3
 """Largest relative drift of a gap from its equilibrium that is corrected without a search."""
-
-FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
-"""First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
-
-SMALLEST_GAP = 1e-12
-"""Gap [m] below which the search starts as if from this one."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +177,7 @@ class Jumper:
             rows[:, column] = gaps
             return np.atleast_2d(function(rows))[:, 0]
 
-        g = _zero_ahead(tangent, float(base[column]), direction, 1.0)
+        g = zero_ahead(tangent, float(base[column]), direction, 1.0)
         if g is None:
             return None
         y = point.y.copy()
@@ -341,33 +331,9 @@ class Jumper:
                 rows = np.where(np.isfinite(heated), heated, rows)
             return np.asarray(np.atleast_2d(self._equilibria(rows))[:, 2 * number])
 
-        g = self._march(driving, float(base[column]), direction)
+        g = march(driving, float(base[column]), direction)
         if g is None:
             return None
         y = point.y.copy()
         y[column - 1] = g
         return Point(point.t, y, point.ydot, point.parameters)
-
-    def _march(self, driving: Curve, start: float, direction: float) -> float | None:
-        """The gap at which the push of the driving traction, or that from a fold, ends."""
-        push = float(np.sign(driving([start])[0]))
-        if push == 0.0 and direction == 0.0:
-            return start
-        return _zero_ahead(driving, start, direction or push, direction or push)
-
-
-def _zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> float | None:
-    """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
-    from scipy.optimize import brentq
-
-    size = FIRST * max(abs(start), SMALLEST_GAP)
-    gaps = start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1)
-    values = sign * curve(np.asarray(gaps))
-    first = int(np.argmax(values > 0))
-    crossed = np.nonzero(~(values[first:] > 0))[0]
-    if not values[first] > 0 or len(crossed) == 0 or not np.isfinite(values[first + crossed[0]]):
-        return None
-    j = first + int(crossed[0])
-    if values[j] == 0.0:
-        return float(gaps[j])
-    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))

@@ -11,34 +11,17 @@ from typing import Any
 
 from surfacechem.expressions import Expression
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
-from surfacechem.mechanism.rates import KILO, plain
-from surfacechem.terms import RateLaw, option, parameter
+from surfacechem.mechanism.rates import KILO, MechanismReaction
+from surfacechem.terms import parameter
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""
 
 
-class EvaluatedReaction(RateLaw):
+class EvaluatedReaction(MechanismReaction):
     """A reaction whose net rate is a number that comes from outside at every call."""
 
-    number: str = option("short name of the reaction")
-    equation: str = option("the reaction as the mechanism writes it")
-    change: Mapping[str, float] = option("products less reactants, for each coverage")
     value: float = parameter("1/(m^2 s)", "net rate, evaluated by Cantera", varies=False)
-
-    @property
-    def label(self) -> str:
-        """Short name for the quantities of this reaction."""
-        return self.number
-
-    @property
-    def title(self) -> str:
-        """The reaction in words."""
-        return self.equation
-
-    def stoichiometry(self) -> Mapping[str, int | float]:
-        """Change of each coverage, in molecules."""
-        return {name: plain(nu) for name, nu in self.change.items() if nu}
 
     @property
     def rate(self) -> Formula:  # type: ignore[override]

@@ -46,7 +46,29 @@ class CoverageTerm:
 LN10 = 2.302585092994046
 
 
-class SurfaceReaction(RateLaw):
+class MechanismReaction(RateLaw):
+    """A reaction of a mechanism: its name, its equation and what it changes."""
+
+    number: str = option("short name of the reaction")
+    equation: str = option("the reaction as the mechanism writes it")
+    change: Mapping[str, float] = option("products less reactants, for each coverage")
+
+    @property
+    def label(self) -> str:
+        """Short name for the quantities of this reaction."""
+        return self.number
+
+    @property
+    def title(self) -> str:
+        """The reaction in words."""
+        return self.equation
+
+    def stoichiometry(self) -> Mapping[str, int | float]:
+        """Change of each coverage, in molecules."""
+        return {name: plain(nu) for name, nu in self.change.items() if nu}
+
+
+class SurfaceReaction(MechanismReaction):
     r"""Mass action on a surface, per current area.
 
     .. math:: R = k(T) \left[ \prod_k n_k^{\,r_k}
@@ -64,11 +86,8 @@ class SurfaceReaction(RateLaw):
     native: ClassVar[bool] = False
     """Whether Cantera knows the type without an extension."""
 
-    number: str = option("short name of the reaction")
-    equation: str = option("the reaction as the mechanism writes it")
     orders: Mapping[str, float] = option("forward order of each coverage")
     products: Mapping[str, float] = option("product coefficient of each coverage")
-    change: Mapping[str, float] = option("products less reactants, for each coverage")
     species: tuple[Species, ...] = option("the species that take part")
     reversible: bool = option("whether the reverse follows from the thermo", default=True)
 
@@ -93,20 +112,6 @@ class SurfaceReaction(RateLaw):
     def own_reads(self) -> tuple[str, ...]:
         """Variables that the coefficient reads beside the temperature."""
         return ()
-
-    @property
-    def label(self) -> str:
-        """Short name for the quantities of this reaction."""
-        return self.number
-
-    @property
-    def title(self) -> str:
-        """The reaction in words."""
-        return self.equation
-
-    def stoichiometry(self) -> Mapping[str, int | float]:
-        """Change of each coverage, in molecules."""
-        return {name: plain(nu) for name, nu in self.change.items() if nu}
 
     @property
     def rate(self) -> Formula:  # type: ignore[override]
