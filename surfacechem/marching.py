@@ -1,0 +1,46 @@
+"""Searches along a gap: the next equilibrium in the direction in which the tractions push, or the fold ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Curve = Callable[[Sequence[float] | Array], Array]
+
+CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "disp": False}
+"""How closely a root of the tractions is found: to rounding."""
+
+FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
+"""First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
+
+SMALLEST_GAP = 1e-12
+"""Gap [m] below which the search starts as if from this one."""
+
+
+def march(driving: Curve, start: float, direction: float) -> float | None:
+    """The gap at which the push of the driving traction, or that from a fold, ends."""
+    push = float(np.sign(driving([start])[0]))
+    if push == 0.0 and direction == 0.0:
+        return start
+    return zero_ahead(driving, start, direction or push, direction or push)
+
+
+def zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> float | None:
+    """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
+    from scipy.optimize import brentq
+
+    size = FIRST * max(abs(start), SMALLEST_GAP)
+    gaps = start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1)
+    values = sign * curve(np.asarray(gaps))
+    first = int(np.argmax(values > 0))
+    crossed = np.nonzero(~(values[first:] > 0))[0]
+    if not values[first] > 0 or len(crossed) == 0 or not np.isfinite(values[first + crossed[0]]):
+        return None
+    j = first + int(crossed[0])
+    if values[j] == 0.0:
+        return float(gaps[j])
+    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))
