@@ -249,7 +249,7 @@ def seconds_at(curves: list[Curve], case: str, name: str, error: float) -> float
 def compare(curves: list[Curve]) -> None:
     """Times at equal error and how many times longer than ours."""
     for case in CASES:
-        for error in (1e-4, 1e-6, 1e-8, 1e-10):
+        for error in (1e-4, 1e-6, 1e-7, 1e-8, 1e-10):
             ours = seconds_at(curves, case, "radau", error)
             for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
                 time_taken = seconds_at(curves, case, name, error)
@@ -270,6 +270,7 @@ def machine() -> str:
 def main() -> None:
     """Run everything."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    folder.mkdir(parents=True, exist_ok=True)
     print(machine())
     curves = [curve for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for curve in p1_curves(rtol)]
     curves += [curve for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
