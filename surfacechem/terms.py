@@ -313,8 +313,9 @@ class HeatTransfer(Law):
     """What carries the heat, for the names of fluxes."""
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
-    closure: Literal["direct", "medium"] = option(
-        "'direct' from end to end, or 'medium': through the interface, with twice the conductance on each side",
+    closure: Literal["direct", "medium", "mean"] = option(
+        "'direct' from end to end, 'medium' through the interface with twice the conductance on each side, or 'mean' "
+        "from the interface into both bodies alike, driven by T_c over the harmonic mean of their temperatures",
         default="direct",
     )
     conductance: ClassVar[Callable[..., Expression]]

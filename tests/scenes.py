@@ -23,7 +23,7 @@ from surfacechem.laws.factors import (
     Proportional,
 )
 from surfacechem.laws.friction import Coulomb, MohrCoulomb, Viscous
-from surfacechem.laws.heat import Conductance
+from surfacechem.laws.heat import Conductance, Radiation
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat, VanDerWaalsSpherePlane
@@ -113,6 +113,16 @@ def algebraic() -> Scene:
     heat = [path("interface", "lower", 2500.0), path("interface", "upper", 700.0)]
     loading = {"v": Hold(level=0.1), "g_n": Hold(level=1e-6)}
     return Scene(bodies(energy=Constant), interface, heat, loading, None, 300.0, {"T_1": 290.0, "T_2": 350.0})
+
+
+def mean_influx() -> Scene:
+    """Heat of friction into both bodies alike, and a stretched area."""
+    mean = Conductance(between=("upper", "lower"), h=40.0, closure="mean")
+    radiation = Radiation(between=("lower", "upper"), epsilon_1=0.8, closure="mean")
+    interface = Interface("T_c", [InterfaceCapacity(C_c=3.0)], [Coulomb(mu=0.3)])
+    loading = {"p": Hold(level=1e5), "v": Hold(level=0.02), "J_c": Ramp(start=1.0, rate=0.01)}
+    heat = [mean, radiation, path("lower", "upper", 70.0)]
+    return Scene(bodies(), interface, heat, loading, T_0=300.0, initial={"T_1": 290.0, "T_2": 350.0, "T_c": 310.0})
 
 
 def one_sided() -> Scene:
@@ -233,6 +243,7 @@ ALL = [
     coupled,
     no_medium,
     algebraic,
+    mean_influx,
     one_sided,
     reservoirs,
     prescribed_medium,

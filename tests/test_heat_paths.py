@@ -14,7 +14,7 @@ from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.contact import InterfaceCapacity
+from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.contact_conductance import (
     BondedPressureConductance,
     CooperMikicYovanovich,
@@ -196,6 +196,36 @@ def test_a_medium_is_between_the_bodies():
     law = Conductance(between=("lower", "surroundings"), h=1.0, closure="medium")
     with pytest.raises(InputError, match="belongs to a path between the two bodies"):
         assemble(dataclasses.replace(through_medium([law]), surroundings=Hold(level=300.0)))
+
+
+def test_mean_influx_against_its_exact_solution():
+    """Between bodies that keep their temperatures the interface relaxes to the harmonic mean."""
+    mean = Conductance(between=("upper", "lower"), h=40.0, closure="mean")
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=20.0)])
+    initial = {"T_1": 300.0, "T_2": 450.0, "T_c": 300.0}
+    scene = dataclasses.replace(direct([mean], {}, interface=interface), initial=initial)
+    trajectory = solved(scene, 0.0, 0.1, 0.5, 2.0)
+    values, t = computed(trajectory), np.array([0.0, 0.1, 0.5, 2.0])
+    harmonic = 2 * 300.0 * 450.0 / 750.0
+    exact = harmonic + (300.0 - harmonic) * np.exp(-2 * 40.0 * t / 20.0)
+    assert values["T_c"] == pytest.approx(exact, rel=1e-10)
+    assert values["q_1"] == pytest.approx(40.0 * (exact - harmonic), rel=1e-8)
+    assert values["q_t"] == pytest.approx(np.zeros(4), abs=1e-9)
+
+
+def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
+    mean = Conductance(between=("lower", "surroundings"), h=1.0, closure="mean")
+    with pytest.raises(InputError, match="`closure: mean` belongs to a path between the two bodies"):
+        assemble(dataclasses.replace(through_medium([mean]), surroundings=Hold(level=300.0)))
+    shared = Scene(
+        bodies("T", "T"),
+        Interface("T_c", [InterfaceCapacity(C_c=3.0)]),
+        [Conductance(between=ENDS, h=1.0, closure="mean")],
+        T_0=300.0,
+        initial={"T": 300.0, "T_c": 310.0},
+    )
+    with pytest.raises(InputError, match="two bodies with temperatures of their own"):
+        assemble(shared)
 
 
 # -- ranges -----------------------------------------------------------------------------------------------------------

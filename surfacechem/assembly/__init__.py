@@ -14,6 +14,7 @@ from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
 from surfacechem.assembly.logarithms import logarithmic_state
+from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
 from surfacechem.assembly.slip import tangential_gap, tangential_motion
@@ -47,6 +48,7 @@ STAGES = (
     normal_motion,
     tangential_motion,
     heat_paths,
+    mean_influx,
     equations,
     stage_ends,
     totals,

@@ -87,16 +87,33 @@ def _share(build: Build, heat: Expression, channel: str) -> None:
     for end, share in build.shares().items():
         if share * heat != 0:
             build.node_of[end].inflow.append(share * heat)
-            _receive(build, end, share * heat, channel)
+            receive(build, end, share * heat, channel)
 
 
-def _receive(build: Build, end: str, heat: Expression, channel: str) -> None:
+def receive(build: Build, end: str, heat: Expression, channel: str) -> None:
     """Remember the heat that a body gets from the interface or the other body, by what carries it."""
     if end in build.from_interface:
         received = build.from_interface[end]
         received[channel] = received.get(channel, symengine.Integer(0)) + heat
     elif end == "interface":
         build.into_interface.append(heat)
+
+
+def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
+    """Conductances of a law [W/(m^2 K)], by what carries the heat."""
+    from_node, to_node = (end_node(build, end) for end in law.between)
+    bound = build.variables.bind(law, f"heat.{law.name()}")
+    own = {"T_from": from_node.T, "T_to": to_node.T}
+    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
+    build.law_ranges(law)
+    build.law_margins(law, {})
+    return channels
+
+
+def check_closure(build: Build, law: HeatTransfer) -> None:
+    """Closures other than the direct one need two bodies."""
+    if not set(law.between) <= {body.name for body in build.scene.bodies}:
+        raise InputError(f"`closure: {law.closure}` belongs to a path between the two bodies.", law.place)
 
 
 @dataclass(frozen=True)
@@ -111,6 +128,8 @@ def _by_ends(build: Build) -> list[list[_Path]]:
     """The heat paths, those between the same two ends together."""
     groups: dict[frozenset[str], list[_Path]] = {}
     for law in build.scene.heat:
+        if law.closure == "mean":
+            continue
         for path in _paths(build, law):
             groups.setdefault(frozenset(path.ends), []).append(path)
     return list(groups.values())
@@ -119,31 +138,26 @@ def _by_ends(build: Build) -> list[list[_Path]]:
 def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
     """The path of a law, or through the medium two paths of twice the conductance."""
     a, b = law.between
-    from_node, to_node = _end(build, a), _end(build, b)
+    from_node, to_node = end_node(build, a), end_node(build, b)
     if from_node is to_node:
         raise InputError(
             f"the heat path between {a} and {b} has one temperature, {from_node.name}; remove it.", law.place
         )
-    bound = build.variables.bind(law, f"heat.{law.name()}")
-    own = {"T_from": from_node.T, "T_to": to_node.T}
-    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
-    build.law_ranges(law)
-    build.law_margins(law, {})
+    channels = conductances(build, law)
     if law.closure == "direct":
         yield _Path((a, b), channels)
         return
-    if not {a, b} <= {body.name for body in build.scene.bodies}:
-        raise InputError("`closure: medium` belongs to a path between the two bodies.", law.place)
+    check_closure(build, law)
     double = {name: 2 * h for name, h in channels.items()}
     for ends in ((a, "interface"), ("interface", b)):
-        if _end(build, ends[0]) is not _end(build, ends[1]):
+        if end_node(build, ends[0]) is not end_node(build, ends[1]):
             yield _Path(ends, double)
 
 
 def _between(build: Build, paths: list[_Path]) -> None:
     """All paths between two ends: a flux of each channel where there are several, and their sum."""
     a, b = paths[0].ends
-    from_node, to_node = _end(build, a), _end(build, b)
+    from_node, to_node = end_node(build, a), end_node(build, b)
     area = symengine.Integer(1) if "surroundings" in (a, b) else build.stretch
     channels: dict[str, Expression] = {}
     for path in paths:
@@ -151,18 +165,25 @@ def _between(build: Build, paths: list[_Path]) -> None:
             channels[channel] = channels.get(channel, symengine.Integer(0)) + h
     build.conductances[a, b] = list(channels.values())
     difference = from_node.T - to_node.T
-    name, text = _path_name(build, a, b), f"heat flux from {a} to {b}"
-    parts = {channel: area * h * difference for channel, h in channels.items()}
-    if len(parts) > 1:
-        for channel, part in parts.items():
-            quantity = Quantity(f"{name}_{channel}", "W/m^2", f"{text} by {channel}")
-            parts[channel] = build.name(quantity, part)
-    total = build.name(Quantity(name, "W/m^2", text, tag="e:qc_k1"), symengine.Add(*parts.values()))
+    flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
+    total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
     from_node.inflow.append(-total)
     to_node.inflow.append(total)
     production = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
-    build.production(name, f"heat flow from {a} to {b}", production)
-    _received(build, (a, b), parts if len(parts) > 1 else {next(iter(parts)): total})
+    build.production(flux.name, f"heat flow from {a} to {b}", production)
+    _received(build, (a, b), parts)
+
+
+def named_flux(
+    build: Build, flux: Quantity, parts: Mapping[str, Expression]
+) -> tuple[Expression, dict[str, Expression]]:
+    """A flux by its name, and its channels by theirs where there are several."""
+    if len(parts) > 1:
+        texts = {channel: f"{flux.long_name} by {channel}" for channel in parts}
+        names = {channel: Quantity(f"{flux.name}_{channel}", "W/m^2", text) for channel, text in texts.items()}
+        parts = {channel: build.name(names[channel], part) for channel, part in parts.items()}
+    total = build.name(flux, symengine.Add(*parts.values()))
+    return total, dict(parts) if len(parts) > 1 else {next(iter(parts)): total}
 
 
 def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expression]) -> None:
@@ -172,7 +193,7 @@ def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expressio
             if "surroundings" in ends and end in build.into_body:
                 build.into_body[end] += heat
             else:
-                _receive(build, end, heat, channel)
+                receive(build, end, heat, channel)
 
 
 def _path_name(build: Build, a: str, b: str) -> str:
@@ -182,7 +203,8 @@ def _path_name(build: Build, a: str, b: str) -> str:
     return build.unique(f"q_{short[a]}{short[b]}")
 
 
-def _end(build: Build, end: str) -> Node:
+def end_node(build: Build, end: str) -> Node:
+    """The temperature node of an end; InputError where it has none."""
     if end in build.node_of:
         return build.node_of[end]
     if end == "interface":

@@ -243,7 +243,7 @@ class SceneReader:
             raise InputError(f"a heat path needs two different ends, not {path.between[0]} twice.", place)
         if "surroundings" in path.between and "surroundings" not in self.top:
             raise InputError("the surroundings have no temperature. Add `surroundings: {temperature: ...}`.", place)
-        through = path.closure == "medium" or "interface" in path.between
+        through = path.closure != "direct" or "interface" in path.between
         if through and "temperature" not in self.interface:
             raise InputError("the interface has no temperature. Add `interface.temperature`.", place)
         return cast(HeatTransfer, path)

@@ -1,0 +1,44 @@
+"""Heat that goes from the interface into both bodies alike."""
+
+from __future__ import annotations
+
+import symengine
+
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.exchange import check_closure, conductances, end_node, named_flux, receive
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression
+from surfacechem.quantities import Quantity
+
+BOTH = "interface", "each body"
+
+
+def mean_influx(build: Build) -> None:
+    """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] of the paths with the closure `mean`."""
+    channels: dict[str, Expression] = {}
+    for law in (law for law in build.scene.heat if law.closure == "mean"):
+        check_closure(build, law)
+        if end_node(build, law.between[0]) is end_node(build, law.between[1]):
+            raise InputError("`closure: mean` is of two bodies with temperatures of their own.", law.place)
+        for channel, h in conductances(build, law).items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
+    if channels:
+        _into_both(build, channels)
+
+
+def _into_both(build: Build, channels: dict[str, Expression]) -> None:
+    bodies = [body.name for body in build.scene.bodies]
+    (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
+    build.conductances[BOTH] = list(channels.values())
+    difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)
+    flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
+    total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
+    for name in bodies:
+        build.node_of[name].inflow.append(total)
+    centre.inflow.append(-2 * total)
+    for channel, heat in parts.items():
+        for end, share in ((bodies[0], heat), (bodies[1], heat), ("interface", -2 * heat)):
+            receive(build, end, share, channel)
+    sum_h = symengine.Add(*channels.values())
+    production = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
+    build.production(flux.name, "heat flow from interface to each body", production)
