@@ -5,6 +5,7 @@ Each stage is a module, in the order of STAGES.
 
 from __future__ import annotations
 
+from surfacechem.assembly.bounds import released
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
@@ -48,6 +49,7 @@ STAGES = (
     tangential_motion,
     heat_paths,
     equations,
+    released,
     stage_ends,
     totals,
     touch,
