@@ -27,6 +27,9 @@ ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible
 ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
 
+DIGITS = 4 * float(np.finfo(float).eps)
+"""Last digits of a number."""
+
 SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
 """Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
 least a nanometre."""
@@ -285,12 +288,22 @@ class Jumper:
         if not np.all(np.isfinite(heated)):
             return None
         heat, entropy, total = 0.0, 0.0, float(released[0])
+        if abs(total) <= self._rounding(point, kind):
+            return point, 0.0, 0.0, 0.0
         if any(s.prescribed for s in self.system.sinks[kind]):
             values = self._sink_function(kind)(rows)[0, 1:].reshape(-1, 4)
             for s, (T, share, _, _) in zip(self.system.sinks[kind], values.tolist(), strict=True):
                 heat += share * total if s.prescribed else 0.0
                 entropy += share * total / T if s.prescribed else 0.0
         return Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters), total, heat, entropy
+
+    def _rounding(self, point: Point, kind: str) -> float:
+        """Energy that the last digits of the states and of the energy itself stand for [J/m^2]."""
+        rows = np.repeat(point.inputs()[None], 1 + len(point.y), axis=0)
+        states = slice(1, 1 + len(point.y))
+        rows[1:, states] *= 1 + DIGITS * np.eye(len(point.y))
+        energies = self._sink_function(kind)(rows)[:, 0]
+        return float(np.sum(np.abs(energies[1:] - energies[0])) + DIGITS * abs(energies[0]))
 
     def _temperatures(self, rows: Array, kind: str, energy: float) -> tuple[Array, Array]:
         """Inputs with the temperatures that take up what is missing from the energy, and the energy released."""

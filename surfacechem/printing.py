@@ -82,9 +82,9 @@ def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
     ledger = [
         Row(f"rate_of_{a.quantity.name}", a.rate, f"rate of: {_described(a.quantity)}; {a.kind}") for a in system.ledger
     ]
-    margins = [
-        Row(f"margin_{i}", m.expression, f"{m.name}, else {m.reason}") for i, m in enumerate(system.moving_margins())
-    ]
+    watched = [(m.expression, f"{m.name}, else {m.reason}") for m in system.moving_margins()]
+    watched += [(item.margin, f"else {item.name}: {item.reason}") for item in system.transitions]
+    margins = [Row(f"margin_{i}", expression, text) for i, (expression, text) in enumerate(watched)]
     functions = {
         "residual": ("The balances, zero where they hold.", balances),
         "outputs": ("The named quantities of the dataset.", outputs),

@@ -294,8 +294,15 @@ class System:
 
     @property
     def jump_energy(self) -> Expression:
-        """What a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2]."""
-        return self.find("E_total").expression - sum(self.given.values(), symengine.Integer(0))
+        """What a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2].
+
+        Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
+        """
+        moving = {state.symbol for state in self.states if state.quantity.unit != "K"}
+        moving |= {self.t, *(mode.symbol for mode in self.modes)}
+        members = symengine.sympify(self.find("E_total").expression).free_symbols
+        moved = [member for member in members if self.expand(member).free_symbols & moving]
+        return symengine.Add(*moved, *(-work for work in self.given.values()))
 
     def find(self, name: str) -> Named:
         """The named quantity of that name."""

@@ -5,6 +5,7 @@ Each stage is a module, in the order of STAGES.
 
 from __future__ import annotations
 
+from surfacechem.assembly.bounds import released
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
@@ -50,6 +51,7 @@ STAGES = (
     heat_paths,
     mean_influx,
     equations,
+    released,
     stage_ends,
     totals,
     touch,

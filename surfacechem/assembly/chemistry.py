@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import symengine
 
 from surfacechem import balances
+from surfacechem.assembly.bounds import free_to_react
 from surfacechem.assembly.build import Bond, Build
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.softening import softening
@@ -23,10 +25,13 @@ def reactions(build: Build) -> None:
     laws = {build.label(law): _bound(build, law) for law in build.interface.reactions}
     pairs = opposed(laws)
     together = {label: pair.label for pair in pairs for label in pair.labels}
+    affinities = {label: sum(n * mu[x] for x, n in law.stoichiometry().items()) for label, law in laws.items()}
+    rates = {label: _rate(build, law, affinities[label]) for label, law in laws.items()}
+    free = _free(build, laws, rates)
     for label, law in laws.items():
-        nu = law.stoichiometry()
-        affinity = sum(n * mu[x] for x, n in nu.items())
-        rate = _rate(build, law, label, affinity)
+        nu, affinity = law.stoichiometry(), affinities[label]
+        quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
+        rate = build.name(quantity, rates[label] * free if "phi" in nu else rates[label])
         # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
         owner = together.get(label, label)
         build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
@@ -62,7 +67,15 @@ def _bound(build: Build, law: RateLaw) -> RateLaw:
     return build.variables.bind(law, f"interface.bonding.{law.name()}")
 
 
-def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:
+def _free(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> Expression:
+    """One while the bonding state may change; a law with an envelope ends at its bound by itself."""
+    if "phi" not in build.bonding or any(hasattr(law, "envelope") for law in laws.values()):
+        return symengine.Integer(1)
+    nu = {label: law.stoichiometry().get("phi", 0) for label, law in laws.items()}
+    return free_to_react(build, symengine.Add(*(nu[label] * rate for label, rate in rates.items())))
+
+
+def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     own = {"mu": affinity, "t": build.t}
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
@@ -70,7 +83,7 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     build.law_ranges(law)
-    return build.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
+    return rate
 
 
 def _prescribed_bonding(build: Build) -> None:
