@@ -10,9 +10,9 @@ from surfacechem import balances
 from surfacechem.assembly.build import Bond, Build
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.softening import softening
-from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.expressions import Expression, depends, derivative, exponents
 from surfacechem.quantities import Quantity
-from surfacechem.system import Account
+from surfacechem.system import Account, Capped
 from surfacechem.terms import RateLaw
 
 
@@ -70,6 +70,8 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     build.law_ranges(law)
+    if found := exponents(rate):
+        build.capped.append(Capped(law.title, tuple(found)))
     return build.name(Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R"), rate)
 
 
