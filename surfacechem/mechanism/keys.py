@@ -7,6 +7,7 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
+from surfacechem.mechanism.dependence import MODEL, check_dependence
 from surfacechem.mechanism.kinds import kind_of, kinds, names
 from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source, chosen, sections, sides
@@ -43,7 +44,12 @@ PHASE = frozenset(
         "description",
     )
 )
-SPECIES = frozenset(("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"))
+SPECIES = frozenset(
+    (
+        *("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"),
+        "coverage-dependencies",
+    )
+)
 CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
 POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
@@ -68,9 +74,7 @@ STATE = frozenset(("T", "P", "coverages"))
 REMEDIES = {
     "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
     "phase.",
-    "coverage-dependencies": "coverage-dependent enthalpy and entropy need not follow from one free energy; put the "
-    "dependence into the reaction's activation energy.",
-    "reference-state-coverage": "coverage-dependent thermo is not lowered; use `thermo: ideal-surface`.",
+    "reference-state-coverage": "it belongs to `thermo: coverage-dependent-surface`.",
     "sticking-coefficient": "a sticking reaction needs a gas; give a `rate-constant` instead.",
     "Motz-Wise": "this correction is for sticking reactions, which need a gas; remove it.",
     "sticking-species": "a sticking reaction needs a gas; give a `rate-constant` instead.",
@@ -93,11 +97,16 @@ LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
 
 MODELS = {
     "edge": "a contact line has rates per length; write the reactions on a surface.",
-    "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free energy; use "
-    "`ideal-surface` and put the dependence into the reactions' activation energies.",
 }
 """Phase models that are not plain surfaces, with the way out."""
 
+
+NEIGHBOURS = {
+    "sticking": "a sticking reaction needs a gas beside the surface; give a `rate-constant` instead, the impingement "
+    "rate of a gas at constant pressure included.",
+    "electrochemical": "charge transfer needs an electric potential; give a plain `rate-constant` instead.",
+}
+"""Rate types, by how they begin, of surfaces with neighbours, which a case does not have, with the way out."""
 
 PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
 """Rate types of gases."""
@@ -115,6 +124,9 @@ def check(source: Source, phase: Any, evaluate: bool = False) -> None:
         _check_species(source, entry)
         _check_composition(source, phase, entry)
     names = _names(source, phase, entries)
+    for entry in entries:
+        if entry.get("name") in names:
+            check_dependence(source, phase, entry, names)
     _check_state(source, phase, names)
     for entry in source.reactions(phase):
         if evaluate and is_foreign(entry):
@@ -136,9 +148,9 @@ def _check_file(source: Source) -> None:
 
 def _check_phase(source: Source, phase: Any) -> None:
     title = f"phase {phase.get('name')}"
-    _keys(source, phase, PHASE, title)
     model = str(phase.get("thermo"))
-    if model != "ideal-surface":
+    _keys(source, phase, PHASE | ({"reference-state-coverage"} if model == MODEL else set()), title)
+    if model not in ("ideal-surface", MODEL):
         message = f"{title}: thermo '{model}' is not lowered: {MODELS.get(model, 'use `ideal-surface`.')}"
         raise InputError(message, source.place(phase, "thermo"))
     if phase.get("kinetics", "surface") != "surface":
@@ -227,7 +239,12 @@ def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) ->
 def is_foreign(entry: Any) -> bool:
     """Whether a reaction is of a type that is not known here, but may be one of Cantera's or of another extension."""
     kind = str(entry.get("type", "Arrhenius"))
-    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE
+    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE and not _neighbour(kind)
+
+
+def _neighbour(kind: str) -> str:
+    """Why a rate type needs a neighbour, and the way out; empty where it needs none."""
+    return next((text for start, text in NEIGHBOURS.items() if kind.startswith(start)), "")
 
 
 def _own(law: type[SurfaceReaction]) -> set[str]:
@@ -241,6 +258,8 @@ def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
     if kind in PRESSURE:
         message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
         raise InputError(message, source.place(entry, "type"))
+    if _neighbour(kind):
+        raise InputError(f"{title}: rate type '{kind}': {_neighbour(kind)}", source.place(entry, "type"))
     law = kind_of(kind)
     if law is None:
         message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())} {LEAVE}"
