@@ -19,9 +19,9 @@ class BilinearDebonding(Reference):
         \phi=\frac{g_c}{\hat g}\,\frac{g_f-\hat g}{g_f-g_c},\quad g_c=\frac{t_{max}}{E_b}\le\hat g\le g_f,\qquad
         D=\tfrac12(t_{max}\hat g-\hat tg_c)-H_r(1-\phi)
 
-    with the largest gap so far :math:`\hat g`, and what is dissipated until then, D: the area that loading and unloading
-    enclose less what the broken bonds keep. In all it is :math:`\tfrac12t_{max}g_f-H_r`. The gap opens at a constant
-    speed to :math:`g_1`, closes at the same speed, and opens again. Any t >= 0.
+    with the largest gap so far :math:`\hat g`, and what is dissipated until then, D: the area that loading and
+    unloading enclose less what the broken bonds keep. In all it is :math:`\tfrac12t_{max}g_f-H_r`. The gap
+    opens at a constant speed to :math:`g_1`, closes at the same speed, and opens again. Any t >= 0.
 
     Source: bilinear law as in Camanho & Davila (2002), NASA/TM-2002-211737, integrated.
 
