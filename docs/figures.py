@@ -15,7 +15,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from mkdocs.structure.files import File, Files
 
 import surfacechem
-from surfacechem import plots, sweep_plots
+from surfacechem import case, plots, sweep_plots
 
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 
@@ -187,6 +187,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "friction-with-loss": (["T", "D_coulomb"], None),
     "generalised-bonding": (["T", "phi"], None),
     "generalised-bonding-sliding": (["T", "phi"], None),
+    "hot-plate-bonds": (["g_n", "T_1", "T_2", "T_c", "phi"], None),
     "lubricated-sliding": (["T_1", "T_2", "T_c", "t_film_shear"], None),
     "no-medium": (["T_1", "T_2"], None),
     "one-sided-contact": (["T_1", "T_2", "phi"], None),
@@ -204,6 +205,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "snap-in": (["t_n"], "g_n"),
     "squeeze-film": (["g_n", "T"], None),
     "stick-slip": (["t_t", "v", "T"], None),
+    "stick-slip-debonding": (["t_t", "phi", "u_t"], None),
     "stick-slip-rebonding": (["t_t", "phi"], None),
     "thermal-press": (["g_n", "T_1", "T_2"], None),
     "three-temperatures": (["T_1", "T_2", "T_c"], None),
@@ -213,7 +215,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "viscous-heating": (["T", "t_viscous"], None),
     "weakening-friction": (["T", "D_coulomb"], None),
 }
-"""Cases of the gallery: what is plotted, and over what if not time."""
+"""What is plotted of a case, and over what if not time; of others the usual panels."""
 
 SWEPT = ("biotin-streptavidin", "catch-bond", "force-spectroscopy", "l-selectin-tether")
 """Cases of the gallery whose sweep is plotted."""
@@ -221,13 +223,10 @@ SWEPT = ("biotin-streptavidin", "catch-bond", "force-spectroscopy", "l-selectin-
 
 def gallery(name: str) -> Figure:
     """A case of the gallery."""
-    variables, against = GALLERY[name]
+    if name in SWEPT:
+        return sweep_plots.figure(surfacechem.sweep(name).dataset)
+    variables, against = GALLERY.get(name, (None, None))
     return plots.figure(surfacechem.run(name).dataset, variables, against)
-
-
-def swept(name: str) -> Figure:
-    """The sweep of a case of the gallery."""
-    return sweep_plots.figure(surfacechem.sweep(name).dataset)
 
 
 def gas_network() -> Figure:
@@ -236,8 +235,7 @@ def gas_network() -> Figure:
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    **{f"gallery-{name}.svg": partial(gallery, name) for name in GALLERY},
-    **{f"gallery-{name}.svg": partial(swept, name) for name in SWEPT},
+    **{f"gallery-{name}.svg": partial(gallery, name) for name in case.names()},
     "gallery-gas-network.svg": gas_network,
     "accuracy.svg": accuracy,
     "signs.svg": signs,

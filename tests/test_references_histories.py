@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from surfacechem.errors import InputError
 from surfacechem.references import get
 
+SLIDER = {"m": 10.0, "k": 1e8, "V": 1e-3, "p": 1e5, "mu_b": 0.9, "mu_ub": 0.6, "mu_k": 0.4}
 ROCK = {"mu_0": 0.6, "a": 0.01, "b": 0.015, "L": 1e-5, "v_0": 1e-6, "p": 5e6}
 STEPS = {"theta_i": 3.0, "v_i": 1e-6, "v_step": 1e-4, "t_1": 2.0, "t_2": 3.0}
 ZONE = {"t_max": 8e7, "E_b": 1e15, "g_f": 24e-6, "H_r": 2.0, "g_1": 8e-6, "speed": 1e-6}
@@ -88,3 +89,35 @@ def test_bilinear_debonding_unloads_to_the_origin():
 def test_a_line_that_does_not_fall_is_refused():
     with pytest.raises(InputError, match="g_f must be above t_max / E_b = 8e-08 m"):
         get("bilinear-debonding")(**{**ZONE, "g_f": 8e-8})
+
+
+def test_stick_slip_debonding_without_stronger_bonds_is_stick_slip():
+    t = np.linspace(0.0, 3.0, 3998)
+    ours = get("stick-slip-debonding")(**{**SLIDER, "mu_b": 0.6}).solution(t)
+    plain = get("stick-slip")(m=10.0, k=1e8, V=1e-3, t_s=6e4, t_k=4e4).solution(t)
+    for name, values in plain.items():
+        np.testing.assert_allclose(ours[name], values, atol=1e-10 * np.abs(values).max())
+
+
+def test_stick_slip_debonding_closes_its_energy():
+    """Work of the spring's end is heat, elastic and kinetic energy."""
+    slider = get("stick-slip-debonding")(**SLIDER)
+    t = np.linspace(0.0, 3.0, 30001)
+    values = slider.solution(t)
+    spring, v = values["spring_traction"], values["v"]
+    np.testing.assert_allclose(spring, SLIDER["k"] * (SLIDER["V"] * t - values["u_t"]), atol=1e-6)
+    edges = np.unique([*t, slider.onset_time, slider.onset_time + slider.first.duration])
+    work = np.interp(t, edges, np.concatenate([[0.0], np.cumsum(_averages(slider, edges) * np.diff(edges))]))
+    energy = spring**2 / (2 * SLIDER["k"]) + 0.5 * SLIDER["m"] * v**2 + values["heat"]
+    np.testing.assert_allclose(SLIDER["V"] * work, energy, atol=1e-3 * energy.max())
+    assert values["phi"][t > slider.onset_time].max() == 0.0
+
+
+def _averages(slider, edges):
+    spring = slider.solution(edges)["spring_traction"]
+    return (spring[1:] + spring[:-1]) / 2
+
+
+def test_bonds_too_strong_for_one_direction_are_refused():
+    with pytest.raises(InputError, match="exact for mu_k <= mu_ub <= mu_b <= 2 mu_k"):
+        get("stick-slip-debonding")(**{**SLIDER, "mu_b": 1.5})
