@@ -1,8 +1,10 @@
 """Figures that are computed when the documentation is built."""
 
+import runpy
 from collections.abc import Callable
 from functools import partial
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -13,7 +15,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from mkdocs.structure.files import File, Files
 
 import surfacechem
-from surfacechem import plots, sweep_plots
+from surfacechem import case, plots, sweep_plots
 
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 
@@ -151,32 +153,90 @@ def force_spectrum() -> Figure:
 
 
 GALLERY: dict[str, tuple[list[str], str | None]] = {
-    "stick-slip": (["t_t", "v", "T"], None),
-    "stick-slip-rebonding": (["t_t", "phi"], None),
-    "coulomb-stop": (["v", "T"], None),
-    "cohesive-cycles": (["t_n"], "w_n"),
-    "dynamic-pull-off": (["g_n", "E_kinetic_n", "E_spring_n"], None),
-    "slow-passage": (["g_n"], None),
+    "adhesion-cluster": (["phi"], None),
+    "adhesion-cluster-held": (["phi"], None),
+    "adiabatic-arrhenius": (["phi", "T"], None),
+    "area-stretch": (["T_1", "T_2", "T_c", "phi", "t_coulomb"], None),
+    "bond-constant-force": (["phi"], None),
+    "closing-film": (["T"], "g_n"),
+    "closing-gas-gap": (["T_1", "T_2", "q_1_film", "q_1_radiation"], None),
     "cohesive-cooling": (["T"], "g_n"),
+    "cohesive-cycles": (["t_n"], "w_n"),
+    "cohesive-pull-off": (["t_n"], "w_n"),
+    "compliant-debonding": (["t_n"], "g_n"),
+    "cooling-to-zero": (["T"], None),
+    "coulomb-stop": (["v", "T"], None),
     "debonding": (["t_n", "T"], None),
     "debonding-cooling": (["t_n", "T"], None),
+    "dna-adhesive": (["T_1", "T_2", "T_c", "phi"], None),
+    "dynamic-pull-off": (["g_n", "E_kinetic_n", "E_spring_n"], None),
+    "elastic-bonds-at-a-gap": (["phi", "t_n"], None),
+    "endothermic": (["T", "phi"], None),
+    "endothermic-kappa-0p1": (["T"], None),
+    "endothermic-kappa-0p9": (["T"], None),
+    "endothermic-kappa-0p99": (["T"], None),
+    "entropic-endothermic": (["T", "phi"], None),
+    "epoxy-cure-adiabatic": (["phi", "T"], None),
+    "epoxy-cure-isothermal": (["phi"], None),
+    "exothermic": (["T", "phi"], None),
+    "exothermic-kappa-0p1": (["T"], None),
+    "exothermic-kappa-1": (["T"], None),
+    "exothermic-kappa-2": (["T"], None),
+    "exponential-affinity": (["phi"], None),
+    "friction-ignited-bonding": (["phi"], "T"),
+    "friction-with-loss": (["T", "D_coulomb"], None),
+    "generalised-bonding": (["T", "phi"], None),
+    "generalised-bonding-sliding": (["T", "phi"], None),
+    "hot-plate-bonds": (["g_n", "T_1", "T_2", "T_c", "phi"], None),
+    "lubricated-sliding": (["T_1", "T_2", "T_c", "t_film_shear"], None),
+    "no-medium": (["T_1", "T_2"], None),
+    "one-sided-contact": (["T_1", "T_2", "phi"], None),
+    "pair-exchange": (["T_1", "T_2"], None),
+    "press-conductance": (["T_1", "T_2", "p", "q_1"], None),
     "press-hold-pull": (["theta_bond_s", "t_n"], None),
+    "rate-and-state-slip-law": (["t_rate_and_state_slip", "theta"], None),
+    "rate-and-state-stick-slip": (["t_t", "u_t", "theta"], None),
+    "rate-and-state-velocity-steps": (["t_rate_and_state_aging", "theta"], None),
+    "reservoir-exchange": (["T_1", "T_2"], None),
+    "shared-load-rupture": (["phi"], None),
+    "sliding-dry": (["T"], None),
+    "sliding-viscous": (["T"], None),
+    "slow-passage": (["g_n"], None),
     "snap-in": (["t_n"], "g_n"),
-    "thermal-press": (["g_n", "T_1", "T_2"], None),
     "squeeze-film": (["g_n", "T"], None),
-    "closing-film": (["T"], "g_n"),
+    "stick-slip": (["t_t", "v", "T"], None),
+    "stick-slip-debonding": (["t_t", "phi", "u_t"], None),
+    "stick-slip-rebonding": (["t_t", "phi"], None),
+    "thermal-press": (["g_n", "T_1", "T_2"], None),
+    "three-temperatures": (["T_1", "T_2", "T_c"], None),
+    "three-temperatures-no-capacity": (["T_1", "T_2", "T_c"], None),
+    "two-way-linear": (["phi"], None),
+    "unequal-sites": (["phi"], None),
+    "viscous-heating": (["T", "t_viscous"], None),
+    "weakening-friction": (["T", "D_coulomb"], None),
 }
-"""Cases of the gallery: what is plotted, and over what if not time."""
+"""What is plotted of a case, and over what if not time; of others the usual panels."""
+
+SWEPT = ("biotin-streptavidin", "catch-bond", "force-spectroscopy", "l-selectin-tether")
+"""Cases of the gallery whose sweep is plotted."""
 
 
 def gallery(name: str) -> Figure:
     """A case of the gallery."""
-    variables, against = GALLERY[name]
+    if name in SWEPT:
+        return sweep_plots.figure(surfacechem.sweep(name).dataset)
+    variables, against = GALLERY.get(name, (None, None))
     return plots.figure(surfacechem.run(name).dataset, variables, against)
 
 
+def gas_network() -> Figure:
+    """The figure of the notebook."""
+    return runpy.run_path(str(Path(__file__).parent / "notebooks" / "gas_network.py"))["figure"]
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
-    **{f"gallery-{name}.svg": partial(gallery, name) for name in GALLERY},
+    **{f"gallery-{name}.svg": partial(gallery, name) for name in case.names()},
+    "gallery-gas-network.svg": gas_network,
     "accuracy.svg": accuracy,
     "signs.svg": signs,
     "press.svg": press,

@@ -213,7 +213,7 @@ def _reference(name: str, kind: type[references.Reference]) -> str:
 
 
 def made_cases() -> str:
-    """Every shipped case: title, regime, exact solution, and its text."""
+    """Every shipped case: title, regime, exact solution, its text and its figure."""
     found = [cases.load(name) for name in cases.names()]
     rows = [
         (
@@ -227,6 +227,7 @@ def made_cases() -> str:
     parts = [table(("case", "title", "thermal regime", "exact solution"), rows)]
     for case in found:
         parts += [f"## `{case.name}` {{ #{case.name} }}", f"```yaml\n{case.text.rstrip()}\n```"]
+        parts += [f"![{case.title}](images/gallery-{case.name}.svg)"]
     return "\n\n".join(parts)
 
 

@@ -12,11 +12,13 @@ from pathlib import Path
 import pytest
 
 import surfacechem
+from surfacechem.case import names
 from surfacechem.document import parse
 from surfacechem.solvers import stepper
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.py"))
 FENCE = re.compile(
     r"(?:^<!-- part of: (?P<base>\S+) -->\n)?"
     r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<body>.*?)^```$",
@@ -115,6 +117,19 @@ def test_parts_of_cases_are_valid(page):
     for block in blocks(page):
         if block.base:
             surfacechem.load(block.base, parse(block.body).plain()).system  # noqa: B018
+
+
+def test_the_gallery_shows_every_case():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    for name in names():
+        assert f"](cases.md#{name})" in page
+        assert f"](images/gallery-{name}.svg)" in page
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_runs_from_top_to_bottom(notebook, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    run_python(Block("python", notebook.read_text(encoding="utf-8")), {"__name__": notebook.stem}, notebook)
 
 
 def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):

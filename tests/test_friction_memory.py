@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scenes import SITES, bodies
 
+import surfacechem
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
+from surfacechem.check import consistent_start, rates
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
@@ -73,6 +75,21 @@ def test_sliding_is_unstable_below_the_critical_stiffness(stiffness, slips):
     v = trajectory.result.outputs[300:, column]
     assert (trajectory.result.steps.y[:, column].max() > 10 * V) == slips
     assert bool(np.all(np.abs(v - V) < 1e-2 * V)) != slips
+
+
+@pytest.mark.parametrize("ratio", [0.9, 1.0, 1.1])
+def test_growth_rates_are_those_of_linear_stability(ratio):
+    """About steady sliding B x'' + (k - k_c) x' + k V x / L = 0, B = a p / V + c_b, k_c = [(b - a) p - c_b V] / L."""
+    p, V, c_b, L = 5e6, 1e-6, 5e6, 1e-5
+    critical = (0.005 * p - c_b * V) / L
+    k = ratio * critical
+    ramp = {"ramp": {"start": 0.6 * p / k, "rate": V}}
+    changes = {"mechanics.tangential.k": k, "initial.theta": L / V, "loading.w_t": ramp}
+    simulation = surfacechem.load("rate-and-state-stick-slip", changes)
+    start = consistent_start(simulation.model, simulation.model.values())
+    expected = np.roots([0.01 * p / V + c_b, k - critical, k * V / L])
+    np.testing.assert_allclose(sorted(rates(start), key=np.imag), sorted(expected, key=np.imag), rtol=1e-8)
+    assert np.all((rates(start).real > 1e-12) == (ratio < 1))
 
 
 def test_an_extreme_direct_effect_does_not_overflow():

@@ -74,6 +74,14 @@ def test_bonds_of_a_mechanism_have_a_spectrum():
             assert found[f"f_{which}"].item() == pytest.approx(getattr(bond, which), rel=1e-9, abs=1e-24)
 
 
+def test_biotin_breaks_near_the_forces_that_were_measured():
+    """200 pN at 1.5 nN/s and 230 pN at 110 nN/s, Sedlak et al. (2017); the off-rate is known to a power of ten."""
+    data = surfacechem.sweep("biotin-streptavidin").dataset
+    assert data.attrs["error"] < 1e-10
+    slow, fast = (data["f_mode"].sel(rate=rate, method="nearest").item() for rate in (1.5e-9, 110e-9))
+    assert (slow, fast) == (pytest.approx(200e-12, rel=0.02), pytest.approx(230e-12, rel=0.1))
+
+
 def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
     solution = bonding.sweep({K_0: [100.0, "0.3 kJ/m^2"], "initial.phi": [0.0, 0.2, 0.4]})
     data = solution.dataset
