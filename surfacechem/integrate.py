@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Filler, Function, Program, compile_function, compile_program
+from surfacechem.equilibria import Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
-from surfacechem.jumps import Jump, Jumper, Point
+from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
@@ -39,8 +40,8 @@ STATE = Spec("", "initial value")
 PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
 """Parts into which the period of a load is cut, and the number of them above which it is left to the steps."""
 
-LARGEST_SLACK = 1e-3
-"""How far bonding may stray beyond its bounds at most, however loose the tolerance."""
+STRAY, LARGEST_SLACK = 1e3, 1e-3
+"""How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
 
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
@@ -208,7 +209,7 @@ class Model:
     def _start(self, y: Array, parameters: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.jumper is not None and self.system.equilibria:
-            settled = self.jumper.settle(Point(0.0, y, np.zeros_like(y), parameters))
+            settled = self.jumper.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
@@ -220,7 +221,7 @@ class Model:
             if parameter.load is not None:
                 rows[:, j] = [parameter.at(float(start)) for start in starts]
             elif parameter.path == "run.slack":
-                rows[:, j] = min(max(values[parameter.path], 10 * run.rtol), LARGEST_SLACK)
+                rows[:, j] = min(max(values[parameter.path], STRAY * run.rtol), LARGEST_SLACK)
             else:
                 rows[:, j] = values[parameter.path]
         return rows

@@ -108,6 +108,8 @@ class Law(ABC):
     """Variables that must stay above zero for the law to hold."""
     nonnegative: ClassVar[tuple[str, ...]] = ()
     """Variables that must not fall below zero."""
+    kinks: ClassVar[tuple[str, ...]] = ()
+    """Variables at whose zeros the formula bends, so that a step has to end there."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""

@@ -162,7 +162,8 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         dv = symengine.Symbol(f"d{name}_dt")
         build.rows[name] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
     elif kind.elastic:
-        _elastic_balance(build, far, u, du, carried)
+        follows = symengine.Integer(1) if kind.rate_dependent else 1 - slides
+        _elastic_balance(build, far, u, du, carried, follows)
     elif kind.rate_dependent:
         v = symengine.Symbol("v")
         build.rows["u_t"] = du - v
@@ -176,7 +177,7 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
             return
         build.rows["u_t"] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
-        build.equilibria.append(Equilibrium("u_t", slides * driving, size))
+        build.equilibria.append(Equilibrium("u_t", slides * driving, size, active=slides))
 
 
 def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None:
@@ -189,21 +190,23 @@ def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None
     build.margins.append(Margin("sticks", limit - absolute(driving), reason))
 
 
-def _elastic_balance(build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression) -> None:
-    """The body's spring and damper in series with the elastic gap."""
+def _elastic_balance(
+    build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression, follows: Expression
+) -> None:
+    """The body's spring and damper in series with the elastic gap, which ``follows`` at once what cannot slide."""
     if far.c_b != 0 or far.c_g != 0:
         build.rows["u_t"] = (far.c_b + far.c_g) * du - far.k * (far.w - u) - far.c_b * far.w_dot - far.F + t_e
         return
     residual = far.k * (far.w - u) + far.F - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
     size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_e)
-    build.equilibria.append(Equilibrium("u_t", residual, size))
+    build.equilibria.append(Equilibrium("u_t", residual, size, along={"g_t": follows}))
 
 
 def _elastic_rows(
     build: Build, kind: Kind, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
 ) -> None:
-    g, dg = symengine.symbols("g_t dg_t_dt")
+    dg = symengine.Symbol("dg_t_dt")
     rate = build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows["g_t"] = dg - (rate - v)
@@ -212,8 +215,8 @@ def _elastic_rows(
         _stable_sliding(build, slides, driving, symengine.Symbol("v"))
         return
     residual = t_f - t_e
-    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * derivative(t_e, g) * (dg - rate)
-    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f)))
+    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
+    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
 
 
 def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
