@@ -6,6 +6,7 @@ from functools import partial
 
 import symengine
 
+from surfacechem.assembly.breaking import bonds_left
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError
@@ -53,7 +54,9 @@ def _rigid(build: Build, mount: Held) -> None:
 def starts_closed(build: Build, mount: Held) -> Expression:
     """Whether a rigid interface is closed at the start: it is where bonds hold it, or the far field does not pull."""
     far = far_field(build, mount)
-    bonds = symengine.Symbol("phi") if "phi" in build.bonding else symengine.Integer(1 if build.interface.limits else 0)
+    bonds = bonds_left(build)
+    if bonds is None:
+        bonds = symengine.Integer(1 if build.interface.limits else 0)
     return where(bonds > 0, 1, where(far.k * far.w + far.F > 0, 0, 1))
 
 

@@ -12,6 +12,7 @@ from functools import partial
 
 import symengine
 
+from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError
@@ -236,10 +237,7 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     limit = build.motion.stick_limit
     assert limit is not None
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
-    if breaking is not None and build.interface.bonds:
-        message = f"{breaking.name()} breaks bonds as sliding starts, which the species of a mechanism cannot."
-        raise InputError(message, breaking.place)
-    jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaking is not None else {}
+    jump = broken(build, breaking) if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
     held = build.constant("held_until", HELD, Spec("s", "time until which sticking is held"), 0.0, internal=True)
     for s, word in ((1, "forward"), (-1, "backward")):
