@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.jumps import DRIFT, Jump, Jumper, Point
+from surfacechem.equilibria import DRIFT, Point
+from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stretches import Part, all_counters, all_events, all_steps, changed, joined
@@ -82,7 +83,7 @@ class Hybrid:
             parameters = row.copy()
             parameters[self.jumper.mode_columns] = modes
             point = Point(float(start), y, np.zeros(len(y)), parameters)
-            ended = self._segment(self.jumper.polished(point), float(end))
+            ended = self._segment(self.jumper.equilibria.polished(point), float(end))
             if ended is None:
                 break
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
@@ -156,7 +157,7 @@ class Hybrid:
         if part.status is Status.EVENT:
             index = int(part.result.events.index[-1]) - self.first
             return index if index >= 0 else None
-        return self.jumper.lost_equilibrium(point, self.problem.rtol) if part.status in LOST else None
+        return self.jumper.equilibria.lost(point, self.problem.rtol) if part.status in LOST else None
 
     def _across_kink(self, part: Part, point: Point) -> Point | None:
         """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""

@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Filler, Function, Program, compile_function, compile_program
+from surfacechem.equilibria import Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
-from surfacechem.jumps import Jump, Jumper, Point
+from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
+from surfacechem.starting import stable_start
 from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
@@ -38,8 +40,8 @@ STATE = Spec("", "initial value")
 PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
 """Parts into which the period of a load is cut, and the number of them above which it is left to the steps."""
 
-LARGEST_SLACK = 1e-3
-"""How far bonding may stray beyond its bounds at most, however loose the tolerance."""
+STRAY, LARGEST_SLACK = 1e3, 1e-3
+"""How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
 
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
@@ -205,13 +207,13 @@ class Model:
                 parameters[:, symbols.index(mode.symbol)] = start
 
     def _start(self, y: Array, parameters: Array) -> Array:
-        """The initial state with its quasi-static gaps in equilibrium."""
-        if self.jumper is None or not self.system.equilibria:
-            return y
-        settled = self.jumper.settle(Point(0.0, y, np.zeros_like(y), parameters))
-        if settled is None:
-            raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
-        return settled.y
+        """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
+        if self.jumper is not None and self.system.equilibria:
+            settled = self.jumper.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
+            if settled is None:
+                raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
+            y = settled.y
+        return stable_start(self.system, self.program, y, parameters)
 
     def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
         rows = np.empty((len(starts), len(self.system.parameters)))
@@ -219,7 +221,7 @@ class Model:
             if parameter.load is not None:
                 rows[:, j] = [parameter.at(float(start)) for start in starts]
             elif parameter.path == "run.slack":
-                rows[:, j] = min(max(values[parameter.path], 10 * run.rtol), LARGEST_SLACK)
+                rows[:, j] = min(max(values[parameter.path], STRAY * run.rtol), LARGEST_SLACK)
             else:
                 rows[:, j] = values[parameter.path]
         return rows
@@ -291,10 +293,12 @@ class Model:
             return "stopped", f"{shrunk} near {where}"
         algebraic = [state for state in self.system.states if state.algebraic]
         if result.status is Status.NO_CONSISTENT_STATE and algebraic:
-            names = ", ".join(state.name for state in algebraic)
-            reason = f"ignition: no temperature {names} balances the heat that the interface produces"
-            if any(state.quantity.unit != "K" for state in algebraic):
-                reason = f"no {names} satisfies the balances that have no inertia or capacity"
+            names = " and ".join(state.name for state in algebraic)
+            reason = f"no {names} satisfies the balances that have no inertia or capacity"
+            if all(state.quantity.unit == "K" for state in algebraic):
+                reason = f"ignition: no temperature {names} balances the heat that the interface produces"
+            elif any(state.quantity.unit == "K" for state in algebraic):
+                reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
         return "failed", f"{REASONS[result.status]} at {where}"
 

@@ -5,7 +5,7 @@ Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (202
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
+from surfacechem.equilibria import Equilibria, Point
 from surfacechem.expressions import Expression, derivative
-from surfacechem.marching import march, zero_ahead
-from surfacechem.system import HELD, Equilibrium, System, Transition
+from surfacechem.system import HELD, System, Transition
 
 Array = NDArray[np.float64]
-
-DRIFT = 100.0
-"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 
@@ -30,27 +27,7 @@ ROUNDING = 1e-12
 DIGITS = 4 * float(np.finfo(float).eps)
 """Last digits of a number."""
 
-SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
-"""Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
-least a nanometre."""
-
 NEWTON = 60
-POLISH = 3
-DRIFTED = 1e-3
-"""Largest relative drift of a gap from its equilibrium that is corrected without a search."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A state with the parameters that hold there."""
-
-    t: float
-    y: Array
-    ydot: Array
-    parameters: Array
-
-    def inputs(self) -> Array:
-        return np.concatenate(([self.t], self.y, self.ydot, self.parameters))
 
 
 @dataclass(frozen=True)
@@ -86,6 +63,7 @@ class Jumper:
     def __init__(self, system: System) -> None:
         self.system = system
         self.states = [state.name for state in system.states]
+        self.equilibria = Equilibria(system)
         mode_symbols = {mode.symbol for mode in system.modes}
         kept = [p.symbol in mode_symbols or p.path == HELD for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
@@ -147,89 +125,6 @@ class Jumper:
     def _sink_functions(self) -> dict[str, Function]:
         return {}
 
-    @cached_property
-    def _equilibria(self) -> Function:
-        """Driving traction and size of its parts, for each quasi-static gap."""
-        items = [item for e in self.system.equilibria for item in (e.residual, e.size)]
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in items])
-
-    @cached_property
-    def _folds(self) -> list[Function | None]:
-        """Tangent and curvature of the transitions that are folds."""
-        system = self.system
-        return [
-            compile_function(system.inputs, [system.expand(f.tangent), system.expand(f.curvature)]) if f else None
-            for f in (item.fold for item in system.transitions)
-        ]
-
-    def at_fold(self, index: int, point: Point) -> tuple[Point, float] | None:
-        """The point with its gap at the fold itself, and the direction in which it runs from there.
-
-        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. None where the
-        fold is out of reach.
-        """
-        fold, function = self.system.transitions[index].fold, self._folds[index]
-        assert fold is not None
-        assert function is not None
-        column = 1 + self.states.index(fold.state)
-        base = point.inputs()
-        direction = float(np.sign(function(base)[1]))
-
-        def tangent(gaps: Sequence[float] | Array) -> Array:
-            rows = np.repeat(base[None], len(gaps), axis=0)
-            rows[:, column] = gaps
-            return np.atleast_2d(function(rows))[:, 0]
-
-        g = zero_ahead(tangent, float(base[column]), direction, 1.0)
-        if g is None:
-            return None
-        y = point.y.copy()
-        y[column - 1] = g
-        return Point(point.t, y, point.ydot, point.parameters), direction
-
-    def lost_equilibrium(self, point: Point, rtol: float) -> int | None:
-        """The fold that is so close to a point that time cannot tell them apart."""
-        for index, item in enumerate(self.system.transitions):
-            found = self.at_fold(index, point) if item.fold else None
-            if found is not None and self._is_close(index, point, found[0], DRIFT * rtol):
-                return index
-        return None
-
-    def _is_close(self, index: int, point: Point, fold: Point, tolerance: float) -> bool:
-        state = self.system.transitions[index].fold.state  # type: ignore[union-attr]
-        number = [e.state for e in self.system.equilibria].index(state)
-        size, left = (abs(float(self._equilibria(p.inputs())[2 * number + 1 - k])) for k, p in ((0, point), (1, fold)))
-        return left <= tolerance * size
-
-    def settle(self, point: Point) -> Point | None:
-        """The point with its quasi-static gaps in equilibrium, temperatures held; None where there is none."""
-        for e in self.system.equilibria:
-            found = self._next_equilibrium(point, e, "", 0.0, 0.0)
-            if found is None:
-                return None
-            point = found
-        return point
-
-    @cached_property
-    def _tangents(self) -> Function:
-        """Driving traction and its slope, for each quasi-static gap."""
-        symbols = {state.name: state.symbol for state in self.system.states}
-        residuals = [(self.system.expand(e.residual), symbols[e.state]) for e in self.system.equilibria]
-        return compile_function(self.system.inputs, [x for r, g in residuals for x in (r, derivative(r, g))])
-
-    def polished(self, point: Point) -> Point:
-        """The point without the drift that integration has left in its quasi-static gaps."""
-        if not self.system.equilibria:
-            return point
-        y = point.y.copy()
-        columns = [self.states.index(e.state) for e in self.system.equilibria]
-        for _ in range(POLISH):
-            values = self._tangents(replace(point, y=y).inputs())
-            residual, slope = values[::2], values[1::2]
-            change = np.where(slope < 0, -residual / np.where(slope < 0, slope, -1.0), 0.0)
-            y[columns] += np.where(np.abs(change) <= DRIFTED * np.abs(y[columns]), change, 0.0)
-        return replace(point, y=y)
-
     def make(self, index: int, before: Point, since: float) -> Jump:
         """Carry out a transition; ``since`` is the time since the one before [s]."""
         item = self.system.transitions[index]
@@ -242,13 +137,14 @@ class Jumper:
         energy = float(books[0])
         after: Point | None = start
         if item.settles:
-            direction = 0.0
+
+            def heat(rows: Array) -> Array:
+                return self._temperatures(rows, item.sinks, energy)[0]
+
             if item.fold is not None:
-                found = self.at_fold(index, before)
-                if found is not None:
-                    before, direction = found
-                    after = Point(start.t, before.y, start.ydot, parameters)
-            after = self._settled(after, item, energy, direction)
+                before, after = self.equilibria.let_go(index, before, parameters, heat)
+            else:
+                after = self.equilibria.settle(start, heat)
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since)
@@ -257,20 +153,6 @@ class Jumper:
             Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),
             books,
         )
-
-    def _settled(self, point: Point | None, item: Transition, energy: float, direction: float) -> Point | None:
-        """The point with all quasi-static gaps in equilibrium; each may move the others through pressure and heat."""
-        moved: Point | None = point
-        for sweep in range(SWEEPS):
-            last = moved
-            for e in self.system.equilibria:
-                own = sweep == 0 and item.fold is not None and e.state == item.fold.state
-                moved = moved and self._next_equilibrium(moved, e, item.sinks, energy, direction if own else 0.0)
-            if moved is None or last is None:
-                return None
-            if len(self.system.equilibria) < 2 or np.all(np.abs(moved.y - last.y) <= STILL * (np.abs(moved.y) + TINY)):
-                return moved
-        return None
 
     def _judged(self, jump: Jump, books: Array) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
@@ -327,26 +209,3 @@ class Jumper:
                 break
             now = function(rows)[:, 1:].reshape(len(rows), -1, 4)
         return rows, released
-
-    def _next_equilibrium(
-        self, point: Point, e: Equilibrium, kind: str, energy: float, direction: float
-    ) -> Point | None:
-        """The nearest zero of the driving traction in the direction in which it pushes."""
-        column = 1 + self.states.index(e.state)
-        number = self.system.equilibria.index(e)
-        base = point.inputs()
-
-        def driving(gaps: Sequence[float] | Array) -> Array:
-            rows = np.repeat(base[None], len(gaps), axis=0)
-            rows[:, column] = gaps
-            if kind:
-                heated, _ = self._temperatures(rows, kind, energy)
-                rows = np.where(np.isfinite(heated), heated, rows)
-            return np.asarray(np.atleast_2d(self._equilibria(rows))[:, 2 * number])
-
-        g = march(driving, float(base[column]), direction)
-        if g is None:
-            return None
-        y = point.y.copy()
-        y[column - 1] = g
-        return Point(point.t, y, point.ydot, point.parameters)

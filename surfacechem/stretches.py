@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.jumps import Point
+from surfacechem.equilibria import Point
 from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Status
 
 Array = NDArray[np.float64]

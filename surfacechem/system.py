@@ -118,13 +118,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class Fold:
-    """The loss of a quasi-static equilibrium."""
+    """The loss of the equilibrium of the quasi-static gaps."""
 
-    state: str
     tangent: Expression
     """Zero at the fold, positive before it."""
-    curvature: Expression
-    """Its sign says which way the gap runs."""
+    falls: tuple[Expression, ...]
+    """How fast the stiffness falls along each gap; it tells which way they run."""
+    stiffness: tuple[tuple[Expression, ...], ...]
+    """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,10 @@ class Equilibrium:
     """Traction that drives the gap open, less what resists [Pa]."""
     size: Expression
     """Size of the tractions that balance [Pa]."""
+    along: Mapping[str, Expression] = field(default_factory=dict)
+    """Gaps that move with it, and how far: elastic sticking follows the displacement."""
+    active: Expression = 1
+    """Zero in modes in which it is held."""
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,8 @@ class Law(ABC):
     """Variables that must stay above zero for the law to hold."""
     nonnegative: ClassVar[tuple[str, ...]] = ()
     """Variables that must not fall below zero."""
+    kinks: ClassVar[tuple[str, ...]] = ()
+    """Variables at whose zeros the formula bends, so that a step has to end there."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""
@@ -330,6 +332,7 @@ class Limit(Law):
 
     The jump conserves energy. Where it would destroy entropy the run follows ``violation``: refuse, warn or accept.
     ``release`` says what takes part: 'joint' lets the bodies relax within the jump, 'local' leaves the gap as it is.
+    Bonds of a mechanism break into what the first reaction that breaks them makes of them.
     """
 
     contract = "limit"
@@ -337,6 +340,7 @@ class Limit(Law):
 
     release: Literal["joint", "local"] = option("what takes part in the jump: joint or local", default="joint")
     violation: Literal["refuse", "warn", "accept"] = option("what to do where entropy would fall", default="warn")
+    breaks: str = option("the species of a mechanism whose bonds break; all bonds if not given", default="")
     strength: ClassVar[Callable[..., Expression]]
 
 

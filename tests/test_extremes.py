@@ -8,6 +8,7 @@ import pytest
 import scenes
 import tables
 from scenes import SITES, bodies, path, varying
+from scipy.special import lambertw
 
 from surfacechem.assembly import assemble
 from surfacechem.errors import InputError
@@ -19,7 +20,7 @@ from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, P
 from surfacechem.laws.friction import Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Hold, Ramp, Table
-from surfacechem.scene import Body, Interface, Scene, Sites
+from surfacechem.scene import Body, Interface, Mounting, Scene, Sites
 
 
 def run(scene: Scene, end: float, outputs: int = 11, **settings) -> Trajectory:
@@ -127,6 +128,35 @@ def test_ignition_is_located_where_the_load_passes_the_fold():
     assert trajectory.status == "stopped"
     assert "ignition" in trajectory.reason
     assert trajectory.result.t == pytest.approx(factor**-0.5, rel=1e-6)
+
+
+BETA, H, ETA, FILM = 0.05, 50.0, 0.1, 1e-6
+CRITICAL = H / (math.e * BETA)
+"""Heat at which a film that thins as it warms under a dead shear load has no steady temperature any more [W/m^2]."""
+
+
+def sheared_film(heat: float, guess: float = 300.0, *, ramp: bool = False) -> Scene:
+    """A film without capacity whose sliding velocity the load and its viscosity set: F^2 g / eta(T) = H (T - T_0)."""
+    F = math.sqrt(heat * ETA / FILM)
+    interface = Interface("T_c", [], [Viscous(eta=varying(ETA, Exponential(beta=BETA)))])
+    loading = {"F_t": Ramp(rate=F) if ramp else Hold(level=F), "g_n": Hold(level=FILM)}
+    heats = [path("interface", "lower", 30.0), path("interface", "upper", 20.0)]
+    return Scene(ISOTHERMAL, interface, heats, loading, T_0=300.0, initial={"T_c": guess}, tangential=Mounting())
+
+
+@pytest.mark.parametrize("guess", [300.0, 330.0, 350.0, 353.6, 400.0])
+def test_temperature_and_velocity_find_their_stable_state_from_any_guess(guess):
+    trajectory = run(sheared_film(0.5 * CRITICAL, guess), 1.0)
+    names = [state.name for state in trajectory.model.system.states]
+    exact = 300.0 - lambertw(-0.5 / math.e).real / BETA
+    assert trajectory.result.y[names.index("T_c")] == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_film_ignites_where_its_load_passes_the_fold():
+    assert "ignition" in run(sheared_film(1.0001 * CRITICAL), 1.0).reason
+    trajectory = run(sheared_film(4 * CRITICAL, ramp=True), 1.0, 21)
+    assert "ignition: no temperature T_c balances the heat" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(0.5, rel=1e-6)
 
 
 def test_a_capacity_that_vanishes_on_the_way_ends_the_run():

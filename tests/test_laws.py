@@ -17,7 +17,7 @@ EVERY = [law for contract in FAMILIES for law in laws(contract).values()]
 POINTS = dict.fromkeys(("times", "pressures", "gaps"), (0.0, 1.0, 3.0))
 VALUES = dict.fromkeys(("values", "conductances"), (1.0, 2.0, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
-OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn"}
+OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
 READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
 SAMPLES = 20
 

@@ -15,7 +15,7 @@ FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
     "contracts": ["terms", "substances", "scene"],
     "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
-    "time": ["solvers.*", "marching", "jumps", "stretches", "events", "integrate"],
+    "time": ["solvers.*", "marching", "equilibria", "jumps", "stretches", "events", "starting", "integrate"],
     "results": ["accuracy", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",

@@ -10,6 +10,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
+from surfacechem.assembly.folds import folds
 from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
@@ -48,6 +49,7 @@ STAGES = (
     friction,
     normal_motion,
     tangential_motion,
+    folds,
     heat_paths,
     mean_influx,
     equations,

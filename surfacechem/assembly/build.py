@@ -242,6 +242,9 @@ class Build:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
+        for name in law.kinks:
+            value = own[name] if name in own else self.variables.get(name, law)
+            self.margins.append(Margin(name, value, f"{name} changes its sign, where {law.name()} bends", False))
         for name, ends in law.limits.items():
             value, (low, high) = self.variables.get(name, law), ends
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))

@@ -144,7 +144,7 @@ def _is_algebraic(build: Build, node: Node) -> bool:
 def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
-    slope = derivative(build.expanded(row.subs(explicit)), node.T)
+    slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
     if slope == 0:
         raise InputError(
             f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
@@ -154,6 +154,15 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
     build.margins.append(Margin(f"stable {node.name}", slope, reason))
+
+
+def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
+    """Slope of a balance of heat with temperature as a sliding velocity that has no inertia follows it."""
+    v = symengine.Symbol("v")
+    if not (depends(heat, v) and any(state.algebraic and state.name == "v" for state in build.states)):
+        return derivative(heat, T)
+    tractions = build.expanded(build.rows["v"])
+    return derivative(heat, T) - derivative(heat, v) * derivative(tractions, T) / derivative(tractions, v)
 
 
 def _recovered_heat(build: Build, node: Node, rates: Mapping[Any, Expression]) -> None:

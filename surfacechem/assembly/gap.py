@@ -6,15 +6,13 @@ from functools import partial
 
 import symengine
 
+from surfacechem.assembly.breaking import bonds_left
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Equilibrium, Fold, State, Transition
-
-FOLD = 1e-7
-"""Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
+from surfacechem.system import Equilibrium, State
 
 
 def normal_gap(build: Build) -> None:
@@ -56,7 +54,9 @@ def _rigid(build: Build, mount: Held) -> None:
 def starts_closed(build: Build, mount: Held) -> Expression:
     """Whether a rigid interface is closed at the start: it is where bonds hold it, or the far field does not pull."""
     far = far_field(build, mount)
-    bonds = symengine.Symbol("phi") if "phi" in build.bonding else symengine.Integer(1 if build.interface.limits else 0)
+    bonds = bonds_left(build)
+    if bonds is None:
+        bonds = symengine.Integer(1 if build.interface.limits else 0)
     return where(bonds > 0, 1, where(far.k * far.w + far.F > 0, 0, 1))
 
 
@@ -106,34 +106,3 @@ def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -
     size = far.k * (absolute(far.w) + absolute(g)) + absolute(far.F) + absolute(t_n)
     build.rows["g_n"] = -build.total_derivative(residual)
     build.equilibria.append(Equilibrium("g_n", residual, size))
-    tangent = far.k + _slope(build, t_n, g)
-    stiffness = far.k + absolute(derivative(t_n, g))
-    # Under dead load there is no stiffness to compare with; the secant of the traction takes its place.
-    relative = tangent / stiffness if far.k != 0 else where(t_n * g > 0, tangent * g / t_n, 1)
-    build.transitions.append(
-        Transition(
-            "snap",
-            relative - FOLD,
-            "the quasi-static equilibrium of the gap was lost (mechanical fold)",
-            settles=True,
-            fold=Fold("g_n", relative, -derivative(derivative(t_n, g), g)),
-        )
-    )
-
-
-def _slope(build: Build, t_n: Expression, g: Expression) -> Expression:
-    """Tangent of the traction: isentropic where the interface keeps its heat, else isothermal."""
-    slope = derivative(t_n, g)
-    node = build.node_of.get("interface")
-    if node is None or node.prescribed:
-        return slope
-    coupling = derivative(t_n, node.T)
-    if coupling == 0:
-        return slope
-    capacity = node.capacity()
-    if capacity == 0:
-        raise InputError(
-            f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the interface "
-            "one, or mount the bodies with a damper or a mass."
-        )
-    return slope + node.T * coupling**2 / capacity

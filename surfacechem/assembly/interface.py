@@ -132,7 +132,7 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     if not build.variables.has("slack"):
         spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
-        number = partial(build.constant, "slack", "run.slack", spec, 1e-9, internal=True)
+        number = partial(build.constant, "slack", "run.slack", spec, 1e-6, internal=True)
         build.variables.define("slack", number, "internal", "run")
     slack = build.variables.get("slack", "the bounds")
     spec = Spec("1", f"upper bound of {name}")

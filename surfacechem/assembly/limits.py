@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import symengine
 
+from surfacechem.assembly.breaking import bonds_left, broken, follows_bonds
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, depends, where
+from surfacechem.expressions import Expression, where
 from surfacechem.system import Transition
 from surfacechem.terms import Limit
 
@@ -26,9 +27,10 @@ def bonded_mode(build: Build) -> None:
 def _starts_bonded(build: Build) -> Expression | None:
     """An open gap without bonds is not bonded."""
     closed = next((mode.start for mode in build.modes if mode.name == "closed"), None)
-    if closed is not None or "phi" not in build.bonding or "g_n" not in build.motion.gap_rates:
+    bonds = bonds_left(build)
+    if closed is not None or bonds is None or "g_n" not in build.motion.gap_rates:
         return closed
-    return where(symengine.Symbol("phi") > 0, 1, where(symengine.Symbol("g_n") > 0, 0, 1))
+    return where(bonds > 0, 1, where(symengine.Symbol("g_n") > 0, 0, 1))
 
 
 def limits(build: Build) -> None:
@@ -62,8 +64,6 @@ def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
 def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
     """State a limit; whether its strength is that of the bonds, so that it can come back with them."""
     bound = build.variables.bind(law, f"interface.limits.{law.name()}")
-    if build.interface.bonds:
-        raise InputError(f"{law.name()} breaks bonds at once, which the species of a mechanism cannot.", law.place)
     strength = build.variables.call(bound, bound.statement)
     t_n = _traction(build, law)
     bonded = build.variables.get("bonded", law)
@@ -77,13 +77,13 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
             where(holds > 0, strength - t_n, 1),
             OPEN,
             {mode: none for mode in (bonded, closed) if mode is not None},
-            {bond.symbol: none for name, bond in build.bonding.items() if name == "phi"},
+            broken(build, law, law.breaks),
             settles=True,
             sinks=law.release,
             violation=law.violation,
         )
     )
-    return depends(build.expanded(strength), symengine.Symbol("phi"))
+    return follows_bonds(build, strength)
 
 
 def _traction(build: Build, law: Limit) -> Expression:

@@ -12,6 +12,7 @@ from functools import partial
 
 import symengine
 
+from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError
@@ -162,7 +163,8 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         dv = symengine.Symbol(f"d{name}_dt")
         build.rows[name] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
     elif kind.elastic:
-        _elastic_balance(build, far, u, du, carried)
+        follows = symengine.Integer(1) if kind.rate_dependent else 1 - slides
+        _elastic_balance(build, far, u, du, carried, follows)
     elif kind.rate_dependent:
         v = symengine.Symbol("v")
         build.rows["u_t"] = du - v
@@ -176,7 +178,7 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
             return
         build.rows["u_t"] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
-        build.equilibria.append(Equilibrium("u_t", slides * driving, size))
+        build.equilibria.append(Equilibrium("u_t", slides * driving, size, active=slides))
 
 
 def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None:
@@ -189,21 +191,23 @@ def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None
     build.margins.append(Margin("sticks", limit - absolute(driving), reason))
 
 
-def _elastic_balance(build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression) -> None:
-    """The body's spring and damper in series with the elastic gap."""
+def _elastic_balance(
+    build: Build, far: FarField, u: Expression, du: Expression, t_e: Expression, follows: Expression
+) -> None:
+    """The body's spring and damper in series with the elastic gap, which ``follows`` at once what cannot slide."""
     if far.c_b != 0 or far.c_g != 0:
         build.rows["u_t"] = (far.c_b + far.c_g) * du - far.k * (far.w - u) - far.c_b * far.w_dot - far.F + t_e
         return
     residual = far.k * (far.w - u) + far.F - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
     size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_e)
-    build.equilibria.append(Equilibrium("u_t", residual, size))
+    build.equilibria.append(Equilibrium("u_t", residual, size, along={"g_t": follows}))
 
 
 def _elastic_rows(
     build: Build, kind: Kind, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
 ) -> None:
-    g, dg = symengine.symbols("g_t dg_t_dt")
+    dg = symengine.Symbol("dg_t_dt")
     rate = build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
         build.rows["g_t"] = dg - (rate - v)
@@ -212,8 +216,8 @@ def _elastic_rows(
         _stable_sliding(build, slides, driving, symengine.Symbol("v"))
         return
     residual = t_f - t_e
-    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * derivative(t_e, g) * (dg - rate)
-    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f)))
+    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
+    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
 
 
 def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
@@ -233,10 +237,7 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     limit = build.motion.stick_limit
     assert limit is not None
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
-    if breaking is not None and build.interface.bonds:
-        message = f"{breaking.name()} breaks bonds as sliding starts, which the species of a mechanism cannot."
-        raise InputError(message, breaking.place)
-    jump = {bond.symbol: NONE for name, bond in build.bonding.items() if name == "phi"} if breaking is not None else {}
+    jump = broken(build, breaking) if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
     held = build.constant("held_until", HELD, Spec("s", "time until which sticking is held"), 0.0, internal=True)
     for s, word in ((1, "forward"), (-1, "backward")):

@@ -49,6 +49,8 @@ class AdhesionLoss(RateLaw):
     (-7.5e+17, 0.0)
     """
 
+    kinks = ("mu",)
+
     b: float = parameter("J s/m^2", "viscosity of adhesion", above=0)
 
     def rate(self, mu: Expression, n_c: Expression, N_c: Expression) -> Expression:

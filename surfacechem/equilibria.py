@@ -1,0 +1,221 @@
+"""Gaps without mass or damper: the equilibrium they find together, and the folds at which they lose it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Function, compile_function
+from surfacechem.expressions import Expression, derivative
+from surfacechem.marching import march, zero_ahead
+from surfacechem.system import Equilibrium, Fold, System
+
+Array = NDArray[np.float64]
+Heat = Callable[[Array], Array]
+"""Inputs with the temperatures that a jump to them gives."""
+
+DRIFT = 100.0
+"""Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
+
+SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
+"""Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
+least a nanometre."""
+
+POLISH = 3
+DRIFTED = 1e-3
+"""Largest relative drift of a gap from its equilibrium that is corrected without a search."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A state with the parameters that hold there."""
+
+    t: float
+    y: Array
+    ydot: Array
+    parameters: Array
+
+    def inputs(self) -> Array:
+        return np.concatenate(([self.t], self.y, self.ydot, self.parameters))
+
+
+@dataclass(frozen=True)
+class Way:
+    """A direction in the space of the gaps: what moves, the gap that counts the way, and the tractions along it."""
+
+    moves: Array
+    """Change of each state, shape (states,)."""
+    column: int
+    """The state that changes by one."""
+    pulls: Array
+    """Weights of the driving tractions, shape (equilibria,)."""
+
+
+class Equilibria:
+    """The quasi-static gaps of a system, compiled when first needed."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.states = [state.name for state in system.states]
+        self.items = system.equilibria
+
+    @cached_property
+    def _balance(self) -> Function:
+        """Driving traction and size of its parts, for each gap."""
+        items = [item for e in self.items for item in (e.residual, e.size)]
+        return compile_function(self.system.inputs, [self.system.expand(item) for item in items])
+
+    @cached_property
+    def _company(self) -> Function:
+        """How far other gaps move with each."""
+        moves = [e.along.get(name, 0) for e in self.items for name in self.states]
+        return compile_function(self.system.inputs, [self.system.expand(item) for item in moves])
+
+    @cached_property
+    def _tangents(self) -> Function:
+        """Driving traction and its slope along the gap and what moves with it, for each gap."""
+        pairs = [(self.system.expand(e.residual), e) for e in self.items]
+        return compile_function(self.system.inputs, [x for r, e in pairs for x in (r, self._slope(r, e))])
+
+    def _slope(self, residual: Expression, e: Equilibrium) -> Expression:
+        symbols = {state.name: state.symbol for state in self.system.states}
+        others = (self.system.expand(w) * derivative(residual, symbols[x]) for x, w in e.along.items())
+        return derivative(residual, symbols[e.state]) + sum(others)
+
+    @cached_property
+    def _active(self) -> Function:
+        """Which gaps are not held."""
+        return compile_function(self.system.inputs, [self.system.expand(e.active) for e in self.items])
+
+    def _ways(self, point: Point) -> list[Way]:
+        """The way of each gap by itself."""
+        company = self._company(point.inputs()).reshape(len(self.items), len(self.states))
+        ways = []
+        for j, e in enumerate(self.items):
+            column = self.states.index(e.state)
+            company[j, column] = 1.0
+            ways.append(Way(company[j], column, np.eye(len(self.items))[j]))
+        return ways
+
+    def _rows(self, point: Point, way: Way, gaps: Sequence[float] | Array) -> Array:
+        rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
+        rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
+        rows[:, 1 + way.column] = gaps
+        return rows
+
+    def _moved(self, point: Point, way: Way, gap: float | None) -> Point | None:
+        if gap is None:
+            return None
+        return replace(point, y=self._rows(point, way, [gap])[0, 1 : 1 + len(point.y)])
+
+    def march(self, point: Point, way: Way, direction: float = 0.0, heat: Heat | None = None) -> Point | None:
+        """The next point along a way at which the driving traction along it ends, in the direction in which it pushes.
+
+        A ``direction`` other than zero is that in which a fold has let go.
+        """
+
+        def driving(gaps: Sequence[float] | Array) -> Array:
+            rows = self._rows(point, way, gaps)
+            if heat is not None:
+                heated = heat(rows)
+                rows = np.where(np.isfinite(heated), heated, rows)
+            return np.asarray(np.atleast_2d(self._balance(rows))[:, ::2] @ way.pulls)
+
+        return self._moved(point, way, march(driving, float(point.y[way.column]), direction))
+
+    def settle(self, point: Point, heat: Heat | None = None) -> Point | None:
+        """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat."""
+        if not self.items:
+            return point
+        moved: Point | None = point
+        for _ in range(SWEEPS):
+            last = moved
+            for way in self._ways(point):
+                moved = moved and self.march(moved, way, heat=heat)
+            if moved is None or last is None:
+                return None
+            if len(self.items) < 2 or np.all(np.abs(moved.y - last.y) <= STILL * (np.abs(moved.y) + TINY)):
+                return moved
+        return None
+
+    def polished(self, point: Point) -> Point:
+        """The point without the drift that integration has left in its gaps."""
+        if not self.items:
+            return point
+        for _ in range(POLISH):
+            values = self._tangents(point.inputs())
+            y = point.y.copy()
+            for way, residual, slope in zip(self._ways(point), values[::2], values[1::2], strict=True):
+                change = -residual / slope if slope < 0 else 0.0
+                if abs(change) <= DRIFTED * abs(point.y[way.column]):
+                    y += change * way.moves
+            point = replace(point, y=y)
+        return point
+
+    # -- folds ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _folds(self) -> list[tuple[Function, Function] | None]:
+        """Tangent of the transitions that are folds; and with it how it falls, and the stiffness."""
+        return [self._compiled_fold(item.fold) if item.fold else None for item in self.system.transitions]
+
+    def _compiled_fold(self, fold: Fold) -> tuple[Function, Function]:
+        inputs, expand = self.system.inputs, self.system.expand
+        entries = [*fold.falls, *(entry for row in fold.stiffness for entry in row)]
+        return compile_function(inputs, [expand(fold.tangent)]), compile_function(inputs, [*map(expand, entries)])
+
+    def at_fold(self, index: int, point: Point) -> tuple[Point, Way, float] | None:
+        """The point with its gaps at the fold itself, the way in which they are lost, and the direction along it.
+
+        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. None where the
+        fold is out of reach.
+        """
+        found = self._folds[index]
+        assert found is not None
+        tangent, shape = found
+        values = np.atleast_1d(shape(point.inputs()))
+        n = len(self.items)
+        way, weights = self._lost_way(point, values[n:].reshape(n, n))
+        direction = float(np.sign(values[:n] @ weights))
+
+        def ahead(gaps: Sequence[float] | Array) -> Array:
+            return np.asarray(tangent(self._rows(point, way, gaps))).reshape(-1)
+
+        at = self._moved(point, way, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
+        return None if at is None else (at, way, direction)
+
+    def _lost_way(self, point: Point, A: Array) -> tuple[Way, Array]:
+        """The way that costs no traction: the gaps by which the stiffness is singular."""
+        ways, active = self._ways(point), np.nonzero(self._active(point.inputs()))[0]
+        weights = np.zeros(len(ways))
+        weights[active] = np.linalg.svd(A[np.ix_(active, active)])[2][-1] if len(active) > 1 else 1.0
+        weights /= weights[np.abs(weights).argmax()]
+        first = ways[int(np.abs(weights).argmax())]
+        moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
+        # What follows another gap would move twice where that gap has a share of its own.
+        return Way(moves, first.column, weights), weights
+
+    def lost(self, point: Point, rtol: float) -> int | None:
+        """The fold that is so close to a point that time cannot tell them apart."""
+        for index, item in enumerate(self.system.transitions):
+            found = self.at_fold(index, point) if item.fold else None
+            if found is not None and self._is_close(point, found[0], DRIFT * rtol):
+                return index
+        return None
+
+    def _is_close(self, point: Point, fold: Point, tolerance: float) -> bool:
+        sizes, left = np.abs(self._balance(point.inputs())[1::2]), np.abs(self._balance(fold.inputs())[::2])
+        return bool(np.all(left <= tolerance * sizes))
+
+    def let_go(self, index: int, point: Point, parameters: Array, heat: Heat) -> tuple[Point, Point | None]:
+        """The point at a fold, and where the gaps come to rest from there with the parameters that hold then."""
+        found = self.at_fold(index, point)
+        if found is None:
+            return point, self.settle(replace(point, parameters=parameters), heat)
+        at, way, direction = found
+        landed = self.march(replace(at, parameters=parameters), way, direction, heat)
+        return at, self.settle(landed, heat) if landed is not None and len(self.items) > 1 else landed
