@@ -2,59 +2,30 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from typer.core import TyperGroup
 
-from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
-from surfacechem.guard import interruptible, refuse_unwritable
+from surfacechem.commands import (
+    DIFFERENT,
+    EXIT_CODES,
+    STATUS,
+    CaseName,
+    Changes,
+    Commands,
+    Quiet,
+    SolverName,
+    Tolerance,
+    chosen,
+    picture_kind,
+    solved,
+)
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.guard import refuse_unwritable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from surfacechem.integrate import Run
-    from surfacechem.simulation import Simulation
     from surfacechem.solution import Solution
-
-S = TypeVar("S")
-
-STATUS = {"finished": 0, "stopped": 3, "failed": 4}
-"""Exit code of each way in which a run ends."""
-
-BAD_INPUT, DIFFERENT, INTERRUPTED = 2, 1, 130
-
-EXIT_CODES = """\b
-Exit codes:
-  0    finished
-  1    rerun: the new values are not bit for bit those of the file
-  2    bad input; nothing was computed
-  3    the run was stopped by physics; what it reached is written, with the reason
-  4    the run failed numerically; what it reached is written
-  130  interrupted; nothing was written
-"""
-
-
-class Commands(TyperGroup):
-    """Commands whose errors are one message on stderr and an exit code."""
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run a command."""
-        try:
-            return super().invoke(ctx)
-        except SurfacechemError as error:
-            typer.echo(f"surfacechem: {error}", err=True)
-            raise typer.Exit(BAD_INPUT) from None
-        except KeyboardInterrupt:
-            typer.echo("surfacechem: interrupted; nothing was written.", err=True)
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(INTERRUPTED)  # compiled code may still be running in another thread, which would be waited for
-
 
 app = typer.Typer(
     cls=Commands,
@@ -65,14 +36,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
-Changes = Annotated[
-    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
-]
-SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
-Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
 
 
 def _version(wanted: bool) -> None:
@@ -107,36 +70,14 @@ def run(
     from surfacechem.simulation import load
 
     simulation = load(case, changes or ())
-    settings = _settings(simulation, solver, rtol)
+    settings = chosen(simulation, solver, rtol)
     target = output or Path(f"{simulation.case.name}.nc")
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(target)
-    solution = _solved(lambda: simulation.run(run=settings), quiet)
+    solution = solved(lambda: simulation.run(run=settings), quiet)
     solution.write(target)
     _conclude(solution, target, quiet)
-
-
-def _settings(simulation: Simulation, solver: str | None, rtol: float | None) -> Run:
-    """The case's settings with those of the command line."""
-    from surfacechem.solvers import names
-
-    if solver is not None and solver not in names:
-        raise InputError(f"no solver '{solver}'.{suggestion(solver, names)}", Place(path="--solver"))
-    if rtol is not None and not 0 < rtol <= 0.1:
-        raise InputError(f"{rtol:g} is outside its range: > 0 and <= 0.1.", Place(path="--rtol"))
-    given = {name: value for name, value in (("solver", solver), ("rtol", rtol)) if value is not None}
-    return replace(simulation.case.run, **given)  # type: ignore[arg-type]
-
-
-def _solved(run: Callable[[], S], quiet: bool) -> S:
-    """The solution, its dataset's columns and audit included, so that what follows only writes."""
-    from surfacechem.solvers import stepper
-
-    if not (quiet or stepper.is_compiled()):
-        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
-
-    return interruptible(run)
 
 
 def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
@@ -180,7 +121,7 @@ def sweep(
     target = output or Path(f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    solution = _solved(lambda: simulation.sweep(values, end), quiet)
+    solution = solved(lambda: simulation.sweep(values, end), quiet)
     solution.write(target)
     if not quiet:
         typer.echo(sweep_summary(solution, target))
@@ -196,7 +137,7 @@ def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rt
     from surfacechem.simulation import load
 
     simulation = load(case, changes or ())
-    settings = _settings(simulation, solver, rtol)
+    settings = chosen(simulation, solver, rtol)
     system, scene, model = simulation.system, simulation.case.scene, simulation.model
     values = model.values()
     try:
@@ -262,7 +203,7 @@ def mechanism(
 
     temperatures = span(temperature, "K", "--temperature", above=0.0)
     forces = span(force, "N", "--force")
-    kind = _format(output) if output else ""
+    kind = picture_kind(output) if output else ""
     if output:
         refuse_unwritable(output)
     from surfacechem.mechanism import load_mechanism
@@ -277,14 +218,6 @@ def mechanism(
         with replacing(output) as temporary:
             plots.save(rateplots.figure(curves, temperatures, forces), temporary, kind)
         typer.echo(f"\nwritten to {output}")
-
-
-def _format(target: Path) -> str:
-    """The kind of picture that a file name asks for."""
-    kind = target.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
-    return kind
 
 
 @app.command(epilog=EXIT_CODES)
@@ -304,7 +237,7 @@ def plot(
     """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
     is_file = source.endswith((".nc", ".nc4", ".cdf"))
     target = output or Path(f"{Path(source).stem}.png")
-    kind = _format(target)
+    kind = picture_kind(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     from surfacechem import plots, sweep_plots
@@ -328,7 +261,7 @@ def _solved_case(name: str, changes: list[str] | None) -> Solution:
     from surfacechem.simulation import load
 
     simulation = load(name, changes or ())
-    return _solved(simulation.run, quiet=False)
+    return solved(simulation.run, quiet=False)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -343,7 +276,7 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(output)
-    solution = _solved(lambda: again.run_again(record), quiet)
+    solution = solved(lambda: again.run_again(record), quiet)
     if output:
         solution.write(output)
     different = again.differences(record, solution)

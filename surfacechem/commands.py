@@ -1,0 +1,94 @@
+"""What the commands share: options, exit codes, errors that are one message, runs that can be interrupted."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+from typer.core import TyperGroup
+
+from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
+from surfacechem.guard import interruptible
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from surfacechem.integrate import Run
+    from surfacechem.simulation import Simulation
+
+S = TypeVar("S")
+
+STATUS = {"finished": 0, "stopped": 3, "failed": 4}
+"""Exit code of each way in which a run ends."""
+
+BAD_INPUT, DIFFERENT, INTERRUPTED = 2, 1, 130
+
+EXIT_CODES = """\b
+Exit codes:
+  0    finished
+  1    rerun: the new values are not bit for bit those of the file
+  2    bad input; nothing was computed
+  3    the run was stopped by physics; what it reached is written, with the reason
+  4    the run failed numerically; what it reached is written
+  130  interrupted; nothing was written
+"""
+
+
+class Commands(TyperGroup):
+    """Commands whose errors are one message on stderr and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(ctx)
+        except SurfacechemError as error:
+            typer.echo(f"surfacechem: {error}", err=True)
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt:
+            typer.echo("surfacechem: interrupted; nothing was written.", err=True)
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)  # compiled code may still be running in another thread, which would be waited for
+
+
+CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
+]
+SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
+Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
+
+
+def chosen(simulation: Simulation, solver: str | None, rtol: float | None) -> Run:
+    """The case's settings with those of the command line."""
+    from surfacechem.solvers import names
+
+    if solver is not None and solver not in names:
+        raise InputError(f"no solver '{solver}'.{suggestion(solver, names)}", Place(path="--solver"))
+    if rtol is not None and not 0 < rtol <= 0.1:
+        raise InputError(f"{rtol:g} is outside its range: > 0 and <= 0.1.", Place(path="--rtol"))
+    given = {name: value for name, value in (("solver", solver), ("rtol", rtol)) if value is not None}
+    return replace(simulation.case.run, **given)  # type: ignore[arg-type]
+
+
+def solved(run: Callable[[], S], quiet: bool) -> S:
+    """The solution, its dataset's columns and audit included, so that what follows only writes."""
+    from surfacechem.solvers import stepper
+
+    if not (quiet or stepper.is_compiled()):
+        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
+
+    return interruptible(run)
+
+
+def picture_kind(target: Path) -> str:
+    """The kind of picture that a file name asks for."""
+    kind = target.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    return kind
