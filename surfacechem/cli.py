@@ -64,6 +64,14 @@ def run(
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
+    error: Annotated[
+        str,
+        typer.Option(
+            "--error",
+            help="Where the error is from: auto (the exact solution, else a second run), estimate (a second run at a "
+            "tighter tolerance), balances (no second run).",
+        ),
+    ] = "auto",
     quiet: Quiet = False,
 ) -> None:
     """Run a case, write its dataset and print a summary."""
@@ -75,7 +83,7 @@ def run(
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(target)
-    solution = solved(lambda: simulation.run(run=settings), quiet)
+    solution = solved(lambda: simulation.run(run=settings, error=error), quiet)
     solution.write(target)
     _conclude(solution, target, quiet)
 

@@ -19,6 +19,7 @@ FLOORS = {
     "results": ["accuracy", "solution", "audit", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
+        "achieved",
         "spectrum",
         "sweeps",
         "sweep_dataset",
