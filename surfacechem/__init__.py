@@ -6,8 +6,8 @@
 'finished'
 
 ``load`` reads a case and returns a :class:`~surfacechem.simulation.Simulation`, which compiles once and runs with any
-values of its parameters; ``run`` does both, and ``sweep`` runs many at once. Theory: Sauer, Duong & Mandadapu (2021),
-doi 10.1177/10812865211032723.
+values of its parameters; ``run`` does both, ``sweep`` runs many at once, ``precision`` measures error against run time.
+Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
 """
 
 from __future__ import annotations
@@ -15,12 +15,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from surfacechem.comparing import precision
     from surfacechem.simulation import Simulation, load, run, sweep
 
-__all__ = ["Simulation", "load", "run", "sweep"]
+__all__ = ["Simulation", "load", "precision", "run", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "precision":
+        from surfacechem import comparing
+
+        return comparing.precision
     if name in __all__:
         from surfacechem import simulation
 

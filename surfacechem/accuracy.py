@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+
 TIGHTER = 1e-2
 """Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
 
@@ -24,9 +26,18 @@ def second_tolerance(rtol: float) -> float:
     return max(rtol * TIGHTER, TIGHTEST) if rtol > TIGHTEST else rtol / TIGHTER
 
 
-def relative_error(values: NDArray[np.float64], exact: NDArray[np.float64], floor: float) -> float:
-    """Largest error relative to the exact value at the same time, or to ``floor`` times its largest if that is more."""
+def relative_errors(values: Array, exact: Array, floor: float) -> Array:
+    """Errors relative to the exact value at the same time, or to ``floor`` times its largest if that is more; absolute
+    where the exact value is zero throughout.
+
+    >>> relative_errors(np.array([1.5, 2.0]), np.array([1.0, 2.0]), 1e-9).tolist()
+    [0.5, 0.0]
+    """
     largest = float(np.max(np.abs(exact), initial=0.0))
-    if largest == 0.0:
-        return float(np.max(np.abs(values), initial=0.0))
-    return float(np.max(np.abs(values - exact) / np.maximum(np.abs(exact), floor * largest), initial=0.0))
+    scale = np.maximum(np.abs(exact), floor * largest) if largest else 1.0
+    return np.asarray(np.abs(values - exact) / scale)
+
+
+def relative_error(values: Array, exact: Array, floor: float) -> float:
+    """The largest of the relative errors."""
+    return float(np.max(relative_errors(values, exact, floor), initial=0.0))

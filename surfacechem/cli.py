@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from surfacechem import cli_precision
 from surfacechem.commands import (
     DIFFERENT,
     EXIT_CODES,
@@ -25,6 +26,9 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.guard import refuse_unwritable
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from xarray import Dataset
+
     from surfacechem.solution import Solution
 
 app = typer.Typer(
@@ -36,6 +40,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+app.command(epilog=cli_precision.CODES)(cli_precision.precision)
 
 
 def _version(wanted: bool) -> None:
@@ -64,6 +70,14 @@ def run(
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
+    error: Annotated[
+        str,
+        typer.Option(
+            "--error",
+            help="Where the error is from: auto (the exact solution, else a second run), estimate (a second run at a "
+            "tighter tolerance), balances (no second run).",
+        ),
+    ] = "auto",
     quiet: Quiet = False,
 ) -> None:
     """Run a case, write its dataset and print a summary."""
@@ -75,7 +89,7 @@ def run(
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(target)
-    solution = solved(lambda: simulation.run(run=settings), quiet)
+    solution = solved(lambda: simulation.run(run=settings, error=error), quiet)
     solution.write(target)
     _conclude(solution, target, quiet)
 
@@ -240,21 +254,32 @@ def plot(
     kind = picture_kind(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    from surfacechem import plots, sweep_plots
+    from surfacechem import plots
     from surfacechem.solution import replacing
 
     refuse_unwritable(target)
     solution = None if is_file else _solved_case(source, changes)
-    chosen = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
+    names = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
     dataset = solution.dataset if solution else plots.opened(Path(source))
-    swept = "sweep" in dataset.attrs
-    figure = sweep_plots.figure(dataset, chosen) if swept else plots.figure(dataset, chosen, against)
+    figure = _figure(dataset, names, against)
     with replacing(target) as temporary:
         plots.save(figure, temporary, kind)
     typer.echo(str(target))
     if solution and STATUS[solution.status]:
         typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
         raise typer.Exit(STATUS[solution.status])
+
+
+def _figure(dataset: Dataset, variables: list[str] | None, against: str | None) -> Figure:
+    """The figure that suits a dataset: of a run, of a sweep, or of a study of precision."""
+    if dataset.attrs.get("study") == "precision":
+        from surfacechem.workprecision.figure import figure
+
+        return figure(dataset)
+    from surfacechem import plots, sweep_plots
+
+    swept = "sweep" in dataset.attrs
+    return sweep_plots.figure(dataset, variables) if swept else plots.figure(dataset, variables, against)
 
 
 def _solved_case(name: str, changes: list[str] | None) -> Solution:

@@ -42,6 +42,15 @@ def event_columns(trajectory: Trajectory) -> list[EventColumn]:
     return columns + (_jump_columns(trajectory, [row[3] for row in rows]) if jumped else [])
 
 
+def event_times(trajectory: Trajectory) -> dict[str, Any]:
+    """Times [s] of the events by name, in order; where physics stopped the run, also that of its end."""
+    table = {column.name: column.values for column in event_columns(trajectory)}
+    times, names = table.get("event_time", np.empty(0)), table.get("event_name", np.empty(0, object))
+    found = {str(name): times[names == name] for name in dict.fromkeys(names)}
+    ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
+    return found | ended
+
+
 def _jump_columns(trajectory: Trajectory, jumps: Sequence[Jump | None]) -> list[EventColumn]:
     def values(read: Any) -> Any:
         return np.array([np.nan if jump is None else read(jump) for jump in jumps])

@@ -300,4 +300,5 @@ class Hybrid:
             events=all_events(parts, n, q),
             counters=all_counters(parts),
             steps=all_steps(parts) if problem.record_steps and parts else None,
+            stepping=sum(part.result.stepping for part in parts),
         )

@@ -12,7 +12,7 @@ from surfacechem.event_table import event_summary
 if TYPE_CHECKING:
     from surfacechem.audit import Audit
     from surfacechem.check import Group
-    from surfacechem.integrate import Run
+    from surfacechem.integrate import Run, Trajectory
     from surfacechem.scene import Scene
     from surfacechem.solution import Solution
     from surfacechem.sweep_dataset import SweepSolution
@@ -61,14 +61,13 @@ def states(system: System) -> str:
 def run_summary(solution: Solution, written: Path | None) -> str:
     """What was solved, how it ended, how accurate and how fast it was, and where it is."""
     trajectory = solution.trajectory
-    system, counters = trajectory.model.system, trajectory.result.counters
-    work = f"{counters.steps} steps, {counters.rejected} rejected, {counters.residuals} residuals"
+    system = trajectory.model.system
     lines = [
         solution.title or "untitled",
         labelled("solved", f"{states(system)}; {system.regime}; {_method(trajectory.run)}"),
         labelled(solution.status, solution.reason),
         *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
-        labelled("time", f"{_time(solution)}; {work}"),
+        labelled("time", f"{_time(solution)}; {_work(trajectory)}"),
         *([labelled("events", event_summary(trajectory.jumps))] if trajectory.jumps else []),
         labelled("balances", _balances(solution.audit)),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
@@ -115,6 +114,14 @@ def _method(run: Run) -> str:
 def _time(solution: Solution) -> str:
     trajectory = solution.trajectory
     return f"run {duration(trajectory.seconds)}, compile {duration(trajectory.model.compile_seconds)}"
+
+
+def _work(trajectory: Trajectory) -> str:
+    from surfacechem.solvers import solver
+
+    counters = trajectory.result.counters
+    rejected = [f"{counters.rejected} rejected"] if solver(trajectory.run.solver).counts_rejected else []
+    return ", ".join([f"{counters.steps} steps", *rejected, f"{counters.residuals} residuals"])
 
 
 def _accuracy(solution: Solution) -> str:

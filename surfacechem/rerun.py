@@ -66,7 +66,7 @@ def run_again(record: Record) -> Solution | SweepSolution:
         max_seconds=None,
     )
     if "sweep" not in record.attributes:
-        return Simulation(case).run(departures.get("changes"), run)
+        return Simulation(case).run(departures.get("changes"), run, departures.get("error", "auto"))
     plan = recorded_plan(str(record.attribute("sweep")))
     return Simulation(replace(case, run=run)).sweep_plan(plan, departures.get("changes"))
 

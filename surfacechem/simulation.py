@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -10,15 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem import case as cases
-from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
-from surfacechem.case import Case, Reference
+from surfacechem.achieved import accuracy, check_way
+from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.integrate import Model, Run, Trajectory
-from surfacechem.solution import Accuracy, Solution
+from surfacechem.integrate import Model, Run
+from surfacechem.solution import Solution
 from surfacechem.system import System
 from surfacechem.units import parse
 
@@ -68,24 +66,33 @@ class Simulation:
         """The compiled system."""
         return Model(self.system)
 
-    def run(self, changes: Mapping[str, float | str] | None = None, run: Run | None = None) -> Solution:
-        """Run with some parameters or initial values changed, by path; nothing is compiled again."""
+    def run(
+        self, changes: Mapping[str, float | str] | None = None, run: Run | None = None, error: str = "auto"
+    ) -> Solution:
+        """Run with some parameters or initial values changed, by path; nothing is compiled again.
+
+        ``error`` says where the error of the run is from: "auto", the exact solution of the case if there is one, else
+        a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+        """
+        check_way(error)
         settings = run or self.case.run
         values = self._values(changes or {})
         try:
             trajectory = self.model.solve(settings, values)
-        except InputError as error:
-            raise self.case.located(error) from None
+        except InputError as refused:
+            raise self.case.located(refused) from None
         case = self.case
+        exact = (case.reference.name, case.reference.options) if case.reference else None
         return Solution(
             trajectory,
             title=case.title,
             source=case.source,
             case=case.text,
             mechanism=case.mechanism_text or "",
-            accuracy=self._accuracy(trajectory),
+            accuracy=accuracy(trajectory, case.scene, exact, error) if len(trajectory.result.times) else None,
             changes=values,
             case_run=case.run,
+            error_from=error,
         )
 
     def sweep(
@@ -143,41 +150,6 @@ class Simulation:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, units)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
 
-    def _accuracy(self, trajectory: Trajectory) -> Accuracy | None:
-        if len(trajectory.result.times) == 0:
-            return None
-        if self.case.reference is None:
-            return self._against_tighter(trajectory)
-        try:
-            return self._against_exact(trajectory, self.case.reference)
-        except InputError as error:
-            estimate = self._against_tighter(trajectory)
-            unused = f"the exact solution {self.case.reference.name} is not of this scene: {error.message}"
-            return replace(estimate, source=f"{estimate.source}; {unused}")
-
-    def _against_exact(self, trajectory: Trajectory, named: Reference) -> Accuracy:
-        from surfacechem.references.matching import exact_values
-
-        exact = exact_values(named.name, named.options, self.case.scene, trajectory)
-        columns, states = computed(trajectory), _states(trajectory)
-        errors = {
-            name: relative_error(columns[name], values, FLOOR if name in states else 1.0)
-            for name, values in exact.items()
-        }
-        return Accuracy(max(errors.values()), f"exact solution {named.name}", errors, exact)
-
-    def _against_tighter(self, trajectory: Trajectory) -> Accuracy:
-        """Error estimated from a second run; at the tightest tolerance that run is the looser one."""
-        rtol = trajectory.run.rtol
-        other = second_tolerance(rtol)
-        second = self.model.resolve(trajectory, other)
-        ours, theirs = _states(trajectory), _states(second)
-        if len(second.result.times) < len(trajectory.result.times) or len(trajectory.result.times) < 2:
-            return Accuracy(math.nan, f"not known: a second run at rtol {other:.0e} ended earlier: {second.reason}")
-        shared = len(trajectory.result.times)
-        errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
-        return Accuracy(max(errors.values()), f"estimate: a second run at rtol {other:.0e}", errors)
-
 
 def _listed(values: object) -> object:
     """Arrays as lists."""
@@ -187,14 +159,3 @@ def _listed(values: object) -> object:
 def _level(path: str, known: Mapping[str, str]) -> str:
     """The path of a constant history may leave out its one parameter."""
     return f"{path}.level" if f"{path}.level" in known else path
-
-
-def _states(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
-    names = [state.name for state in trajectory.model.system.states]
-    return dict(zip(names, trajectory.result.outputs.T, strict=True))
-
-
-def computed(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
-    """States and named quantities at the output times."""
-    names = [item.name for item in trajectory.model.system.outputs]
-    return _states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))

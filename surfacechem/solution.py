@@ -50,7 +50,7 @@ class Accuracy:
 
     error: float
     source: str
-    """Words: the exact solution's name, or the second run at tighter tolerance."""
+    """Words: the exact solution's name, the second run and its tolerance, or the balances."""
     variables: Mapping[str, float] = field(default_factory=dict)
     exact: Mapping[str, Any] = field(default_factory=dict)
     """Exact values at the output times, by variable, where an exact solution was named."""
@@ -105,6 +105,8 @@ class Solution:
     """Parameters and initial values that differ from the case, by path."""
     case_run: Run | None = None
     """How the case would be run; where the run was another, the dataset says so."""
+    error_from: str = "auto"
+    """Where the error was asked to be from."""
 
     def __repr__(self) -> str:
         """Title, end and error in a line."""
@@ -277,6 +279,8 @@ class Solution:
         if self.case_run is not None:
             now, usual = ({name: getattr(r, name) for name in RECORDED} for r in (run, self.case_run))
             departures |= {name: value for name, value in now.items() if value != usual[name]}
+        if self.error_from != "auto":
+            departures["error"] = self.error_from
         if self.trajectory.result.status is Status.STOPPED:
             departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
         return {"departures": json.dumps(departures)} if departures else {}

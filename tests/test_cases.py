@@ -5,6 +5,7 @@ import pytest
 import thermodynamics as laws
 
 import surfacechem
+from surfacechem.achieved import against_exact, against_tighter
 from surfacechem.case import names
 from surfacechem.simulation import Simulation
 
@@ -123,8 +124,8 @@ def test_the_error_estimate_is_true(simulations):
     simulation = load(simulations, "exothermic")
     trajectory = simulation.model.solve(simulation.case.run)
     exact, estimate = (
-        simulation._against_exact(trajectory, simulation.case.reference),
-        simulation._against_tighter(trajectory),
+        against_exact(trajectory, simulation.case.scene, simulation.case.reference.name, {}),
+        against_tighter(trajectory),
     )
     for name in estimate.variables:
         assert 0.1 < estimate.variables[name] / exact.variables[name] < 10

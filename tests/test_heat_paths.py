@@ -8,6 +8,7 @@ import scenes
 import tables
 from scenes import bodies, path
 
+from surfacechem.achieved import computed
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.errors import InputError
@@ -29,7 +30,6 @@ from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.printing import python
 from surfacechem.quantities import STEFAN_BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene
-from surfacechem.simulation import computed
 from surfacechem.solution import Solution
 
 ENDS = ("lower", "upper")

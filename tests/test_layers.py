@@ -19,6 +19,7 @@ FLOORS = {
     "results": ["accuracy", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
+        "achieved",
         "spectrum",
         "sweeps",
         "sweep_dataset",
@@ -49,8 +50,9 @@ FLOORS = {
         "rerun",
         "guard",
         "commands",
-        "cli_studies",
+        "comparing",
         "cli",
+        "cli_precision",
         "__init__",
         "__main__",
     ],

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from surfacechem import case, fits, simulation
+from surfacechem.achieved import computed
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.errors import InputError
@@ -18,7 +19,6 @@ from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Scene
-from surfacechem.simulation import computed
 
 BOUND = 1e-8
 FLUIDS = [

@@ -171,11 +171,25 @@ class _Stretch(Method):
             value = row + (t - self.t) * value
         return value * self.reactor.unit
 
+    @property
+    def factorizations(self) -> int:
+        return int(self.net.solver_stats["lin_solve_setups"])
+
+    @property
+    def own_jacobians(self) -> int:
+        return int(self.net.solver_stats["jac_evals"])
+
+    @property
+    def rejected(self) -> int:
+        stats = self.net.solver_stats
+        return int(stats["err_test_fails"] + stats["nonlinear_conv_fails"])
+
 
 class CanteraSolver(SteppingSolver):
     """BDF of variable order in Cantera's ReactorNet; algebraic variables are eliminated inside the right-hand side."""
 
     name = "cantera"
+    counts_rejected = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
         return _Stretch(view, t, y, ledger)

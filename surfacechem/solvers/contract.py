@@ -167,6 +167,8 @@ class Result:
     steps: Points | None = None
     note: str = ""
     """What a library said of its failure."""
+    stepping: float = float("nan")
+    """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
 
     @property
     def success(self) -> bool:
@@ -191,6 +193,8 @@ class Solver(ABC):
     """A method for problems; stateless, hence shared between threads."""
 
     name: str
+    counts_rejected = True
+    """Whether it is known how many steps the method has rejected."""
 
     def prepare(self) -> None:  # noqa: B027 - most methods need nothing
         """Load what the first solve needs, so that it does not count as run time."""

@@ -19,6 +19,7 @@ class Reduced:
         return np.concatenate((y[~self.mask], ledger))
 
     def rates(self, t: float, x: Array) -> Array:
+        self.view.residuals += 1
         y, ydot = self.view.complete(t, x[: self.n])
         return np.concatenate((ydot[~self.mask], self.view.ledger_rates(t, y, ydot)))
 

@@ -39,6 +39,7 @@ class View:
     guess: Array
     """Last algebraic variables found: the start of the next search."""
     residuals: int = 0
+    """Right-hand sides that the library has asked for; those for outputs and events are not counted."""
     jacobians: int = 0
 
     def inputs(self, t: float, y: Array, ydot: Array) -> Array:
@@ -50,7 +51,6 @@ class View:
         y = np.where(program.algebraic_mask, self.guess, 0.0)
         y[~program.algebraic_mask] = differential
         found = consistent(program, t, y, np.zeros_like(y), self.parameters)
-        self.residuals += 1
         if not found.valid:
             return np.full_like(y, np.nan), np.full_like(y, np.nan)
         self.guess = found.y
@@ -88,6 +88,16 @@ class Method(ABC):
         """Matrices factored so far; 0 where the library does not tell."""
         return 0
 
+    @property
+    def own_jacobians(self) -> int:
+        """Jacobians that the library has made so far by itself."""
+        return 0
+
+    @property
+    def rejected(self) -> int:
+        """Steps rejected so far, for a solver that counts them."""
+        return 0
+
 
 @dataclass
 class Progress:
@@ -108,6 +118,9 @@ class Progress:
     residuals: int = 0
     jacobians: int = 0
     factorizations: int = 0
+    rejected: int = 0
+    stepping: float = 0.0
+    """Time inside the library's own steps [s]."""
 
     def restart_sides(self, fired: set[int]) -> None:
         self.sides = np.sign(self.margins)
@@ -123,6 +136,7 @@ class Progress:
 class SteppingSolver(Solver):
     """A solver made of a library's single steps."""
 
+    counts_rejected = False
     keeps_algebraic = False
     """Whether x holds the algebraic variables too."""
 
@@ -182,6 +196,8 @@ class SteppingSolver(Solver):
                 fired = self._stretch(view, progress, method, end)
             finally:
                 progress.factorizations += method.factorizations
+                progress.jacobians += method.own_jacobians
+                progress.rejected += method.rejected
             if any(view.problem.margins[i].terminal for i in fired):
                 return Status.EVENT
             over = progress.over_budget()
@@ -193,7 +209,9 @@ class SteppingSolver(Solver):
         """Step until an event, the end of the segment or of the budget; returns the margins that fired."""
         start = progress.t
         while progress.t < end and progress.over_budget() is None:
+            before = time.perf_counter()
             reached = min(method.advance(), end)
+            progress.stepping += time.perf_counter() - before
             if not reached > progress.t:
                 raise StepError("the step size fell to zero")
             if progress.t == start:
@@ -302,9 +320,11 @@ def _result(progress: Progress, status: Status) -> Result:
         events=Events(*_rows([event[1:] for event in progress.events], problem), index=index),
         counters=Counters(
             steps=progress.count,
+            rejected=progress.rejected,
             residuals=progress.residuals,
             jacobians=progress.jacobians,
             factorizations=progress.factorizations,
         ),
         steps=Points(*_rows(progress.steps, problem)) if problem.record_steps else None,
+        stepping=progress.stepping,
     )
