@@ -14,6 +14,7 @@ Phys. Rev. Lett. 92, 108102, doi 10.1103/PhysRevLett.92.108102.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import symengine
@@ -33,6 +34,7 @@ INSTANT = 1e-100
 """Time that counts as none [s]."""
 
 SHARED = "load shared by all bonds"
+ELASTIC = "bond elasticity"
 OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from zero."
 
 
@@ -45,13 +47,13 @@ def force(build: Build) -> None:
     for name, bond in build.bonding.items():
         if depends(derivative(build.psi, bond.symbol), g_n):
             variable = "f" if name == "phi" else f"f_{name}"
-            build.variables.define(variable, partial(_elastic, build, variable, name), "derived", "bond elasticity")
+            build.variables.define(variable, partial(_elastic, build, variable, name), "derived", ELASTIC)
     if build.variables.has("t_n") and not _elastic_phi(build):
         build.variables.define("f", partial(_shared, build), "derived", SHARED)
 
 
 def _elastic_phi(build: Build) -> bool:
-    return any(role.variable == "f" and role.by == "bond elasticity" for role in build.variables.roles)
+    return any(role.variable == "f" and role.by == ELASTIC for role in build.variables.roles)
 
 
 def _elastic(build: Build, variable: str, name: str) -> Expression:
@@ -72,14 +74,25 @@ def _shared(build: Build) -> Expression:
 
 
 def rupture(build: Build) -> None:
-    """End a run where bonds that share a load break faster and faster, and time cannot resolve the rest of it."""
-    shared = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
-    if not (shared and build.variables.was_read("f")):
-        return
-    phi = build.variables.get("phi", "the force per bond")
-    gain: Expression = symengine.Integer(0)
-    for name, bond in build.bonding.items():
-        gain -= derivative(phi, bond.symbol) * build.rows[name].subs({bond.dot: 0})
-    if gain != 0:
-        left = phi + RESOLUTION * (build.t + INSTANT) * gain + NOTHING
-        build.margins.append(Margin("bonds left", left, "the bonds ruptured", remedy=OVERLOAD))
+    """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
+    carriers = list(_carriers(build))
+    for name, bonds in carriers:
+        gain: Expression = symengine.Integer(0)
+        for other, bond in build.bonding.items():
+            gain -= derivative(bonds, bond.symbol) * build.rows[other].subs({bond.dot: 0})
+        if gain != 0:
+            left = bonds + RESOLUTION * (build.t + INSTANT) * gain + NOTHING
+            # What is left of hardly any bonds cannot be told from rounding.
+            left = where(bonds > FEWEST, left, NOTHING)
+            which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
+            build.margins.append(Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD))
+
+
+def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
+    """Bonds whose load grows on the rest as they break: those that share one, or hold a gap that gives way."""
+    for role in build.variables.roles:
+        if role.by == SHARED and build.variables.was_read(role.variable):
+            yield "phi", build.variables.get("phi", "the force per bond")
+        if role.by == ELASTIC and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
+            name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
+            yield name, build.bonding[name].symbol
