@@ -186,6 +186,9 @@ def _source(law: type[SurfaceReaction]) -> str:
 def remarks(curves: Curves) -> Iterator[str]:
     """What is odd about a mechanism, though not wrong."""
     idle = set(curves.mechanism.species.values())
+    around = [name for name, item in curves.species.items() if item.interactions]
+    if around:
+        yield f"The thermo of {', '.join(around)} depends on coverages; everything above is without that."
     for law in curves.laws.values():
         idle -= set(law.change)
         yield from _odd(law)

@@ -7,7 +7,7 @@ possible bond, so that forward over reverse is the equilibrium constant of the c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import symengine
@@ -19,7 +19,7 @@ from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.terms import reads
+from surfacechem.terms import Potential, reads
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Curves:
         }
         self._amounts = {variable.name: variable.density for variable in mechanism.variables}
         self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
-        self._psi = sum(self._call(law.statement) for law in mechanism.potentials)
+        self._psi = sum(self._call(_alone(law).statement) for law in mechanism.potentials)
 
     @property
     def loaded(self) -> bool:
@@ -137,6 +137,13 @@ class Curves:
 def _symbols(law: SurfaceReaction) -> dict[str, Expression]:
     """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
     return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
+
+
+def _alone(law: Potential) -> Potential:
+    """The potential without interactions, so that standard states depend on no coverage."""
+    if not isinstance(law, IdealMixture):
+        return law
+    return law.bind({"species": tuple(replace(item, interactions=()) for item in law.species)})
 
 
 def _thermo(species: Species, temperature: float) -> Thermo:

@@ -33,9 +33,9 @@ def cantera_of(mechanism):
 def without_load(text):
     """A mechanism whose loaded rates are the Arrhenius rates that they are without load; others stay as written."""
     plain = YAML(typ="safe").load(text)
-    types = {entry["type"]: kind_of(entry["type"]) for entry in plain["reactions"] if "type" in entry}
+    types = {entry["type"]: kind_of(entry["type"]) for entry in plain.get("reactions", []) if "type" in entry}
     loaded = {name: law for name, law in types.items() if not law.native}
-    for entry in plain["reactions"]:
+    for entry in plain.get("reactions", []):
         if entry.get("type") in loaded:
             for key in loaded[entry.pop("type")].own_keys():
                 entry.pop(key, None)
@@ -102,7 +102,10 @@ def call(formula, point):
 
 
 def partial_molar(mechanism, point):
-    """Chemical potential, enthalpy, entropy [J/mol, J/(mol K)] of each species, by differentiating the potential."""
+    """Chemical potential, enthalpy, entropy and heat capacity of each species, by differentiating the potential.
+
+    [J/mol, J/mol, J/(mol K), J/(mol K)]
+    """
     symbols = {name: symengine.Symbol(name) for name in point}
     (potential,) = mechanism.potentials
     psi = call(potential.energy, symbols)
@@ -111,18 +114,9 @@ def partial_molar(mechanism, point):
     for variable in mechanism.variables:
         mu = AVOGADRO * derivative(psi, symbols[variable.name]) / symbols[f"N_{variable.name}"]
         s = -derivative(mu, T)
-        rows += [mu, mu + T * s, s]
+        rows += [mu, mu + T * s, s, T * derivative(s, T)]
     numbers = symengine.Lambdify(list(symbols.values()), rows)([point[name] for name in symbols])
-    return list(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True))
-
-
-def heat_capacity(mechanism, point):
-    """T ds/dT of the mixture [J/(m^2 K)]."""
-    symbols = {name: symengine.Symbol(name) for name in point}
-    T = symbols["T_c"]
-    psi = call(mechanism.potentials[0].energy, symbols)
-    expression = symengine.sympify(-T * derivative(derivative(psi, T), T))
-    return float(symengine.Lambdify(list(symbols.values()), [expression])([point[name] for name in symbols])[0])
+    return list(zip(*(numbers[k::4] for k in range(4)), strict=True))
 
 
 # -- random mechanisms ------------------------------------------------------------------------------------------------

@@ -31,15 +31,24 @@ REFUSED = {
     "a phase model": ("thermo: ideal-surface", "thermo: edge", "'edge' is not lowered: a contact line"),
     "coverage-dependent thermo": (
         "thermo: ideal-surface",
-        "thermo: coverage-dependent-surface",
-        "need not follow from one free energy",
+        "thermo: coverage-dependent-surface\n  reference-state-coverag: 0.1",
+        "Did you mean 'reference-state-coverage'?",
+    ),
+    "a coverage of the standard state": (
+        "  reactions: all",
+        "  reactions: all\n  reference-state-coverage: 0.1",
+        "it belongs to `thermo: coverage-dependent-surface`",
     ),
     "neighbours": (
         "  reactions: all",
         "  reactions: all\n  adjacent-phases: [gas]",
         "'adjacent-phases' cannot be used",
     ),
-    "coverage dependence of a species": ("  sites: 2", "  sites: 2\n  coverage-dependencies: {}", "activation energy"),
+    "coverage dependence of a species": (
+        "  sites: 2",
+        "  sites: 2\n  coverage-dependencies: {}",
+        "only a phase with `thermo: coverage-dependent-surface` reads this",
+    ),
     "sticking": ("  rate-constant:", "  sticking-coefficient:", "needs a gas"),
     "charge transfer": (
         "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",

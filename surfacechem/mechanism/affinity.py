@@ -40,7 +40,7 @@ class AffinityReaction(InterfaceArrhenius):
         return self.coefficient(values, 0) * self._full(values)
 
     def _reverse(self, values: Mapping[str, Expression]) -> Expression:
-        affinity = self.standard_affinity(values["T_c"], values.get("g_n"))
+        affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
         return self.coefficient(values, affinity + self._log_mixing(values)) * self._full(values)
 
     def _log_forward(self, values: Mapping[str, Expression]) -> Expression:

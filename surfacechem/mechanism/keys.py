@@ -7,6 +7,7 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
+from surfacechem.mechanism.dependence import MODEL, check_dependence
 from surfacechem.mechanism.kinds import kind_of, kinds, names
 from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source, chosen, sections, sides
@@ -43,7 +44,12 @@ PHASE = frozenset(
         "description",
     )
 )
-SPECIES = frozenset(("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"))
+SPECIES = frozenset(
+    (
+        *("name", "composition", "thermo", "sites", "bond", "units", "note", "description", "transport"),
+        "coverage-dependencies",
+    )
+)
 CONSTANT_CP = frozenset(("model", "T0", "h0", "s0", "cp0", "T-min", "T-max", "reference-pressure", "note"))
 POLYNOMIAL = frozenset(("model", "temperature-ranges", "data", "reference-pressure", "note"))
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
@@ -68,9 +74,7 @@ STATE = frozenset(("T", "P", "coverages"))
 REMEDIES = {
     "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
     "phase.",
-    "coverage-dependencies": "coverage-dependent enthalpy and entropy need not follow from one free energy; put the "
-    "dependence into the reaction's activation energy.",
-    "reference-state-coverage": "coverage-dependent thermo is not lowered; use `thermo: ideal-surface`.",
+    "reference-state-coverage": "it belongs to `thermo: coverage-dependent-surface`.",
     "sticking-coefficient": "a sticking reaction needs a gas; give a `rate-constant` instead.",
     "Motz-Wise": "this correction is for sticking reactions, which need a gas; remove it.",
     "sticking-species": "a sticking reaction needs a gas; give a `rate-constant` instead.",
@@ -93,8 +97,6 @@ LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
 
 MODELS = {
     "edge": "a contact line has rates per length; write the reactions on a surface.",
-    "coverage-dependent-surface": "coverage-dependent enthalpy and entropy need not follow from one free energy; use "
-    "`ideal-surface` and put the dependence into the reactions' activation energies.",
 }
 """Phase models that are not plain surfaces, with the way out."""
 
@@ -115,6 +117,9 @@ def check(source: Source, phase: Any, evaluate: bool = False) -> None:
         _check_species(source, entry)
         _check_composition(source, phase, entry)
     names = _names(source, phase, entries)
+    for entry in entries:
+        if entry.get("name") in names:
+            check_dependence(source, phase, entry, names)
     _check_state(source, phase, names)
     for entry in source.reactions(phase):
         if evaluate and is_foreign(entry):
@@ -136,9 +141,9 @@ def _check_file(source: Source) -> None:
 
 def _check_phase(source: Source, phase: Any) -> None:
     title = f"phase {phase.get('name')}"
-    _keys(source, phase, PHASE, title)
     model = str(phase.get("thermo"))
-    if model != "ideal-surface":
+    _keys(source, phase, PHASE | ({"reference-state-coverage"} if model == MODEL else set()), title)
+    if model not in ("ideal-surface", MODEL):
         message = f"{title}: thermo '{model}' is not lowered: {MODELS.get(model, 'use `ideal-surface`.')}"
         raise InputError(message, source.place(phase, "thermo"))
     if phase.get("kinetics", "surface") != "surface":

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.mechanism.dependence import interactions
 from surfacechem.mechanism.evaluated import EvaluatedReaction, SurfaceEngine
 from surfacechem.mechanism.fields import rate_fields, spring
 from surfacechem.mechanism.keys import check, is_foreign
 from surfacechem.mechanism.kinds import kind_of, names
-from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species
+from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
 from surfacechem.mechanism.rates import KILO, plain
 from surfacechem.mechanism.source import Source, sides
 from surfacechem.mechanism.thermo import lower
@@ -152,8 +154,27 @@ def _species(surface: Any, source: Source, phase: Any) -> tuple[Species, ...]:
         if gibbs is None:
             message = f"species {item.name}: thermo of type {type(item.thermo).__name__} is not lowered."
             raise InputError(message, source.place(entries.get(item.name)))
-        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring(source, entries[item.name])))
+        if "reference-state-coverage" in phase:
+            gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
+        entry = entries[item.name]
+        own = interactions(source, entry, names)
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring(source, entry), own))
+    _check_potential(result, entries, source)
     return tuple(result)
+
+
+def _check_potential(species: Sequence[Species], entries: Mapping[str, Any], source: Source) -> None:
+    """Coverage-dependent thermo has to derive from one free energy."""
+    found = unpaired(species)
+    if found is None:
+        return
+    name, other = found
+    message = (
+        f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would come "
+        f"out of a cycle of coverages. Between two species make both linear, without heat capacity, and give {other} "
+        f"the same dependence on {name}, per site."
+    )
+    raise InputError(message, source.place(entries[name].get("coverage-dependencies"), other))
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:

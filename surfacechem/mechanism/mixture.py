@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from surfacechem.expressions import Expression, log_fraction
+from surfacechem.mechanism.interaction import SAME, Interaction
 from surfacechem.mechanism.thermo import StandardGibbs
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import Potential, option
@@ -46,13 +47,17 @@ class Spring:
 
 @dataclass(frozen=True)
 class Species:
-    """A surface species: its name in the mechanism, its coverage's name here, its sites, thermo and elasticity."""
+    """A surface species: its name in the mechanism, its coverage's name here, its sites, thermo and elasticity.
+
+    ``interactions`` say how its thermo depends on coverages.
+    """
 
     name: str
     variable: str
     sites: float
     gibbs: StandardGibbs
     spring: Spring | None = None
+    interactions: tuple[Interaction, ...] = ()
 
     @property
     def amount(self) -> str:
@@ -76,9 +81,11 @@ class IdealMixture(Potential):
               \frac{1}{N_k} \frac{\partial \Psi}{\partial \theta_k} = g_k(T) + w_k(g_n) + k_B T \ln \theta_k
 
     :math:`w_k = \tfrac12 k_b (g_n - l_0)^2` is the elastic energy of species that are springs across the gap,
-    :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes.
-    Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; the chemical potentials, enthalpies,
-    entropies and heat capacities of Cantera's ideal-surface phase. 0 <= theta_k <= 1.
+    :math:`N_k` is the amount of species k at full coverage, the site density over the sites that k takes. Where the
+    thermo of species depends on coverages the energy of their interactions is added, see
+    :mod:`surfacechem.mechanism.interaction`. Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018),
+    ch. 11; the chemical potentials, enthalpies, entropies and heat capacities of Cantera's ideal-surface and
+    coverage-dependent-surface phases. 0 <= theta_k <= 1.
     """
 
     species: tuple[Species, ...] = option("species of the surface phase")
@@ -104,4 +111,42 @@ class IdealMixture(Potential):
             mixing = BOLTZMANN * T * (log_fraction(theta) - 1)
             elastic = species.spring.energy(values["g_n"]) if species.spring else 0
             total += values[species.amount] * theta * (species.standard(T) + elastic + mixing)
+        if any(species.interactions for species in self.species):
+            total += _interactions(self.species, values)
         return total
+
+
+def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
+    """The first species whose dependence on another belongs to no potential, and that other; None where all do."""
+    by_name = {item.name: item for item in species}
+    for item in species:
+        for interaction in item.interactions:
+            if interaction.on != item.name and not _paired(item, interaction, by_name[interaction.on]):
+                return item.name, interaction.on
+    return None
+
+
+def _paired(item: Species, interaction: Interaction, other: Species) -> bool:
+    ours = interaction.slopes
+    back = next((x for x in other.interactions if x.on == item.name), Interaction(item.name, item.variable))
+    theirs = back.slopes
+    if ours is None or theirs is None:
+        return False
+    pairs = zip((x / item.sites for x in ours), (x / other.sites for x in theirs), strict=True)
+    return all(abs(x - y) <= SAME * max(abs(x), abs(y)) for x, y in pairs)
+
+
+def _interactions(species: Sequence[Species], values: Mapping[str, Expression]) -> Expression:
+    """Free energy of all interactions [J/m^2], each pair counted once."""
+    total: Expression = 0
+    seen: set[frozenset[str]] = set()
+    for item in species:
+        for interaction in item.interactions:
+            theta, other = values[item.variable], values[interaction.variable]
+            pair = frozenset((item.name, interaction.on))
+            if interaction.on == item.name:
+                total += values[item.amount] * interaction.integral(values["T_c"], theta)
+            elif pair not in seen:
+                total += values[item.amount] * theta * interaction.gibbs(values["T_c"], other)
+            seen.add(pair)
+    return total / AVOGADRO

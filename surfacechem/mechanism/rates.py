@@ -19,6 +19,8 @@ from surfacechem.terms import RateLaw, Spec, option, parameter
 KILO = 1000.0
 """Moles in a kmol, in which Cantera counts."""
 
+NO_COVERAGES: Mapping[str, Expression] = {}
+
 COVERAGE_FLOOR = 1e-20
 """Coverages below this count as this where a rate depends on their logarithm, as in Cantera."""
 
@@ -141,11 +143,16 @@ class SurfaceReaction(MechanismReaction):
     def _formula(self, evaluate: Any) -> Formula:
         names = (name for item in self.species for name in (item.variable, item.concentration))
         gap = ("g_n",) if self.reversible and self._stretches() else ()
-        return Formula(("T_c", *gap, *names, *self.own_reads()), evaluate)
+        around = (x.variable for item in self._changing() for x in item.interactions) if self.reversible else ()
+        return Formula(("T_c", *gap, *names, *around, *self.own_reads()), evaluate)
+
+    def _changing(self) -> tuple[Species, ...]:
+        """The species that the reaction makes or uses up."""
+        return tuple(item for item in self.species if self.change.get(item.variable))
 
     def _stretches(self) -> bool:
         """Whether the reaction changes the number of elastic bonds."""
-        return any(item.spring and self.change.get(item.variable) for item in self.species)
+        return any(item.spring for item in self._changing())
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
         return self.coefficient(values, 0) * self._amounts(values, self.orders)
@@ -164,18 +171,24 @@ class SurfaceReaction(MechanismReaction):
         standard: Expression = 1
         for item in self.species:
             standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
-        affinity = self.standard_affinity(values["T_c"], values.get("g_n"))
+        affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
         return self.coefficient(values, affinity) * standard * self._amounts(values, self.products)
 
-    def standard_affinity(self, T: Expression, g_n: Expression = None) -> Expression:
-        """Standard Gibbs energy of the reaction over k_B T, with the elastic energy of its bonds at the gap g_n."""
+    def standard_affinity(
+        self, T: Expression, g_n: Expression = None, coverages: Mapping[str, Expression] = NO_COVERAGES
+    ) -> Expression:
+        """Standard Gibbs energy of the reaction over k_B T, with the elastic energy of its bonds at the gap g_n.
+
+        Interactions count where ``coverages`` are given.
+        """
         total: Expression = 0
-        for item in self.species:
-            nu = self.change.get(item.variable, 0)
-            if nu:
-                total += plain(nu) * item.gibbs(T)
-                if item.spring is not None:
-                    total += plain(nu) * item.spring.energy(g_n) / BOLTZMANN
+        for item in self._changing():
+            value = item.gibbs(T)
+            if item.spring is not None:
+                value += item.spring.energy(g_n) / BOLTZMANN
+            for interaction in item.interactions if coverages else ():
+                value += interaction.gibbs(T, coverages[interaction.variable]) / GAS_CONSTANT
+            total += plain(self.change[item.variable]) * value
         return total / T
 
     def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float]) -> Expression:

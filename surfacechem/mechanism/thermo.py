@@ -36,6 +36,8 @@ class StandardGibbs:
 
     model: str
     pieces: tuple[Piece, ...]
+    shift: float = 0.0
+    """What is added to it for each kelvin, by a standard state of another coverage than one."""
 
     def __call__(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
@@ -44,7 +46,7 @@ class StandardGibbs:
         for piece in reversed(self.pieces[:-1]):
             below = piece.top >= T if piece.closed else piece.top > T
             value = where(below, form(piece.coefficients, T), value)
-        return value
+        return value + self.shift * T if self.shift else value
 
 
 def constant_cp(c: Sequence[float], T: Expression) -> Expression:

@@ -1,0 +1,134 @@
+r"""Thermo of species that depends on coverages: Cantera's ``thermo: coverage-dependent-surface``.
+
+The enthalpy and entropy of species k change with the coverages of species j,
+
+.. math:: g_k^{ex} = \sum_j \left[ h_{kj}(\theta_j) - T s_{kj}(\theta_j)
+          + \theta_j^2 \int_{T_r}^T \left( 1 - \frac{T}{T'} \right) (a_{kj} \ln T' + b_{kj})\,dT' \right],
+          \quad T_r = 298.15\,\mathrm{K}
+
+They belong to one potential only if it does not matter in which order coverages change,
+:math:`\partial g_k / \partial n_j = \partial g_j / \partial n_k`. What depends on a species' own coverage always does;
+what depends on another's does where it is linear and the other depends on this one as much, per site.
+
+Source: Cantera's CoverageDependentSurfPhase; Maxwell's relation of a potential of several variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from surfacechem.expressions import Expression, log, where
+
+REFERENCE = 298.15
+"""Temperature [K] at which heat capacities begin to count."""
+
+SAME = 1e-9
+"""Relative difference of numbers that count as the same."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A continuous function of one coverage, zero where that is: polynomials from one knot to the next.
+
+    ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
+
+    >>> Curve.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), Curve.polynomial([2.0, 1.0]).integral(1.0)
+    (2.0, 1.3333333333333333)
+    """
+
+    pieces: tuple[tuple[float, tuple[float, ...]], ...] = ()
+
+    @classmethod
+    def polynomial(cls, coefficients: Sequence[float]) -> Curve:
+        """From the coefficients of the first power and up."""
+        return cls(((0.0, (0.0, *coefficients)),) if any(coefficients) else ())
+
+    @classmethod
+    def through(cls, coverages: Sequence[float], values: Sequence[float]) -> Curve:
+        """Straight lines through points."""
+        lines = []
+        for x, y, x_2, y_2 in zip(coverages, values, coverages[1:], values[1:], strict=False):
+            slope = (y_2 - y) / (x_2 - x)
+            lines.append((x, (y - slope * x, slope)))
+        return cls(tuple(lines) if any(values) else ())
+
+    @property
+    def slope(self) -> float | None:
+        """The slope of a straight line through zero; None for any other curve."""
+        if not self.pieces:
+            return 0.0
+        slopes = [coefficients[1] for _, coefficients in self.pieces]
+        size = SAME * max(map(abs, slopes))
+        straight = all(abs(c) <= size for _, coefficients in self.pieces for c in (coefficients[0], *coefficients[2:]))
+        return slopes[0] if straight and max(slopes) - min(slopes) <= size else None
+
+    def __call__(self, theta: Expression) -> Expression:
+        """Value at a coverage."""
+        return self._pieced(theta, [(start, _power_sum(c, theta)) for start, c in self.pieces])
+
+    def integral(self, theta: Expression) -> Expression:
+        """Integral from no coverage to theta."""
+        rows: list[tuple[float, Expression]] = []
+        past: Expression = 0.0
+        for k, (start, c) in enumerate(self.pieces):
+            whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
+            rows.append((start, past - _power_sum(whole, start) + _power_sum(whole, theta)))
+            if k + 1 < len(self.pieces):
+                past = past + _power_sum(whole, self.pieces[k + 1][0]) - _power_sum(whole, start)
+        return self._pieced(theta, rows)
+
+    @staticmethod
+    def _pieced(theta: Expression, rows: list[tuple[float, Expression]]) -> Expression:
+        value: Expression = rows[0][1] if rows else 0.0
+        for start, row in rows[1:]:
+            value = where(theta >= start, row, value)
+        return value
+
+
+def _power_sum(coefficients: Sequence[float], theta: Expression) -> Expression:
+    value: Expression = 0.0
+    for coefficient in reversed(coefficients):
+        value = value * theta + coefficient
+    return value
+
+
+@dataclass(frozen=True)
+class Interaction:
+    """How the enthalpy [J/mol] and entropy [J/(mol K)] of a species depend on one coverage."""
+
+    on: str
+    """The species."""
+    variable: str
+    """Name of its coverage."""
+    enthalpy: Curve = Curve()
+    entropy: Curve = Curve()
+    a: float = 0.0
+    b: float = 0.0
+
+    def gibbs(self, T: Expression, theta: Expression) -> Expression:
+        """Gibbs energy [J/mol]."""
+        return self.enthalpy(theta) - T * self.entropy(theta) + self._capacity(T) * theta**2
+
+    def integral(self, T: Expression, theta: Expression) -> Expression:
+        """Its integral over the coverage."""
+        return self.enthalpy.integral(theta) - T * self.entropy.integral(theta) + self._capacity(T) * theta**3 / 3
+
+    @property
+    def slopes(self) -> tuple[float, float] | None:
+        """Enthalpy and entropy per coverage where both are linear and no heat capacity goes with them."""
+        h, s = self.enthalpy.slope, self.entropy.slope
+        return None if h is None or s is None or self.a or self.b else (h, s)
+
+    def _capacity(self, T: Expression) -> Expression:
+        """Gibbs energy of the heat capacity a ln T + b, at a coverage of one."""
+        if not (self.a or self.b):
+            return 0.0
+
+        def enthalpy(t: Expression) -> Expression:
+            return t * (self.a * log(t) - self.a + self.b)
+
+        def entropy(t: Expression) -> Expression:
+            return log(t) * (self.a * log(t) + 2 * self.b) / 2
+
+        return enthalpy(T) - enthalpy(REFERENCE) - T * (entropy(T) - entropy(REFERENCE))
