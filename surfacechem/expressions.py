@@ -81,6 +81,21 @@ def exp(x: Expression) -> Expression:
     return where(x < EXPONENT_CAP, symengine.exp(x), top * (x + (1 - EXPONENT_CAP)))
 
 
+def exponents(expression: Expression) -> list[Expression]:
+    """The exponents of an expression that :func:`exp` and :func:`expm1` cap.
+
+    >>> import symengine
+    >>> exponents(2 * exp(symengine.Symbol("x")) + 1)
+    [x]
+    """
+    if not is_symbolic(expression):
+        return []
+    import symengine
+
+    conditions = {condition for piece in expression.atoms(symengine.Piecewise) for condition in piece.args[1::2]}
+    return [item.args[0] for item in conditions if len(item.args) == 2 and item.args[1] == EXPONENT_CAP]
+
+
 def expm1(x: Expression) -> Expression:
     """exp(x) - 1 without cancellation near zero, continued by its tangent above EXPONENT_CAP."""
     if not is_symbolic(x):

@@ -9,6 +9,7 @@ of this package (``type: Bell`` and so on), in every Cantera script. What a rate
 from __future__ import annotations
 
 import math
+import warnings
 import weakref
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
@@ -17,6 +18,7 @@ from typing import Any, ClassVar
 import cantera
 
 from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.fields import converted
 from surfacechem.mechanism.keys import REACTION
@@ -88,7 +90,7 @@ class LoadedRate(cantera.ExtensibleRate):
     def set_parameters(self, node: Any, units: Any) -> None:
         """Read the entry of a reaction. What is wrong with it is kept for ``validate``, where it gets its line."""
         self.kind = self.law.kind.removeprefix("interface-")
-        self.problem = ""
+        self.problem, self.capped = "", False
         self.bound: InterfaceArrhenius | None = None
         self.units = units.product()
         try:
@@ -171,7 +173,21 @@ class LoadedRate(cantera.ExtensibleRate):
         for name in self.bound.own_reads():
             if name not in values:
                 values[name] = self._load(data, name)
-        return float(self.bound.coefficient(values, 0.0))
+        found = float(self.bound.coefficient(values, 0.0))
+        self._warn_of_cap(found, data.T)
+        return found
+
+    def _warn_of_cap(self, coefficient: float, T: float) -> None:
+        """Say once that an exponent was too large to be taken literally."""
+        assert self.bound is not None
+        if not self.capped and coefficient > self.bound.A * T**self.bound.b * math.exp(EXPONENT_CAP):
+            self.capped = True
+            warnings.warn(
+                f"reaction {self.bound.equation}: an exponent of its rate of type {self.kind} is above "
+                f"{EXPONENT_CAP:g}; beyond that the rate goes on along its tangent.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     def _load(self, data: Surroundings, name: str) -> float:
         value = data.read(name, self.kind)

@@ -319,9 +319,13 @@ class Model:
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""
-        problem = result.problem
-        segment = np.searchsorted(problem.segments[1:-1], t, side="left")
-        inputs = np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
+        inputs = self.inputs(result, t, y, ydot)
         return (
             self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))
         )
+
+    def inputs(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
+        """Arguments of compiled functions along a trajectory."""
+        problem = result.problem
+        segment = np.searchsorted(problem.segments[1:-1], t, side="left")
+        return np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)

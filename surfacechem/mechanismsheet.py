@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.cycles import cycles
+from surfacechem.cycles import verdict as around
 from surfacechem.detailedbalance import said
 from surfacechem.errors import InputError, Place
 from surfacechem.listing import WIDTH, source
@@ -75,6 +77,7 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
         f"phase {mechanism.phase}, {curves.site_density:.6g} sites/m^2",
         _section(f"Species at {shown:g} K, without force", _species(curves, shown)),
         "\n".join(["Reactions", *_reactions(curves, temperatures, forces)]),
+        _section("Cycles", _cycles(curves, temperatures, forces)),
         _section("Against temperature, without force; rates per bond at coverages of one", _hot(curves, temperatures)),
         _section(f"Against the force on {curves.pulled or 'a bond'}, at {shown:g} K", _loaded(curves, shown, forces)),
         "\n".join(["Rate types", *(_source(law) for law in _types(curves))]),
@@ -132,6 +135,12 @@ def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str
     others = " and ".join(other for other in pair.labels if other != label)
     where = temperatures.words("K") + (f", {forces.words('pN', 1e12)}" if curves.loaded else "")
     return f"pair with {others}: {said(float(values.min()), float(values.max()))} ({where})"
+
+
+def _cycles(curves: Curves, temperatures: Span, forces: Span) -> Iterator[tuple[str, ...]]:
+    grid = np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
+    for cycle in cycles(curves):
+        yield " ".join(cycle.labels), around(cycle, curves, *grid)
 
 
 def _hot(curves: Curves, temperatures: Span) -> Iterator[tuple[str, ...]]:

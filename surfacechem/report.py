@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from surfacechem.scene import Scene
     from surfacechem.solution import Solution
     from surfacechem.sweep_dataset import SweepSolution
+    from surfacechem.sweeps import Sweep
     from surfacechem.system import System
 
 REGIMES = {
@@ -89,10 +90,18 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
         labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
         *([labelled("error", f"{accuracy.errors.max():.2g} ({accuracy.source})")] if accuracy else []),
         labelled("time", f"{speed}; {sweep.batch.steps.sum()} steps"),
-        labelled("balances", f"energy {sweep.energy_error.max():.1e}"),
+        labelled("balances", _sweep_balances(sweep)),
         *([labelled("written", str(written))] if written else []),
     ]
     return "\n".join(lines)
+
+
+def _sweep_balances(sweep: Sweep) -> str:
+    """The worst of all runs."""
+    errors = (("energy", sweep.energy_error), ("entropy", sweep.entropy_error), ("sites", sweep.site_error))
+    residuals = ", ".join(f"{name} {values.max():.1e}" for name, values in errors)
+    count = int(sweep.destroys_entropy.sum())
+    return f"{residuals}; " + (f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy")
 
 
 def _span(values: Sequence[float]) -> str:

@@ -22,6 +22,7 @@ from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.errors import InputError, Place
 from surfacechem.event_table import event_columns, event_findings, event_violations
+from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.solvers.contract import Status
 
@@ -141,6 +142,7 @@ class Solution:
             *unbalanced,
             *jumps,
             *self._extrapolations(),
+            *capped_rates(self.trajectory),
             *self._lost_fluxes(),
             *system.warnings,
         )

@@ -154,6 +154,9 @@ class SweepSolution:
             ("time_reached", batch.t, "s", "time that the run reached"),
             ("steps", batch.steps.astype(float), "1", "steps of the run"),
             ("energy_error", sweep.energy_error, "1", "largest energy residual relative to the energy exchanged"),
+            ("entropy_error", sweep.entropy_error, "1", "largest entropy residual relative to what was exchanged"),
+            ("site_error", sweep.site_error, "1", "largest residual of the site balances"),
+            ("destroys_entropy", sweep.destroys_entropy.astype(float), "1", "1 where a law destroys entropy, else 0"),
         ]
         if self.accuracy:
             rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))
@@ -200,6 +203,8 @@ class SweepSolution:
             "compile_seconds": float(sweep.model.compile_seconds),
             **error,
             "energy_error": float(np.max(sweep.energy_error)),
+            "entropy_error": float(np.max(sweep.entropy_error)),
+            "site_error": float(np.max(sweep.site_error)),
             "versions": versions(),
         }
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import spectrum
+from surfacechem.audit import EPSILON, SLACK
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.integrate import Model, Run, Trajectory
@@ -183,12 +184,50 @@ class Sweep:
     @cached_property
     def energy_error(self) -> Array:
         """Largest energy residual of each run relative to the energy it exchanged."""
-        total = self.named["E_total"] - self.named["E_total"][:, :1]
         supplied, turned = self._booked("energy supply"), self._booked("dissipation")
-        stored = [values - values[:, :1] for name, values in self.named.items() if name in ("U_1", "U_2", "U_c")]
-        parts = [*stored, *np.moveaxis(supplied, -1, 0), *np.moveaxis(turned, -1, 0)]
+        return self._residual("E_total", "U_", [supplied], [supplied, turned])
+
+    @cached_property
+    def entropy_error(self) -> Array:
+        """Largest entropy residual of each run relative to the entropy it exchanged or produced."""
+        booked = [self._booked("entropy supply"), self._booked("entropy production")]
+        return self._residual("S_total", "S_", booked, booked)
+
+    @cached_property
+    def site_error(self) -> Array:
+        """Largest residual of the site balances of each run."""
+        accounts = [(j, a.law) for j, a in enumerate(self.model.system.ledger) if a.kind == "bonds"]
+        worst = np.zeros(len(self))
+        for j, name in accounts:
+            change = self.named[name] - self.named[name][:, :1]
+            booked = np.where(self.reached, self.batch.ledger_outputs[:, :, j], np.nan)
+            worst = np.maximum(worst, np.nanmax(np.abs(change - booked), axis=1))
+        return worst
+
+    @cached_property
+    def destroys_entropy(self) -> NDArray[np.bool_]:
+        """Which runs have a law that destroys entropy beyond their tolerance."""
+        largest = [np.nanmax(np.abs(rate), axis=1) for rate in self._productions]
+        rounding = EPSILON * np.max(largest, axis=0, initial=0.0)
+        low = [np.nanmin(rate, axis=1) for rate in self._productions]
+        pairs = zip(low, largest, strict=True)
+        found = [least < -(SLACK * self.run.rtol * high + rounding) for least, high in pairs]
+        return np.any(found, axis=0) if found else np.zeros(len(self), dtype=bool)
+
+    @property
+    def _productions(self) -> list[Array]:
+        """Entropy production of each law, [run, output]."""
+        laws = [account.law for account in self.model.system.ledger if account.kind == "entropy production"]
+        return [self.named[f"sigma_{law}"] for law in laws if f"sigma_{law}" in self.named]
+
+    def _residual(self, total: str, prefix: str, booked: Sequence[Array], exchanged: Sequence[Array]) -> Array:
+        """What a total changed by without being booked, relative to the largest part that was exchanged."""
+        change = self.named[total] - self.named[total][:, :1]
+        names = [f"{prefix}{suffix}" for suffix in ("1", "2", "c")]
+        stored = [self.named[name] - self.named[name][:, :1] for name in names if name in self.named]
+        parts = [*stored, *(column for block in exchanged for column in np.moveaxis(block, -1, 0))]
         scale = np.max([np.nanmax(np.abs(part), axis=1) for part in parts], axis=0, initial=0.0)
-        worst = np.nanmax(np.abs(total - supplied.sum(axis=-1)), axis=1)
+        worst = np.nanmax(np.abs(change - sum(block.sum(axis=-1) for block in booked)), axis=1)
         return np.asarray(np.where(scale > 0, worst / np.where(scale > 0, scale, 1.0), worst))
 
     def _booked(self, kind: str) -> Array:

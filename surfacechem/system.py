@@ -214,6 +214,14 @@ class Role:
 
 
 @dataclass(frozen=True)
+class Capped:
+    """The exponents of a law, in words, above whose cap its exponentials go on along their tangents."""
+
+    title: str
+    exponents: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
 class System:
     """States, equations and everything that is read off them.
 
@@ -230,6 +238,7 @@ class System:
     margins: tuple[Margin, ...]
     roles: tuple[Role, ...]
     ranges: tuple[Range, ...]
+    capped: tuple[Capped, ...]
     regime: str
     breakpoints: tuple[float, ...]
     warnings: tuple[str, ...] = ()

@@ -1,5 +1,6 @@
 """Rates under load in Cantera itself: the same numbers as in a scene, honest about a load that is missing."""
 
+import contextlib
 import math
 
 import cantera as ct
@@ -232,7 +233,8 @@ def test_exponents_of_a_thousand_are_no_infinity():
     for f in (1e-8, -1e-8):
         surface.f = f
         assert f * 0.31e-9 / (BOLTZMANN * 300) > 700 or f < 0
-        assert math.isfinite(surface.forward_rate_constants[0])
+        with pytest.warns(RuntimeWarning, match="above 300") if f > 0 else contextlib.nullcontext():
+            assert math.isfinite(surface.forward_rate_constants[0])
 
 
 BELL = entry("Bell")

@@ -16,7 +16,7 @@ FLOORS = {
     "contracts": ["terms", "substances", "scene"],
     "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
     "time": ["solvers.*", "marching", "jumps", "stretches", "events", "integrate"],
-    "results": ["accuracy", "solution", "audit", "event_table", "detailedbalance"],
+    "results": ["accuracy", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
         "spectrum",
@@ -35,6 +35,7 @@ FLOORS = {
         "studyreport",
         "workprecision.*",
         "ratecurves",
+        "cycles",
         "mechanismsheet",
         "rateplots",
     ],

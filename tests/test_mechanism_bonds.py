@@ -274,6 +274,7 @@ WRONG = [
     ({"x-beta": "0.4 nm"}, "reaction bond <=> free: 'x-beta' is no key of interface-Arrhenius; it belongs to"),
     ({"type": "Bell", "x-bta": "0.4 nm"}, "unknown key 'x-bta'. Did you mean 'x-beta'?"),
     ({"type": "Bell", "x-beta": "0.4 pN"}, "reaction bond <=> free: x-beta = 0.4 pN is not a quantity in m."),
+    ({"type": "Bell", "x-beta": 0.4}, "x-beta: 0.4 is a length of 0.4 m, which no bond has; write it as `0.4 nm`."),
     ({"type": "Bell", "x-beta": [1, 2]}, "reaction bond <=> free: x-beta must be a number, not [1, 2]."),
     ({"type": "Bel", "x-beta": "0.4 nm"}, "rate type 'Bel' is not lowered. Did you mean"),
     ({"type": "Dudko-Hummer-Szabo", **DUDKO, "nu": 2}, "nu = 2 is outside its range: > 0 and <= 1."),

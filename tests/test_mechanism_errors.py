@@ -50,6 +50,11 @@ REFUSED = {
         "only a phase with `thermo: coverage-dependent-surface` reads this",
     ),
     "sticking": ("  rate-constant:", "  sticking-coefficient:", "needs a gas"),
+    "sticking by its type": (
+        "  rate-constant: {A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "  type: sticking-Blowers-Masel",
+        "needs a gas beside the surface",
+    ),
     "charge transfer": (
         "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
         "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}\n  beta: 0.5",

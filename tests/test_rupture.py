@@ -72,3 +72,15 @@ def test_bonds_that_fade_do_not_rupture(pulled):
     solution = pulled(1e10, 3e-8)
     assert solution.status == "finished"
     assert solution.dataset["theta_bond_s"].values[-1] < 1e-9
+
+
+@pytest.mark.parametrize(("force", "capped"), [("20 pN", False), ("6 nN", True), ("10 nN", True)])
+def test_a_rate_that_is_capped_is_never_used_silently(tmp_path, force, capped):
+    (tmp_path / "bonds.yaml").write_text(MECHANISM.replace(f", bond: {{stiffness: {STIFFNESS} N/m}}", ""))
+    path = tmp_path / "case.yaml"
+    text = CASE.replace("mechanics: {normal: {k: MOUNT}}\n", "").replace("w_n: HELD", f"f: {force}")
+    path.write_text(text)
+    solution = surfacechem.run(path)
+    said = [warning for warning in solution.warnings if "above 300 the rate goes on along its tangent" in warning]
+    assert bool(said) == capped
+    assert all(np.all(np.isfinite(column.values)) for column in solution.columns if column.values.dtype.kind == "f")

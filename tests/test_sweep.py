@@ -82,7 +82,10 @@ def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
     one = data.sel(K_0=300.0, initial_phi=0.2)
     for name in ("phi", "T", "q_1", "U_1", "E_total", "S_total"):
         assert one[name].values.tobytes() == single[name].values.tobytes()
-    assert one["energy_error"].item() == pytest.approx(single.attrs["energy_error"], abs=1e-13)
+    for name in ("energy_error", "entropy_error", "site_error"):
+        assert one[name].item() == pytest.approx(single.attrs[name], abs=1e-13)
+        assert data.attrs[name] == data[name].values.max() < 1e-8
+    assert not data["destroys_entropy"].any()
     assert one["time_reached"] == single.attrs["time_reached"]
 
 

@@ -79,6 +79,7 @@ def assemble(scene: Scene) -> System:
         margins=tuple(build.margins),
         roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
         ranges=tuple(build.ranges),
+        capped=tuple(build.capped),
         pairs=tuple(build.pairs),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),

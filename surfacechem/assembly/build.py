@@ -15,7 +15,7 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
+from surfacechem.system import Account, Capped, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
 from surfacechem.terms import Law, Load, Spec
 from surfacechem.variables import Parameters, Variables, unit_of
 
@@ -98,6 +98,7 @@ class Build:
         self.cycles: list[str] = []
         """Paths of the frequencies of histories that repeat themselves."""
         self.ranges: list[Range] = []
+        self.capped: list[Capped] = []
         self.modes: list[Mode] = []
         self.transitions: list[Transition] = []
         self.equilibria: list[Equilibrium] = []

@@ -12,9 +12,9 @@ from surfacechem.assembly.bounds import free_to_react
 from surfacechem.assembly.build import Bond, Build
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.softening import softening
-from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.expressions import Expression, depends, derivative, exponents
 from surfacechem.quantities import Quantity
-from surfacechem.system import Account
+from surfacechem.system import Account, Capped
 from surfacechem.terms import RateLaw
 
 
@@ -83,6 +83,8 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     build.law_ranges(law)
+    if found := exponents(rate):
+        build.capped.append(Capped(law.title, tuple(found)))
     return rate
 
 

@@ -44,6 +44,10 @@ def spring(source: Source, entry: Any) -> Spring | None:
     return Spring(numbers["stiffness"], numbers.get("rest-length", 0.0))
 
 
+LONGEST = 1e-5
+"""Lengths [m] above this are not those of molecules, not even of tethers."""
+
+
 def _number(source: Source, entry: Any, node: Any, key: str, spec: Spec, title: str) -> float:
     """A number in SI units; what has no unit has that of the file."""
     import cantera
@@ -58,7 +62,8 @@ def _number(source: Source, entry: Any, node: Any, key: str, spec: Spec, title: 
         number = converted(units, value if isinstance(value, str) else float(value), spec.unit)
         spec.check(key, number)
     except InputError as error:
-        raise InputError(f"{title}: {error.message}", place) from None
+        named = error.message if error.message.startswith(key) else f"{key}: {error.message}"
+        raise InputError(f"{title}: {named}", place) from None
     except (cantera.CanteraError, ValueError):
         raise InputError(f"{title}: {key} = {value} is not a quantity in {spec.unit}.", place) from None
     return number
@@ -77,7 +82,10 @@ def converted(units: Any, value: str | float, unit: str) -> float:
             return float(units.convert_to(value, "J")) if isinstance(value, str) else _per_molecule(units, value)
         except cantera.CanteraError:
             return _per_molecule(units, value)
-    return float(units.convert_to(value, unit))
+    number = float(units.convert_to(value, unit))
+    if unit == "m" and abs(number) > LONGEST:
+        raise InputError(f"{value} is a length of {number:g} m, which no bond has; write it as `0.4 nm`.")
+    return number
 
 
 def _per_molecule(units: Any, value: str | float) -> float:

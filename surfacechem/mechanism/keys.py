@@ -101,6 +101,13 @@ MODELS = {
 """Phase models that are not plain surfaces, with the way out."""
 
 
+NEIGHBOURS = {
+    "sticking": "a sticking reaction needs a gas beside the surface; give a `rate-constant` instead, the impingement "
+    "rate of a gas at constant pressure included.",
+    "electrochemical": "charge transfer needs an electric potential; give a plain `rate-constant` instead.",
+}
+"""Rate types, by how they begin, of surfaces with neighbours, which a case does not have, with the way out."""
+
 PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
 """Rate types of gases."""
 
@@ -232,7 +239,12 @@ def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) ->
 def is_foreign(entry: Any) -> bool:
     """Whether a reaction is of a type that is not known here, but may be one of Cantera's or of another extension."""
     kind = str(entry.get("type", "Arrhenius"))
-    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE
+    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE and not _neighbour(kind)
+
+
+def _neighbour(kind: str) -> str:
+    """Why a rate type needs a neighbour, and the way out; empty where it needs none."""
+    return next((text for start, text in NEIGHBOURS.items() if kind.startswith(start)), "")
 
 
 def _own(law: type[SurfaceReaction]) -> set[str]:
@@ -246,6 +258,8 @@ def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
     if kind in PRESSURE:
         message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
         raise InputError(message, source.place(entry, "type"))
+    if _neighbour(kind):
+        raise InputError(f"{title}: rate type '{kind}': {_neighbour(kind)}", source.place(entry, "type"))
     law = kind_of(kind)
     if law is None:
         message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())} {LEAVE}"

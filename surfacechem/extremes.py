@@ -1,0 +1,40 @@
+"""Rates so fast that no run resolves them: exponentials whose exponents were capped are never used silently."""
+
+from __future__ import annotations
+
+import numpy as np
+import symengine
+from numpy.typing import NDArray
+
+from surfacechem.expressions import EXPONENT_CAP
+from surfacechem.integrate import Trajectory
+
+
+def capped_rates(trajectory: Trajectory) -> list[str]:
+    """Laws that have met an exponent above EXPONENT_CAP at an output or a step of a run, in words."""
+    system = trajectory.model.system
+    if not system.capped:
+        return []
+    table = _inputs(trajectory)
+    found = []
+    for law in system.capped:
+        # Interpreted, since they are needed once.
+        exponents = [system.expand(expression) for expression in law.exponents]
+        values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(table)
+        largest = float(np.nanmax(values, initial=-np.inf))
+        if largest > EXPONENT_CAP:
+            found.append(
+                f"{law.title}: an exponent of its rate reached {largest:.4g}; above {EXPONENT_CAP:g} the rate goes on "
+                "along its tangent, so that it is instantaneous, but not the one stated, and its balances are not "
+                "resolved"
+            )
+    return found
+
+
+def _inputs(trajectory: Trajectory) -> NDArray[np.float64]:
+    """Arguments of compiled functions at the outputs and steps."""
+    result, model = trajectory.result, trajectory.model
+    rows = [model.inputs(result, result.times, result.outputs, trajectory.rates)]
+    if result.steps is not None:
+        rows.append(model.inputs(result, result.steps.t, result.steps.y, result.steps.ydot))
+    return np.concatenate(rows)
