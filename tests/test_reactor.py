@@ -97,6 +97,34 @@ def test_an_ordinary_net_refuses_to_step_over_a_breakpoint(pulse):
         net.advance(2)
 
 
+RAMP = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface: {sites: 1e14 1/m^2, temperature: 300 K, bonding: [bell: {k_off: 0.1 1/s, x_off: 0.4 nm}]}
+loading: {f: {ramp: {rate: 5 pN/s}}}
+initial: {phi: 1}
+run: {until: 4 s}
+"""
+
+
+def test_an_ordinary_net_tells_no_time(tmp_path):
+    """What follows a history is not given for another moment than the one that is asked for."""
+    path = tmp_path / "ramp.yaml"
+    path.write_text(RAMP)
+    interface = InterfaceReactor(path)
+    net = ct.ReactorNet([interface])
+    assert interface["f"] == 0.0
+    net.advance(2)
+    assert interface["phi"] < 1
+    with pytest.raises(InputError, match=r"at what time f is wanted.*interface\.record\(net\.time\)"):
+        interface["f"]
+    interface.record(net.time)
+    assert interface["f"] == pytest.approx(10e-12, rel=1e-12)
+    steady = InterfaceReactor("exothermic")
+    net = ct.ReactorNet([steady])
+    net.advance(0.1)
+    assert steady["R_linear_affinity"] > 0
+
+
 def test_the_end_of_a_scene_is_found_and_said():
     solution = surfacechem.run("cooling-to-zero")
     interface, net = network("cooling-to-zero")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from surfacechem.assembly import assemble
 from surfacechem.case import Case
 from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import depends
 from surfacechem.integrate import Model, Run
 from surfacechem.reactor import coupling
 from surfacechem.solvers.contract import Array
@@ -79,6 +81,13 @@ class EmbeddedScene:
         """Initial values of the variables."""
         ledger = np.zeros(self.problem.program.n_ledger)
         return np.concatenate((self.problem.y0[self.evaluation.free], ledger))
+
+    @cached_property
+    def varies(self) -> bool:
+        """Whether anything follows a history in time."""
+        system = self.model.system
+        named = (item.expression for item in system.named)
+        return any(depends(expression, system.t) for expression in (*named, *system.rows.values()))
 
     @property
     def accounts(self) -> tuple[str, ...]:

@@ -77,6 +77,8 @@ class InterfaceReactor(HeldReactor):
         self.passes_breakpoints = False
         """Whether the network looks after breakpoints."""
         self.t = 0.0
+        self._dated = True
+        """Whether that is the time of the variables last put."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
@@ -123,7 +125,7 @@ class InterfaceReactor(HeldReactor):
         return np.asarray(self.x / self.unit)
 
     def put(self, x: Array) -> None:
-        self.x, self._current = x * self.unit, False
+        self.x, self._current, self._dated = x * self.unit, False, False
         for port in self.ports.values():
             port.warm(float(self.x[self.scene.states.index(port.node)]))
 
@@ -170,7 +172,7 @@ class InterfaceReactor(HeldReactor):
 
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on, at a relative tolerance."""
-        self.t, self._current = t, False
+        self.t, self._current, self._dated = t, False, True
         self.scene.begin_piece(t, rtol)
 
     def end(self) -> None:
@@ -182,7 +184,15 @@ class InterfaceReactor(HeldReactor):
     # -- results ------------------------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> float:
-        """Present value, in SI units, of a state or of a named quantity of the scene."""
+        """Present value, in SI units, of a state or of a named quantity of the scene.
+
+        InputError in an ordinary ReactorNet, which tells no time, where the scene has a history and was not recorded.
+        """
+        if self.scene.varies and not self._dated and name not in self.scene.states:
+            raise InputError(
+                f"an ordinary ReactorNet does not say at what time {name} is wanted, and histories of the scene vary. "
+                "Call `interface.record(net.time)` first, or use surfacechem.reactor.ReactorNet."
+            )
         self._listen()
         return self.scene.quantity(name, self.t, self.x)
 
@@ -193,7 +203,7 @@ class InterfaceReactor(HeldReactor):
 
     def record(self, t: float) -> None:
         """Keep the present state, at time t [s], for the dataset."""
-        self.t = t
+        self.t, self._dated = t, True
         self._listen()
         self.history.append(t, self.x)
 
