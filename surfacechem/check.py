@@ -97,6 +97,10 @@ def groups(model: Model, scene: Scene, values: Mapping[str, float], end: float) 
         *_affinity(scene, start, model.system),
         *_heat(model.system, scene, start, end),
         *_time_scales(start, end),
+        *(
+            Group("t / t_own", end / t, "1", f"length of the run in units of the {p.text}")
+            for p, t in model.paces(values)
+        ),
     ]
 
 

@@ -37,8 +37,10 @@ ATOM = 1e-20
 AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
 
+HOLDABLE = ("stop", "touch", "release")
 HOLD, LONGEST_HOLD = 1e-9, 1e-4
-"""Parts of a run for which chatter of friction is resolved to sticking: the first time, then longer, and at most."""
+"""Transitions whose chatter is resolved, and the parts of a run for which it is: the first time, then longer, and at
+most."""
 
 
 @dataclass
@@ -194,12 +196,14 @@ class Hybrid:
         return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t * (1 - REACHED)
 
     def _hold(self, point: Point) -> bool:
-        """Let friction that sticks and slides without end stick for a while; whether that could be done."""
+        """Let what begins and ends without end stay as it is for a while, and friction stick; whether that could be."""
         columns = {p.path: j for j, p in enumerate(self.system.parameters)}
         if HELD not in columns or len(self.jumps) - self.calm > 2 * AT_ONCE or self.hold > LONGEST_HOLD:
             return False
-        if self.jumps[-1].transition.name == "stop":
-            point.parameters[columns["mode.slip"]] = 0.0
+        name = self.jumps[-1].transition.name
+        if name in HOLDABLE:
+            if name == "stop":
+                point.parameters[columns["mode.slip"]] = 0.0
             point.parameters[columns[HELD]] = point.t + self.hold * self.problem.segments[-1]
             self.hold, self.calm = 10 * self.hold, len(self.jumps)
         return True

@@ -22,7 +22,7 @@ from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.starting import stable_start
-from surfacechem.system import System
+from surfacechem.system import Pace, System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
@@ -42,6 +42,9 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
 
 STRAY, LARGEST_SLACK = 1e3, 1e-3
 """How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
+
+FEW, SHARP = 100.0, 1e-12
+"""Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
@@ -300,7 +303,22 @@ class Model:
             elif any(state.quantity.unit == "K" for state in algebraic):
                 reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
-        return "failed", f"{REASONS[result.status]} at {where}"
+        return "failed", f"{REASONS[result.status]} at {where}{self._too_fast(result, values)}"
+
+    def paces(self, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
+        """Times in which the gaps move by themselves [s], the shortest first."""
+        point = {parameter.symbol: values[parameter.path] for parameter in self.system.parameters}
+        found = [(pace, float(self.system.expand(pace.time).subs(point))) for pace in self.system.paces]
+        return sorted(found, key=lambda item: item[1])
+
+    def _too_fast(self, result: Result, values: Mapping[str, float]) -> str:
+        """What is too short to be followed, and what to do, where that is why a run could not go on."""
+        end = float(result.problem.segments[-1])
+        shortest = {Status.MAX_STEPS: FEW * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
+        for pace, time_ in self.paces(values):
+            if time_ < shortest.get(result.status, 0.0):
+                return f": the {pace.text}, {time_:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
+        return ""
 
     def _closest_margin(self, result: Result) -> str | None:
         """Reason of the margin that is closed, or has all but closed, where a run could not go on."""

@@ -16,7 +16,7 @@ from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
 
 HELD = "run.held_until"
-"""Path of the time until which sticking is held where sliding would begin and stop without end."""
+"""Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
@@ -202,6 +202,15 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class Pace:
+    """A time in which something moves by itself, and what to do where it is too short for a run."""
+
+    text: str
+    time: Expression
+    remedy: str
+
+
+@dataclass(frozen=True)
 class Outside:
     """An engine with the expressions of what it reads."""
 
@@ -257,6 +266,7 @@ class System:
     given: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps [J/m^2], by the account of their work."""
     pairs: tuple[Pair, ...] = ()
+    paces: tuple[Pace, ...] = ()
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None

@@ -83,6 +83,7 @@ def assemble(scene: Scene) -> System:
         ranges=tuple(build.ranges),
         capped=tuple(build.capped),
         pairs=tuple(build.pairs),
+        paces=tuple(build.paces),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
         cycles=tuple(build.cycles) if build.transitions else (),

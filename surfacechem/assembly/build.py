@@ -15,7 +15,20 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
 from surfacechem.scene import Scene
-from surfacechem.system import Account, Capped, Equilibrium, Margin, Mode, Named, Pair, Range, State, Transition
+from surfacechem.system import (
+    HELD,
+    Account,
+    Capped,
+    Equilibrium,
+    Margin,
+    Mode,
+    Named,
+    Pace,
+    Pair,
+    Range,
+    State,
+    Transition,
+)
 from surfacechem.terms import Law, Load, Spec
 from surfacechem.variables import Parameters, Variables, unit_of
 
@@ -104,6 +117,7 @@ class Build:
         self.equilibria: list[Equilibrium] = []
         self.motion = Motion()
         self.pairs: list[Pair] = []
+        self.paces: list[Pace] = []
         self.conductances: dict[tuple[str, str], list[Expression]] = {}
         """Conductances in parallel between two ends [W/(m^2 K)]."""
         self.warnings: list[str] = []
@@ -183,6 +197,13 @@ class Build:
         symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
         self.modes.append(Mode(name, symbol, initial, words, start))
         return symbol
+
+    @property
+    def held_until(self) -> Expression:
+        """Time until which what begins and stops without end is held as it is; made once."""
+        spec = Spec("s", "time until which a mode is held")
+        known = next((p.symbol for p in self.parameters.items if p.path == HELD), None)
+        return known if known is not None else self.constant("held_until", HELD, spec, 0.0, internal=True)
 
     def total_derivative(self, expression: Expression) -> Expression:
         """Time derivative of an expression of the states and of prescribed variables."""

@@ -171,7 +171,7 @@ def _sides_of_touch(build: Build) -> None:
     build.psi = psi
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
-        margin = where(value * side > 0, value * g, 1)
+        margin = where(value * side > 0, where(build.t < build.held_until, 1, value * g), 1)
         build.transitions.append(Transition(name, margin, reason, {side: symengine.Integer(-value)}, settles=True))
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, sqrt
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
-from surfacechem.system import Account
+from surfacechem.system import Account, Pace
 from surfacechem.terms import Law, Varying, reads
 
 LENGTH = 1e-6
@@ -83,9 +84,22 @@ class FarField:
         """Traction with which the far field pulls the gap open [Pa]."""
         return self.k * (self.w - g) + self.c_b * (self.w_dot - rate) + self.F
 
+    def paces(self, text: str) -> list[Pace]:
+        """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""
+        if self.k == 0:
+            return []
+        if self.m != 0:
+            remedy = "leave out the mass, so that it follows at once, or end the run sooner"
+            return [Pace(f"period of the {text}", 2 * math.pi * sqrt(self.m / self.k), remedy)]
+        if self.c_b + self.c_g != 0:
+            remedy = "leave out the damper, so that it snaps where it loses its equilibrium"
+            return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
+        return []
+
     def book(self, build: Build, g: Expression, rate: Expression) -> None:
         """Energies of the bodies, work of the far field, heat of the dampers."""
         text = AXES[self.axis]
+        build.paces += self.paces(text)
         spring, kinetic = self.k * (self.w - g) ** 2 / 2, self.m * rate**2 / 2
         for name, energy, what in (
             ("spring", spring, "elastic energy of the bodies"),

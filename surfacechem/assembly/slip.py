@@ -18,8 +18,8 @@ from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, hel
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import HELD, Equilibrium, Margin, State, Transition
-from surfacechem.terms import Friction, Spec, reads
+from surfacechem.system import Equilibrium, Margin, State, Transition
+from surfacechem.terms import Friction, reads
 
 NONE = symengine.Integer(0)
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
@@ -239,9 +239,8 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = broken(build, breaking) if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
-    held = build.constant("held_until", HELD, Spec("s", "time until which sticking is held"), 0.0, internal=True)
     for s, word in ((1, "forward"), (-1, "backward")):
-        margin = where(slip**2 > 0, 1, where(build.t < held, 1, limit - s * needed))
+        margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, limit - s * needed))
         reason = f"sticking gives way and the interface slides {word}"
         build.transitions.append(
             Transition(
