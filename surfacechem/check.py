@@ -51,8 +51,7 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     y, ydot = np.array([values[f"initial.{state.name}"] for state in system.states]), np.zeros(n)
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
-        jacobian = model.program.jacobian(inputs)
-        K, M = jacobian[: n * n].reshape(n, n), jacobian[n * n :].reshape(n, n)
+        K, M = model.program.derivatives(inputs)
         change = _newton_step(np.where(algebraic, K, M), model.program.residual(inputs))
         if change is None:
             return None

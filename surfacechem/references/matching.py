@@ -98,11 +98,11 @@ def _check(solution: Solution, run: Trajectory) -> None:
         return  # the run ended at its start
     probes, since = _probes(run)
     y, ydot = _along(solution, run, probes, since)
-    problem, program, n = run.result.problem, run.model.program, len(run.model.system.states)
+    problem, program = run.result.problem, run.model.program
     segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
     inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
     misses = program.residual(inputs)
-    terms = program.jacobian(inputs)[:, n * n :].reshape(-1, n, n) * ydot[:, None, :]
+    terms = program.derivatives(inputs)[1] * ydot[:, None, :]
     sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
     # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)
