@@ -76,7 +76,7 @@ class Chain:
     anchor: int
 
 
-PIECE = 100
+PIECE = 400
 """Expressions that are compiled at a time where there are many alike."""
 
 
@@ -156,13 +156,18 @@ def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> 
 def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: int | None = None) -> Function:
     """Compile a vector of expressions; inputs that no expression contains are allowed.
 
-    Compile time grows faster than the number of expressions: many alike are compiled in ``pieces`` of so many each.
+    Compile time grows faster than the number of expressions: many alike are compiled in ``pieces`` of so many each,
+    which there is nothing to gain from optimising.
     """
-    if pieces and len(expressions) > pieces:
+    if pieces:
         starts = range(0, len(expressions), pieces)
-        parts = [compile_function(inputs, expressions[start : start + pieces]) for start in starts]
+        parts = [_compiled(inputs, expressions[start : start + pieces], opt_level=0) for start in starts]
         return replace(parts[0], rest=tuple(parts[1:]))
-    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True)
+    return _compiled(inputs, expressions)
+
+
+def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int) -> Function:
+    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, **options)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(expressions), code)
@@ -206,8 +211,8 @@ def compile_program(
         n_margins=len(margins),
         residual=compile_function(inputs, residual, pieces),
         jacobian=compile_function(inputs, by_state + by_rate + linked, pieces),
-        ledger=compile_function(inputs, ledger) if ledger else None,
-        margins=compile_function(inputs, margins) if margins else None,
+        ledger=compile_function(inputs, ledger, pieces) if ledger else None,
+        margins=compile_function(inputs, margins, pieces) if margins else None,
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.integrate import Trajectory
+from surfacechem.references._across import across
 from surfacechem.references._start import Start
 from surfacechem.references.base import Reference
 from surfacechem.scene import Scene
@@ -38,6 +39,8 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
     reference = match(references.get(name), options, start)
     solution = partial(_solution, reference, start)
     exact = solution(run.result.times)
+    if reference.continuous:
+        return across(reference, exact, scene, run)
     _check_start(exact, run)
     _check(solution, run)
     return exact
@@ -71,7 +74,7 @@ def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     system = run.model.system
     known = [state.name for state in system.states] + [item.name for item in system.outputs]
     stands_for = {
-        "T": [state.name for state in system.states if state.quantity.unit == "K"],
+        "T": [s.name for s in system.states if s.quantity.unit == "K" and s.name not in system.inside],
         "R_c": [name for name in known if name.startswith("R_")],
         "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
     }

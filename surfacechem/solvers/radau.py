@@ -301,7 +301,8 @@ def search_arguments(program: Program, ends: Array, table: Array, counts: NDArra
     """
     none, nothing = np.zeros(0), _no_rows(len(ends))
     return (
-        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, 0, 0, counts[0], 1.0, np.ones(program.n), _kinds(()),
+        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, 0, 0, counts[0], 1.0,
+        np.ones(program.n), _kinds(()),
         ends, table, none, none, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 

@@ -129,9 +129,7 @@ def _factor_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any, orde
     _shifted(w.jacobian, shift, core)
     _shifted(w.border_derivatives, shift, border)
     _shifted(w.band_derivatives, shift, bands)
-    return bool(
-        factor_with_chains(core, border, bands, w.chains, order, w.vector[SCALE], w.vector[DELTA], 0.0)
-    )
+    return bool(factor_with_chains(core, border, bands, w.chains, order, w.vector[SCALE], w.vector[DELTA], 0.0))
 
 
 @compiled
