@@ -21,7 +21,7 @@ STOPPED = {
 FLAGGED = ("debonding-cooling",)
 """Cases that are shown because they violate the second law."""
 
-CELLS = {"sudden-contact": 1e-4}
+CELLS = {"sudden-contact": 1e-4, "epoxy-cure-thick": 1e-4}
 """Cases whose bodies are divided into cells, and the accuracy that these have."""
 
 every_case = pytest.mark.parametrize("name", names())
