@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from surfacechem.audit import audit
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.event_table import event_times
 from surfacechem.integrate import Trajectory
+from surfacechem.profiles import profile_values
 from surfacechem.scene import Scene
 from surfacechem.solution import Accuracy
 
@@ -38,16 +39,30 @@ def check_way(way: str) -> None:
         raise InputError(f"no source '{way}' of an error.{suggestion(way, WAYS)}", Place(path="--error"))
 
 
-def accuracy(trajectory: Trajectory, scene: Scene, exact: tuple[str, Mapping[str, float]] | None, way: str) -> Accuracy:
-    """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters."""
+def no_cells() -> Mapping[str, float]:
+    """Errors of cells across bodies where no body has any."""
+    return {}
+
+
+def accuracy(
+    trajectory: Trajectory,
+    scene: Scene,
+    exact: tuple[str, Mapping[str, float]] | None,
+    way: str,
+    cells: Callable[[], Mapping[str, float]] = no_cells,
+) -> Accuracy:
+    """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters.
+
+    ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see.
+    """
     if way == "balances":
         return from_balances(trajectory, "balances only: what they miss is not seen")
     if exact is None or way == "estimate":
-        return against_tighter(trajectory)
+        return against_tighter(trajectory, cells())
     try:
         return against_exact(trajectory, scene, *exact)
     except InputError as error:
-        estimate = against_tighter(trajectory)
+        estimate = against_tighter(trajectory, cells())
         unused = f"the exact solution {exact[0]} is not of this scene: {error.message}"
         return replace(estimate, source=f"{estimate.source}; {unused}")
 
@@ -62,9 +77,9 @@ def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapp
     return Accuracy(max(errors.values()), f"exact solution {name}", errors, exact)
 
 
-def against_tighter(trajectory: Trajectory) -> Accuracy:
+def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = None) -> Accuracy:
     """Errors of states and of the times of events, estimated from a second run; at the tightest tolerance that run is
-    the looser one.
+    the looser one. Those of the cells across bodies are added.
     """
     other = second_tolerance(trajectory.run.rtol)
     second = trajectory.model.resolve(trajectory, other)
@@ -74,11 +89,13 @@ def against_tighter(trajectory: Trajectory) -> Accuracy:
         return from_balances(trajectory, f"balances only, since {why}")
     ours, theirs = states(trajectory), states(second)
     errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
+    for name, error in (cells or {}).items():
+        errors[name] = errors.get(name, 0.0) + error
     found, expected = event_times(trajectory), event_times(second)
     note = difference(found, expected)
     if found and not note:
         errors[EVENTS] = event_error(found, expected, trajectory.run.times[-1])
-    source = f"estimate: a second run at rtol {other:.0e}"
+    source = f"estimate: a second run at rtol {other:.0e}" + (", and one with half of the cells" if cells else "")
     return Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
 
 
@@ -90,9 +107,11 @@ def from_balances(trajectory: Trajectory, source: str) -> Accuracy:
 
 
 def states(trajectory: Trajectory) -> dict[str, Array]:
-    """States at the output times, by name."""
-    names = [state.name for state in trajectory.model.system.states]
-    return dict(zip(names, trajectory.result.outputs.T, strict=True))
+    """States at the output times, by name; those inside bodies together."""
+    system = trajectory.model.system
+    lone = {s.name: j for j, s in enumerate(system.states) if s.name not in system.inside}
+    found = {name: trajectory.result.outputs[:, j] for name, j in lone.items()}
+    return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
 def computed(trajectory: Trajectory) -> dict[str, Array]:
@@ -103,7 +122,8 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
 
 def floor(trajectory: Trajectory, name: str) -> float:
     """The part of its largest value below which an exact value of a variable counts as this in relative errors."""
-    return FLOOR if name in {state.name for state in trajectory.model.system.states} else 1.0
+    system = trajectory.model.system
+    return FLOOR if name in {*(s.name for s in system.states), *(p.name for p in system.profiles)} else 1.0
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:

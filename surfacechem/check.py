@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.integrate import Model
+from surfacechem.lumping import lumpings
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.scene import Scene
 from surfacechem.system import System
@@ -40,6 +41,8 @@ class Start:
     M: Array
     K: Array
     outputs: Mapping[str, float]
+    inputs: Array
+    """Arguments of compiled functions."""
 
 
 def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
@@ -48,20 +51,20 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     n = len(system.states)
     algebraic = np.array([state.algebraic for state in system.states])
     parameters = [p.at(0.0) if p.load else values[p.path] for p in system.parameters]
-    y, ydot = np.array([values[f"initial.{state.name}"] for state in system.states]), np.zeros(n)
+    y, ydot = np.array([values[state.path] for state in system.states]), np.zeros(n)
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
-        jacobian = model.program.jacobian(inputs)
-        K, M = jacobian[: n * n].reshape(n, n), jacobian[n * n :].reshape(n, n)
+        K, M = model.program.derivatives(inputs)
         change = _newton_step(np.where(algebraic, K, M), model.program.residual(inputs))
         if change is None:
             return None
         y, ydot = y + np.where(algebraic, change, 0.0), ydot + np.where(algebraic, 0.0, change)
         if np.all(np.abs(change) <= 1e-12 * np.maximum(np.abs(np.where(algebraic, y, ydot)), 1e-300)):
             break
-    outputs = model.output_function(np.concatenate([[0.0], y, ydot, parameters]))
+    inputs = np.concatenate([[0.0], y, ydot, parameters])
+    outputs = model.output_function(inputs)
     names = [item.name for item in system.outputs]
-    return Start(y, ydot, M, K, dict(zip(names, outputs.tolist(), strict=True)))
+    return Start(y, ydot, M, K, dict(zip(names, outputs.tolist(), strict=True)), inputs)
 
 
 def _newton_step(matrix: Array, residual: Array) -> Array | None:
@@ -96,6 +99,7 @@ def groups(model: Model, scene: Scene, values: Mapping[str, float], end: float) 
         *found,
         *_affinity(scene, start, model.system),
         *_heat(model.system, scene, start, end),
+        *(Group(*row[:2], "1", row[2]) for body in lumpings(model.system, start.inputs, end) for row in body.rows()),
         *_time_scales(start, end),
         *(
             Group("t / t_own", end / t, "1", f"length of the run in units of the {p.text}")
@@ -156,6 +160,8 @@ def _affinity(scene: Scene, start: Start, system: System) -> Iterator[Group]:
 def _heat(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
     """Heat paths and dissipation against capacities, over the whole run."""
     capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.quantity.unit == "K"}
+    for profile in system.profiles:
+        capacities[profile.surface] = sum(capacities.get(name, 0.0) for name in (profile.surface, *profile.states))
     nodes = {body.name: body.temperature for body in scene.bodies} | {"interface": scene.interface.temperature}
     for law in scene.heat:
         ends = [capacities.get(str(nodes.get(name)), 0.0) for name in law.between]
@@ -192,11 +198,19 @@ def warnings(system: System) -> list[str]:
     return [*system.warnings, *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle)]
 
 
+def lumping_warnings(model: Model, values: Mapping[str, float], end: float) -> list[str]:
+    """Bodies that should not be one lump, and by how much they err."""
+    start = consistent_start(model, values) if model.system.conductors else None
+    found = lumpings(model.system, start.inputs, end) if start is not None else []
+    return [warning for body in found for warning in body.warnings()]
+
+
 def _audited(system: System) -> list[object]:
     return (
         [a.rate for a in system.ledger]
         + [m.expression for m in system.margins]
         + [i.expression for i in system.outputs]
+        + [c.resistance for c in system.conductors]
         + [x for item in system.transitions for x in (item.margin, *item.modes.values(), *item.jump.values())]
     )
 

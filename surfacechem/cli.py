@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -146,7 +147,7 @@ def sweep(
 @app.command(epilog=EXIT_CODES)
 def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rtol: Tolerance = None) -> None:
     """Say a case back in words, without running it."""
-    from surfacechem.check import groups, warnings
+    from surfacechem.check import groups, lumping_warnings, warnings
     from surfacechem.report import check_summary
     from surfacechem.simulation import load
 
@@ -159,7 +160,8 @@ def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rt
     except InputError as error:
         raise simulation.case.located(error) from None
     numbers = groups(model, scene, values, settings.times[-1])
-    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, warnings(system)))
+    found = [*warnings(system), *lumping_warnings(model, values, settings.times[-1])]
+    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found))
 
 
 @app.command()
@@ -172,10 +174,13 @@ def equations(
     if form not in ("python", "latex"):
         raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex'))}", Place(path="--format"))
     from surfacechem import case as cases
-    from surfacechem import printing
+    from surfacechem import printing, spatial
 
     read = cases.load(case, changes or ())
-    typer.echo(getattr(printing, form)(read.system(), read.title), nl=False)
+    title = read.title
+    if spatial.divided(read.scene):
+        read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
+    typer.echo(getattr(printing, form)(read.system(), title), nl=False)
 
 
 @app.command()

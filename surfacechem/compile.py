@@ -6,8 +6,8 @@ raw pointer by the stepper and as a vectorised function from Python.
 """
 
 import ctypes
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,9 +33,19 @@ class Function:
     n_out: int
     keep: Any
     """Owns the machine code: the address is valid as long as this object lives."""
+    rest: tuple["Function", ...] = ()
+    """Further code for the later results, where the function is compiled in pieces."""
 
     def __call__(self, inputs: ArrayLike) -> NDArray[np.float64]:
-        return np.asarray(self.keep(np.ascontiguousarray(inputs, dtype=float)))
+        values = np.ascontiguousarray(inputs, dtype=float)
+        if not self.rest:
+            return np.asarray(self.keep(values))
+        return np.concatenate([np.asarray(self.keep(values)), *(part(values) for part in self.rest)], axis=-1)
+
+    @property
+    def size(self) -> int:
+        """Number of results of all pieces."""
+        return self.n_out + sum(part.n_out for part in self.rest)
 
 
 @dataclass(frozen=True)
@@ -55,6 +65,22 @@ class Filler:
 
 
 @dataclass(frozen=True)
+class Chain:
+    """States from ``first`` to before ``end``, each coupled to its neighbours only, the first one to ``anchor``.
+
+    The anchor is a state before all chains, -1 where there is none.
+    """
+
+    first: int
+    end: int
+    anchor: int
+
+
+PIECE = 400
+"""Expressions that are compiled at a time where there are many alike."""
+
+
+@dataclass(frozen=True)
 class Program:
     """A fully implicit system G(t, y, ydot; p) = 0, linear in ydot, with its exact derivatives, ledger and margins."""
 
@@ -64,7 +90,7 @@ class Program:
     n_margins: int
     residual: Function
     jacobian: Function
-    """dG/dy (row-major), then dG/dydot."""
+    """dG/dy (row-major), then dG/dydot, of the core; then of its border and of the bands of the chains."""
     ledger: Function | None
     """Rates of the quadratures integrated beside the state."""
     margins: Function | None
@@ -72,6 +98,7 @@ class Program:
     algebraic: tuple[bool, ...]
     """Per state: no equation contains its derivative."""
     filler: Filler | None = None
+    chains: tuple[Chain, ...] = ()
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, with the parameters that come from outside."""
@@ -81,7 +108,27 @@ class Program:
     def addresses(self) -> NDArray[np.int64]:
         """Code and user data of residual, jacobian, ledger and margins; zero where absent."""
         functions = (self.residual, self.jacobian, self.ledger, self.margins)
-        return np.array([(f.address, f.user) if f else (0, 0) for f in functions], dtype=np.int64)
+        rows = [(f.address, f.user, which, 0) if f else (0, 0, which, 0) for which, f in enumerate(functions)]
+        for which, f in enumerate(functions):
+            place = f.n_out if f else 0
+            for part in f.rest if f else ():
+                rows.append((part.address, part.user, which, place))
+                place += part.n_out
+        return np.array(rows, dtype=np.int64)
+
+    @cached_property
+    def chain_table(self) -> NDArray[np.int64]:
+        """A row (first, end, anchor) for each chain; anchor -1 where it hangs on nothing."""
+        return np.array([(c.first, c.end, c.anchor) for c in self.chains], dtype=np.int64).reshape(-1, 3)
+
+    def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """dG/dy and dG/dydot as matrices [..., equation, variable]."""
+        values = self.jacobian(inputs)
+        if not self.chains:
+            both = values.reshape(*values.shape[:-1], 2, self.n, self.n)
+        else:
+            both = _scattered(values, self.n, self.chains)
+        return both[..., 0, :, :], both[..., 1, :, :]
 
     @cached_property
     def algebraic_mask(self) -> NDArray[np.bool_]:
@@ -92,9 +139,35 @@ class Program:
         return 1 + 2 * self.n + self.n_parameters
 
 
-def compile_function(inputs: Sequence[Any], expressions: Sequence[Any]) -> Function:
-    """Compile a vector of expressions; inputs that no expression contains are allowed."""
-    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True)
+def _scattered(values: NDArray[np.float64], n: int, chains: Sequence[Chain]) -> NDArray[np.float64]:
+    """Both matrices from the results of a compiled Jacobian."""
+    core = chains[0].first
+    both = np.zeros((*values.shape[:-1], 2, n, n))
+    own, linked = np.split(values, [2 * core * core], axis=-1)
+    both[..., :core, :core] = own.reshape(*values.shape[:-1], 2, core, core)
+    places = np.array(list(_linked(core, chains)), dtype=np.int64)
+    for part in np.split(np.arange(len(places)), [core * len(chains)]):
+        entries, linked = np.split(linked, [2 * len(part)], axis=-1)
+        i, j = places[part].T
+        both[..., i[j >= 0], j[j >= 0]] = entries.reshape(*values.shape[:-1], 2, len(part))[..., j >= 0]
+    return both
+
+
+def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: int | None = None) -> Function:
+    """Compile a vector of expressions; inputs that no expression contains are allowed.
+
+    Compile time grows faster than the number of expressions: many alike are compiled in ``pieces`` of so many each,
+    which there is nothing to gain from optimising.
+    """
+    if pieces:
+        starts = range(0, len(expressions), pieces)
+        parts = [_compiled(inputs, expressions[start : start + pieces], opt_level=0) for start in starts]
+        return replace(parts[0], rest=tuple(parts[1:]))
+    return _compiled(inputs, expressions)
+
+
+def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int) -> Function:
+    code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, **options)
     function, user = code.as_ctypes()
     address = ctypes.cast(function, ctypes.c_void_p).value
     return Function(int(address or 0), int(user.value), len(expressions), code)
@@ -109,23 +182,52 @@ def compile_program(
     ledger: Sequence[Any] = (),
     margins: Sequence[Any] = (),
     filler: Filler | None = None,
+    chains: Sequence[Chain] = (),
 ) -> Program:
-    """Compile a system with the Jacobians differentiated from its residual."""
+    """Compile a system with the Jacobians differentiated from its residual.
+
+    States and equations that form chains stand behind the others, chain after chain.
+    """
     if not len(states) == len(derivatives) == len(residual):
         counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
-    by_state, by_rate = ([derivative(g, x) for g in residual for x in over] for over in (states, derivatives))
-    n = len(states)
+    n, core = len(states), chains[0].first if chains else len(states)
+    own = residual[:core]
+    by_state, by_rate = ([derivative(g, x) for g in own for x in over[:core]] for over in (states, derivatives))
+    places = list(_linked(core, chains))
+    border, bands = places[: core * len(chains)], places[core * len(chains) :]
+    linked = [
+        derivative(residual[i], over[j]) if j >= 0 else symengine.Integer(0)
+        for part in (border, bands)
+        for over in (states, derivatives)
+        for i, j in part
+    ]
+    pieces = PIECE if chains else None
     return Program(
         n=n,
         n_parameters=len(parameters),
         n_ledger=len(ledger),
         n_margins=len(margins),
-        residual=compile_function(inputs, residual),
-        jacobian=compile_function(inputs, by_state + by_rate),
-        ledger=compile_function(inputs, ledger) if ledger else None,
-        margins=compile_function(inputs, margins) if margins else None,
-        algebraic=tuple(all(entry == 0 for entry in by_rate[j::n]) for j in range(n)),
+        residual=compile_function(inputs, residual, pieces),
+        jacobian=compile_function(inputs, by_state + by_rate + linked, pieces),
+        ledger=compile_function(inputs, ledger, pieces) if ledger else None,
+        margins=compile_function(inputs, margins, pieces) if margins else None,
+        algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
+        chains=tuple(chains),
     )
+
+
+def _linked(core: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:
+    """Equation and variable of each derivative outside the core, in the order of the compiled function.
+
+    First how the equations of the core read the first variable of each chain, then each equation of a chain by the
+    variables inwards, its own and outwards; -1 where there is none.
+    """
+    yield from ((i, chain.first) for i in range(core) for chain in chains)
+    for chain in chains:
+        for i in range(chain.first, chain.end):
+            yield i, chain.anchor if i == chain.first else i - 1
+            yield i, i
+            yield i, i + 1 if i + 1 < chain.end else -1

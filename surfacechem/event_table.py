@@ -63,6 +63,8 @@ def _jump_columns(trajectory: Trajectory, jumps: Sequence[Jump | None]) -> list[
         EventColumn("event_verdict", verdicts, "1", "whether the second law allows it"),
     ]
     for k, state in enumerate(trajectory.model.system.states):
+        if state.name in trajectory.model.system.inside:
+            continue
         q = state.quantity
         columns += [
             EventColumn(f"{q.name}_before", values(lambda j, k=k: j.before.y[k]), q.unit, f"{q.long_name} before"),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile import Filler, Function, Program, compile_function, compile_program
+from surfacechem.compile import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
 from surfacechem.equilibria import Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
@@ -90,7 +90,9 @@ class Trajectory:
         """By how much the last bit of a state changes each named quantity at most."""
         result = self.result
         worst = np.zeros(self.outputs.shape[1])
-        for j in range(result.outputs.shape[1]):
+        for j, state in enumerate(self.model.system.states):
+            if state.name in self.model.system.inside:
+                continue  # no flux reads one of them alone but the first, and those are not named
             nudged = result.outputs.copy()
             nudged[:, j] *= 1 + np.finfo(float).eps
             values = self.model.evaluate(result, result.times, nudged, self.rates)
@@ -135,10 +137,11 @@ class Model:
             system.local([account.rate for account in system.ledger]),
             system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
             filler=self._filler(inputs),
+            chains=[Chain(*chain) for chain in system.chains],
         )
         self.jumper = Jumper(system) if system.transitions else None
         outputs = [system.expand(item.expression) for item in system.outputs]
-        self.output_function: Function = compile_function(inputs, outputs)
+        self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
 
     def _filler(self, inputs: list[Any]) -> Filler | None:
@@ -154,7 +157,7 @@ class Model:
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
-        values |= {f"initial.{state.name}": state.initial for state in self.system.states}
+        values |= {state.path: state.initial for state in self.system.states}
         fixed = {parameter.path for parameter in self.system.parameters if not parameter.changeable}
         fixed |= set(self.system.outside.engine.gives) if self.system.outside else set()
         specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
@@ -177,7 +180,7 @@ class Model:
     def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible."""
         system = self.system
-        initial = {state.name: values[f"initial.{state.name}"] for state in system.states}
+        initial = {state.name: values[state.path] for state in system.states}
         check_start(system, values, initial)
         end = run.times[-1]
         segments = self._segments(end, values)
@@ -202,7 +205,7 @@ class Model:
     def _start_modes(self, parameters: Array, values: Mapping[str, float]) -> None:
         """Modes that follow from the initial state."""
         symbols = [p.symbol for p in self.system.parameters]
-        initial = {state.symbol: values[f"initial.{state.name}"] for state in self.system.states}
+        initial = {state.symbol: values[state.path] for state in self.system.states}
         initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {self.system.t: 0}
         for mode in self.system.modes:
             if mode.start is not None:

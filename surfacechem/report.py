@@ -12,6 +12,7 @@ from surfacechem.event_table import event_summary
 if TYPE_CHECKING:
     from surfacechem.audit import Audit
     from surfacechem.check import Group
+    from surfacechem.conductors import Profile
     from surfacechem.integrate import Run, Trajectory
     from surfacechem.scene import Scene
     from surfacechem.solution import Solution
@@ -54,7 +55,9 @@ def duration(seconds: float) -> str:
 
 def states(system: System) -> str:
     """The states by name; algebraic ones say so."""
-    names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in system.states]
+    lone = [state for state in system.states if state.name not in system.inside]
+    names = [f"{state.name} (algebraic)" if state.algebraic else state.name for state in lone]
+    names += [f"{profile.name} ({len(profile.points) - 1} cells)" for profile in system.profiles]
     return ", ".join(names) or "nothing: everything is prescribed"
 
 
@@ -188,7 +191,15 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
             s.quantity.long_name,
         )
         for s in system.states
-    ]
+        if s.name not in system.inside
+    ] + [_profile_row(system, profile) for profile in system.profiles]
+
+
+def _profile_row(system: System, profile: Profile) -> tuple[str, ...]:
+    starts = {state.name: state.initial for state in system.states}
+    start = f"from {starts[profile.states[0]]:g}" if profile.states else ""
+    text = f"temperatures across {profile.body}, in {len(profile.points) - 1} cells"
+    return profile.name, "[K]", "evolved", start, text
 
 
 def _mode_rows(system: System) -> list[tuple[str, str]]:

@@ -8,7 +8,18 @@ from typing import Protocol
 
 from surfacechem.errors import InputError, Place
 from surfacechem.substances import Fluid, Property
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, parameter
+from surfacechem.terms import (
+    BodyEnergy,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Load,
+    Potential,
+    RateLaw,
+    option,
+    parameter,
+)
 
 
 @dataclass(frozen=True)
@@ -22,6 +33,36 @@ class Body:
     name: str
     temperature: str | Load
     energy: BodyEnergy | None = None
+    conduction: Conduction | None = None
+
+
+class Conduction(Law):
+    r"""Heat conduction across a body, from the contact (x = 0) to its far side.
+
+    .. math:: \frac{C(T)}{L}\,\dot T = \frac{\partial}{\partial x}\Big(k\,\frac{\partial T}{\partial x}\Big)
+
+    The body's heat capacity C, per area, is spread over its thickness L. Its temperature is that at the contact; cells
+    divide the thickness, in finite volumes of second order. Without cells the body is one lump. Far side: insulated,
+    held at a temperature, or cooled through ``h_far``. Source: Carslaw & Jaeger (1959), Conduction of Heat in Solids,
+    chapter III; the first law in one dimension.
+    """
+
+    contract = "conduction"
+
+    thickness: float = parameter("m", "thickness of the body", above=0, varies=False)
+    conductivity: float = parameter("W/(m K)", "thermal conductivity", above=0)
+    h_far: float | None = parameter(
+        "W/(m^2 K)", "conductance at the far side, to what is beyond", default=None, at_least=0, varies=False
+    )
+    cells: int = option("number of cells; 0 for a lump", default=0)
+    accuracy: float | None = option("relative accuracy of temperatures, by which a run chooses the cells", default=None)
+    grading: float = option("width of the cells at the far side over that at the contact", default=1.0)
+    far: Load | None = option("temperature at the far side, or beyond it; none where insulated", default=None)
+
+    @property
+    def held(self) -> bool:
+        """Whether the far side is held at a temperature."""
+        return self.far is not None and self.h_far is None
 
 
 class Mounting(Law):

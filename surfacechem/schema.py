@@ -12,13 +12,14 @@ from typing import Any
 from surfacechem import laws, references, solvers
 from surfacechem.assembly import LOADABLE
 from surfacechem.case import TOP_KEYS
+from surfacechem.case.conduction import CONDUCTION_KEYS, INSULATED, LUMP
 from surfacechem.case.mechanics import MOVING, WAYS
 from surfacechem.case.medium import MEDIUM_KEYS, PROPERTIES
 from surfacechem.case.run import RUN_KEYS, SPACINGS
-from surfacechem.case.scene import BODY_NAME, INTERFACE_KEYS, NODE
+from surfacechem.case.scene import BODY_KEYS, BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.case.sweep import RANGE_KEYS, SWEEP_KEYS
 from surfacechem.quantities import VARIABLES
-from surfacechem.scene import Mounting
+from surfacechem.scene import Conduction, Mounting
 from surfacechem.substances import Property
 from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
 
@@ -113,10 +114,31 @@ def _bodies() -> Schema:
         "E": _quantity("Young's modulus [Pa], with H instead of `stiffness`"),
         "H": _quantity("height [m], with E instead of `stiffness`"),
     }
-    properties = {"temperature": _ref("temperature"), "capacity": capacity, **stiffness, **parameters}
+    properties = {"temperature": _ref("temperature"), "capacity": capacity, "conduction": _conduction(), **stiffness}
+    assert set(properties) == set(BODY_KEYS)
+    properties |= parameters
     body = _object(properties, required=("temperature",))
     bodies = _object({}, patterns={BODY_NAME.pattern: body})
     return {**bodies, "minProperties": 2, "maxProperties": 2, "description": "the two bodies; the first is body 1"}
+
+
+def _conduction() -> Schema:
+    specs = dict(Conduction.specs())
+    accuracy = _object({"accuracy": _quantity("relative accuracy of temperatures")}, required=("accuracy",))
+    number = {"type": "integer", "minimum": 2, "multipleOf": 2}
+    far = _object({"temperature": _ref("history"), "h": _parameter(specs["h_far"])}, required=("temperature",))
+    properties = {
+        **{name: _parameter(specs[name]) for name in ("thickness", "conductivity")},
+        "cells": {
+            "description": "number of cells, or the accuracy wanted",
+            "anyOf": [number, accuracy, {"const": LUMP}],
+        },
+        "grading": {**_quantity("width of the cells at the far side over that at the contact"), "default": 1.0},
+        "far": {"description": "far side", "anyOf": [{"const": INSULATED}, far], "default": INSULATED},
+    }
+    assert set(properties) == set(CONDUCTION_KEYS)
+    found = _object(properties, required=("thickness", "conductivity", "cells"))
+    return {**found, "description": "heat conduction across the body"}
 
 
 def _interface() -> Schema:
@@ -180,6 +202,7 @@ def _initial() -> Schema:
     properties |= {
         name: _quantity(f"{VARIABLES[name].long_name} [{VARIABLES[name].unit}]") for name in (*MOVING, "theta")
     }
+    properties |= {f"profile_{k}": _quantity(f"temperature inside body {k}, which conducts [K]") for k in (1, 2)}
     return _object(properties, patterns={NODE.pattern: _quantity("temperature [K]")})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from surfacechem import case as cases
+from surfacechem import spatial
 from surfacechem.achieved import accuracy, check_way
 from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.integrate import Model, Run
+from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solution import Solution
 from surfacechem.system import System
 from surfacechem.units import parse
@@ -51,6 +53,7 @@ class Simulation:
     def __init__(self, case: Case) -> None:
         self.case = case
         self._sweep_models: dict[str, Model] = {}
+        self._finer: dict[int, Simulation] = {}
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -77,11 +80,8 @@ class Simulation:
         check_way(error)
         settings = run or self.case.run
         values = self._values(changes or {})
-        try:
-            trajectory = self.model.solve(settings, values)
-        except InputError as refused:
-            raise self.case.located(refused) from None
-        case = self.case
+        chosen, trajectory, errors = self._resolved(settings, values)
+        case = chosen.case
         exact = (case.reference.name, case.reference.options) if case.reference else None
         return Solution(
             trajectory,
@@ -89,11 +89,53 @@ class Simulation:
             source=case.source,
             case=case.text,
             mechanism=case.mechanism_text or "",
-            accuracy=accuracy(trajectory, case.scene, exact, error) if len(trajectory.result.times) else None,
+            accuracy=accuracy(trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory))
+            if len(trajectory.result.times)
+            else None,
             changes=values,
             case_run=case.run,
             error_from=error,
+            notes=spatial.missed(case.scene, errors),
         )
+
+    def _resolved(
+        self, settings: Run, values: Mapping[str, float], before: float = math.inf
+    ) -> tuple[Simulation, Trajectory, Mapping[str, float]]:
+        """With the cells that its accuracy needs: the simulation, its run and, where it asks for an accuracy, the
+        errors of the cells by variable.
+        """
+        trajectory = self._solved(settings, values)
+        errors = self._cell_errors(trajectory) if spatial.wanted(self.case.scene) is not None else {}
+        factor = spatial.finer(self.case.scene, errors)
+        error = max(errors.values(), default=0.0)
+        if factor > 1 and not error > spatial.HELPED * before:
+            return self._with_more_cells(factor)._resolved(settings, values, error)
+        return self, trajectory, errors
+
+    def _solved(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        try:
+            return self.model.solve(run, values)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def _with_more_cells(self, factor: int) -> Simulation:
+        if factor not in self._finer:
+            finer = Simulation(replace(self.case, scene=spatial.multiplied(self.case.scene, factor)))
+            self._finer[factor] = finer
+        return self._finer[factor]
+
+    @cached_property
+    def _coarser(self) -> Simulation:
+        """The same with half of the cells."""
+        return Simulation(replace(self.case, scene=spatial.halved(self.case.scene)))
+
+    def _cell_errors(self, trajectory: Trajectory) -> dict[str, float]:
+        """Errors of the cells, by variable; nothing where no body has any."""
+        if not spatial.divided(self.case.scene):
+            return {}
+        changes = {path: value for path, value in trajectory.values.items() if path in self._units}
+        coarse = self._coarser._solved(trajectory.run, changes)
+        return spatial.errors(trajectory, coarse)
 
     def sweep(
         self,
@@ -115,6 +157,10 @@ class Simulation:
         """Run a plan whose values are in SI."""
         from surfacechem import sweeping
 
+        if spatial.wanted(self.case.scene) is not None:
+            chosen = self._resolved(self.case.run, self._values(changes or {}))[0]
+            if chosen is not self:
+                return chosen.sweep_plan(plan, changes, threads)
         key = plan.until[0] if plan.until else ""
         try:
             if key not in self._sweep_models:
@@ -140,7 +186,7 @@ class Simulation:
     def _units(self) -> dict[str, str]:
         """Unit of everything that a run may change, by path."""
         units = {p.path: p.spec.unit for p in self.system.parameters if p.changeable}
-        return units | {f"initial.{state.name}": state.quantity.unit for state in self.system.states}
+        return units | {state.path: state.quantity.unit for state in self.system.states}
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = self._units

@@ -24,6 +24,7 @@ from surfacechem.errors import InputError, Place
 from surfacechem.event_table import event_columns, event_findings, event_violations
 from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
+from surfacechem.profiles import profile_columns
 from surfacechem.solvers.contract import Status
 
 if TYPE_CHECKING:
@@ -103,6 +104,8 @@ class Solution:
     accuracy: Accuracy | None = None
     changes: Mapping[str, float] = field(default_factory=dict)
     """Parameters and initial values that differ from the case, by path."""
+    notes: tuple[str, ...] = ()
+    """What else a reader of the results has to know."""
     case_run: Run | None = None
     """How the case would be run; where the run was another, the dataset says so."""
     error_from: str = "auto"
@@ -147,6 +150,7 @@ class Solution:
             *capped_rates(self.trajectory),
             *self._lost_fluxes(),
             *system.warnings,
+            *self.notes,
         )
 
     def _lost_fluxes(self) -> list[str]:
@@ -174,12 +178,18 @@ class Solution:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
-        return (*self._states(), *self._named(), *self._ledger(), *self._balances(), *self._exact(), *self._events())
+        parts = (self._states(), self._named(), self._profiles(), self._ledger(), self._balances())
+        return (*(column for part in parts for column in part), *self._exact(), *self._events())
+
+    def _profiles(self) -> list[Column]:
+        return [Column(*column) for column in profile_columns(self.trajectory)]
 
     def _states(self) -> list[Column]:
         result = self.trajectory.result
         columns = [Column("time", ("time",), result.times, "s", "time since the start")]
         for j, state in enumerate(self.trajectory.model.system.states):
+            if state.name in self.trajectory.model.system.inside:
+                continue
             q = state.quantity
             columns.append(Column(q.name, ("time",), result.outputs[:, j], q.unit, q.long_name, q.tag))
         return columns
@@ -230,9 +240,15 @@ class Solution:
 
     def _exact(self) -> list[Column]:
         exact = self.accuracy.exact if self.accuracy else {}
-        by_name = {c.name: c for c in (*self._states(), *self._named())}
+        by_name = {c.name: c for c in (*self._states(), *self._named(), *self._profiles())}
         return [
-            Column(f"{name}_exact", ("time",), values, by_name[name].unit, f"exact {by_name[name].long_name}")
+            Column(
+                f"{name}_exact",
+                by_name[name].dimensions,
+                values,
+                by_name[name].unit,
+                f"exact {by_name[name].long_name}",
+            )
             for name, values in exact.items()
         ]
 
@@ -259,6 +275,7 @@ class Solution:
             "regime": self.trajectory.model.system.regime,
             "solver": run.solver,
             "rtol": float(run.rtol),
+            **{f"cells_{p.number}": len(p.points) - 1 for p in self.trajectory.model.system.profiles},
             **counters,
             "time_reached": float(result.t),
             "run_seconds": float(self.trajectory.seconds),
@@ -291,8 +308,8 @@ class Solution:
         import xarray
 
         data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        time = data.pop("time")
-        return xarray.Dataset(data, coords={"time": time}, attrs=dict(self.attributes))
+        coordinates = {c.name: data.pop(c.name) for c in self.columns if c.dimensions == (c.name,)}
+        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
 
     def write(self, path: str | Path) -> Path:
         """Save as netCDF; the file appears whole or not at all."""

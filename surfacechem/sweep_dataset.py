@@ -115,7 +115,7 @@ class SweepSolution:
 
     def _meaning(self, path: str) -> tuple[str, str]:
         """Unit and long name of a swept value."""
-        state = next((s for s in self.system.states if path == f"initial.{s.name}"), None)
+        state = next((s for s in self.system.states if path == s.path), None)
         if state is not None:
             return state.quantity.unit, f"initial {state.quantity.long_name}"
         spec = next(p.spec for p in self.system.parameters if p.path == path)
@@ -123,7 +123,7 @@ class SweepSolution:
 
     @property
     def _quantities(self) -> dict[str, Quantity]:
-        states = {state.name: state.quantity for state in self.system.states}
+        states = {state.name: state.quantity for state in self.system.states if state.name not in self.system.inside}
         return states | {item.name: item.quantity for item in self.system.outputs}
 
     def _shaped(self, values: Array) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 
 import symengine
 
+from surfacechem.conductors import Conductor, Profile
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
@@ -56,11 +57,18 @@ class State:
     initial: float
     scale: float
     algebraic: bool
+    start: str = ""
+    """Whose initial value it takes, where not its own."""
 
     @property
     def name(self) -> str:
         """Name in the dataset."""
         return self.quantity.name
+
+    @property
+    def path(self) -> str:
+        """Path of its initial value."""
+        return f"initial.{self.start or self.name}"
 
 
 @dataclass(frozen=True)
@@ -267,6 +275,9 @@ class System:
     """Tractions of the far field times their gaps [J/m^2], by the account of their work."""
     pairs: tuple[Pair, ...] = ()
     paces: tuple[Pace, ...] = ()
+    profiles: tuple[Profile, ...] = ()
+    """Temperatures across bodies; their states stand behind all others, profile after profile."""
+    conductors: tuple[Conductor, ...] = ()
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None
@@ -288,6 +299,21 @@ class System:
         """Arguments of every compiled function: t, states, derivatives, parameters."""
         states = [state.symbol for state in self.states] + [state.dot for state in self.states]
         return [self.t, *states, *(parameter.symbol for parameter in self.parameters)]
+
+    @cached_property
+    def inside(self) -> frozenset[str]:
+        """Names of the states inside bodies, which the profiles show together."""
+        return frozenset(name for profile in self.profiles for name in profile.states)
+
+    @property
+    def chains(self) -> list[tuple[int, int, int]]:
+        """First state, end and anchor of each profile; the anchor is -1 where the contact's temperature is given."""
+        names = [state.name for state in self.states]
+        return [
+            (names.index(p.states[0]), names.index(p.states[-1]) + 1, names.index(p.surface) if p.anchored else -1)
+            for p in self.profiles
+            if p.states
+        ]
 
     @cached_property
     def outputs(self) -> tuple[Named, ...]:

@@ -31,7 +31,7 @@ run: {until: 5 s}
 reference: bonding
 """
 
-BODY_KEYS = "Known: C, E, H, capacity, stiffness, temperature."
+BODY_KEYS = "Known: C, E, H, capacity, conduction, stiffness, temperature."
 RUN_KEYS = "Known: accuracy, atol, first, max-seconds, max-steps, outputs, rtol, solver, spacing, times, until."
 
 MISTAKES = [

@@ -5,7 +5,9 @@ import pytest
 import thermodynamics as laws
 
 import surfacechem
+from surfacechem import spatial
 from surfacechem.achieved import against_exact, against_tighter
+from surfacechem.assembly import assemble
 from surfacechem.case import names
 from surfacechem.simulation import Simulation
 
@@ -18,6 +20,9 @@ STOPPED = {
 
 FLAGGED = ("debonding-cooling",)
 """Cases that are shown because they violate the second law."""
+
+CELLS = {"sudden-contact": 1e-4, "epoxy-cure-thick": 1e-4}
+"""Cases whose bodies are divided into cells, and the accuracy that these have."""
 
 every_case = pytest.mark.parametrize("name", names())
 
@@ -48,15 +53,15 @@ def test_meets_its_exact_solution(simulations, name):
     accuracy = simulation.run().accuracy
     if simulation.case.reference:
         assert accuracy.source == f"exact solution {simulation.case.reference.name}"
-        assert accuracy.error < 1e-8
+        assert accuracy.error < CELLS.get(name, 1e-8)
     else:
         assert accuracy.source.startswith("estimate")
-        assert accuracy.error < 1e-7
+        assert accuracy.error < CELLS.get(name, 1e-7)
 
 
 @every_case
 def test_both_laws_hold_on_the_equations(simulations, name):
-    system = load(simulations, name).system
+    system = assemble(spatial.few(load(simulations, name).case.scene))
     point = laws.consistent_point(system, 0)
     digits = 12 if load(simulations, name).case.mechanism_text else laws.DIGITS  # a mechanism's constants are doubles
     assert laws.first_law_holds(system, point, digits)

@@ -12,11 +12,21 @@ import surfacechem.data
 
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
-    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits"],
+    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits", "grids"],
     "contracts": ["terms", "substances", "scene"],
-    "core": ["balances", "variables", "refit", "system", "validity", "assembly.*", "compile", "kernelcache"],
+    "core": [
+        "balances",
+        "conductors",
+        "variables",
+        "refit",
+        "system",
+        "validity",
+        "assembly.*",
+        "compile",
+        "kernelcache",
+    ],
     "time": ["solvers.*", "marching", "equilibria", "jumps", "stretches", "events", "starting", "integrate"],
-    "results": ["accuracy", "solution", "audit", "extremes", "event_table", "detailedbalance"],
+    "results": ["accuracy", "profiles", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
         "achieved",
@@ -25,6 +35,8 @@ FLOORS = {
         "sweep_dataset",
         "sweep_plots",
         "precision",
+        "spatial",
+        "lumping",
         "stability",
         "check",
         "listing",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from surfacechem.assembly.bounds import released
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
+from surfacechem.assembly.conduction import conductors, profiles, slabs
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.folds import folds
@@ -33,6 +34,7 @@ __all__ = ["LOADABLE", "assemble"]
 
 STAGES = (
     temperatures,
+    slabs,
     prescribed_variables,
     programme,
     bonding_variables,
@@ -58,6 +60,7 @@ STAGES = (
     totals,
     touch,
     logarithmic_state,
+    profiles,
 )
 
 
@@ -84,6 +87,8 @@ def assemble(scene: Scene) -> System:
         capped=tuple(build.capped),
         pairs=tuple(build.pairs),
         paces=tuple(build.paces),
+        profiles=tuple(build.profiles),
+        conductors=tuple(conductors(build)),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
         cycles=tuple(build.cycles) if build.transitions else (),
@@ -120,7 +125,7 @@ def _outside(build: Build) -> Outside | None:
 
 def _refuse_idle_initial_values(build: Build) -> None:
     """An initial value belongs to something that evolves."""
-    states = {state.name for state in build.states}
+    states = {state.start or state.name for state in build.states}
     states |= {name for law in build.interface.frictions for name in law.internal.values()}
     for name in build.scene.initial:
         if name in states:

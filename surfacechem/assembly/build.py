@@ -9,7 +9,9 @@ from typing import Any
 
 import symengine
 
+from surfacechem import grids
 from surfacechem.balances import Node
+from surfacechem.conductors import Profile
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
@@ -81,6 +83,11 @@ class Build:
         self.nodes: dict[str, Node] = {}
         self.node_of: dict[str, Node] = {}
         """Node of each body name, of 'interface' and of 'surroundings'."""
+        self.slabs: dict[str, Any] = {}
+        """Bodies divided into cells, by name."""
+        self.resistances: dict[str, Expression] = {}
+        """L / k of the bodies that say how they conduct [m^2 K/W]."""
+        self.profiles: list[Profile] = []
         self.psi: Expression = symengine.Integer(0)
         self.states: list[State] = []
         self.named: list[Named] = []
@@ -274,6 +281,13 @@ class Build:
                 self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
             if math.isfinite(high):
                 self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
+
+    def volume(self, body: str) -> list[tuple[Node, Expression]]:
+        """The nodes of a body with their parts of its volume; the one at the contact is the first."""
+        if body not in self.slabs:
+            return [(self.node_of[body], symengine.Integer(1))]
+        slab = self.slabs[body]
+        return list(zip(slab.nodes, grids.shares(slab.points), strict=True))
 
     def shares(self) -> dict[str, Expression]:
         """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""

@@ -16,6 +16,9 @@ from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Account, Margin, State
 from surfacechem.terms import Load
 
+_NEWTON = 20
+"""Steps to a temperature from an energy that is close to quadratic."""
+
 COLD = 1e-9
 """Temperature that counts as zero [K]."""
 
@@ -40,7 +43,7 @@ def equations(build: Build) -> None:
         if node.prescribed:
             build.margins.append(_warm(node))
             _recovered_heat(build, node, rates)
-    if not build.states:
+    if not (build.states or build.slabs):
         raise InputError("there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve.")
 
 
@@ -101,11 +104,31 @@ def _temperature_state(build: Build, node: Node) -> None:
             f"nothing evolves or prescribes {node.name}: give {members[0].name} a heat capacity C, or its "
             "temperature a value."
         )
-    initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else build.initial(node.name)
+    initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else _initial(build, node)
     if not initial > 0:
         raise InputError(f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.")
     quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
     build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic))
+
+
+def _initial(build: Build, node: Node) -> float:
+    """Initial value; bodies that touch with different temperatures start from the one that keeps their energy."""
+    slabs = [build.slabs[name] for name, other in build.node_of.items() if other is node and name in build.slabs]
+    inside = [build.scene.initial.get(slab.profile) for slab in slabs]
+    if node.name in build.scene.initial or len(slabs) < len(node.energies) or None in inside:
+        return build.initial(node.name)
+    values = {p.symbol: p.value for p in build.parameters.items}
+    parts = [
+        (balances.internal_energy(node.energies[slab.body.name], node.T).subs(values), float(T))
+        for slab, T in zip(slabs, inside, strict=True)
+        if T is not None
+    ]
+    U = symengine.Add(*(part for part, _ in parts))
+    missing = U - sum(part.subs({node.T: T}) for part, T in parts)
+    T = sum(T for _, T in parts) / len(parts)
+    for _ in range(_NEWTON):
+        T -= float(missing.subs({node.T: T})) / float(derivative(missing, node.T).subs({node.T: T}))
+    return T
 
 
 def _members(build: Build, node: Node) -> str:

@@ -131,10 +131,11 @@ def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
     )
     produced = symengine.Integer(0)
     for body, share in zip(build.scene.bodies, (far.beta_1, 1 - far.beta_1), strict=True):
-        node = build.node_of[body.name]
-        node.inflow.append(share * symbol)
-        build.into_body[body.name] += share * symbol
-        produced += share * symbol / node.T
+        for node, part in build.volume(body.name):
+            node.inflow.append(share * part * symbol)
+            produced += share * part * symbol / node.T
+        contact = build.volume(body.name)[0][1]
+        build.into_body[body.name] += share * contact * symbol
     build.production(label, text, produced)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.sources import by_channel, by_source
 from surfacechem.balances import Node
-from surfacechem.expressions import Expression, derivative
+from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
 from surfacechem.system import Account, Sink
@@ -19,13 +17,14 @@ from surfacechem.system import Account, Sink
 def totals(build: Build) -> None:
     """Energies, entropies and the fluxes into the bodies."""
     energies, entropies = [], []
-    for node, member, F in _energies(build):
+    for member, parts in _energies(build).items():
         suffix = _suffix(build, member)
-        U = balances.internal_energy(F, node.T) if node else F
+        U = symengine.Add(*(balances.internal_energy(F, node.T) if node else F for node, F in parts))
         energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
-        if node and derivative(F, node.T) != 0:
+        S = symengine.Add(*(balances.entropy(F, node.T) for node, F in parts if node))
+        if S != 0:
             quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
-            entropies.append(build.name(quantity, balances.entropy(F, node.T)))
+            entropies.append(build.name(quantity, S))
     energies += build.motion.mechanical
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
@@ -38,12 +37,17 @@ def totals(build: Build) -> None:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
 
 
-def _energies(build: Build) -> Iterator[tuple[Node | None, str, Expression]]:
-    """Node, member and free energy of everything that stores energy; no node where there is no medium."""
-    for node in build.nodes.values():
-        yield from ((node, member, F) for member, F in node.energies.items() if F != 0)
+def _energies(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
+    """Nodes and free energies of every member that stores energy; no node where there is no medium."""
+    found: dict[str, list[tuple[Node | None, Expression]]] = {}
+    inside = [node for slab in build.slabs.values() for node in slab.inner]
+    for node in (*build.nodes.values(), *inside):
+        for member, F in node.energies.items():
+            if F != 0:
+                found.setdefault(member, []).append((node, F))
     if build.interface.temperature is None and build.psi != 0:
-        yield None, "interface", build.psi
+        found["interface"] = [(None, build.psi)]
+    return found
 
 
 def _suffix(build: Build, member: str) -> str:
@@ -86,7 +90,7 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
         flux = recovered if sharing else flux
         if not node.prescribed:
             _book_heat(build, k, body, recovered)
-            if sharing:
+            if sharing and not build.slabs:
                 by_source(build, k, body, flux)
             return flux
     _book_heat(build, k, body, flux)
@@ -106,7 +110,8 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     _jump_accounts(build)
     mounts = list(build.motion.far_fields.values())
     first = mounts[0].beta_1 if mounts else symengine.Rational(1, 2)
-    bodies = _merged([(build.node_of[b.name], s) for b, s in zip(build.scene.bodies, (first, 1 - first), strict=True)])
+    halves = zip(build.scene.bodies, (first, 1 - first), strict=True)
+    bodies = _merged([(node, s * part) for b, s in halves for node, part in build.volume(b.name)])
     centre = build.node_of.get("interface")
     stores = centre is not None and (centre.prescribed or balances.second(centre.free_energy, centre.T) != 0)
     return {"joint": bodies, "local": _merged([(centre, symengine.Integer(1))]) if centre and stores else bodies}

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from surfacechem import laws
 from surfacechem.assembly import LOADABLE
+from surfacechem.case.conduction import read_conduction
 from surfacechem.case.fields import choice, items, mapping, number
 from surfacechem.case.laws import build, history, law, law_list
 from surfacechem.case.mechanics import MOVING, STIFFNESS_KEYS, read_mountings, read_programme
@@ -29,6 +30,9 @@ NODE = re.compile(r"T[A-Za-z0-9_]*")
 
 OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
 """Names that stand for the temperature of body 1, of body 2 and of the interface."""
+
+BODY_KEYS = ("temperature", "capacity", "conduction", *STIFFNESS_KEYS)
+"""What a body may have beside the parameters of its energy."""
 
 BODY_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 TAKEN = ("interface", "surroundings", "reference")
@@ -80,7 +84,7 @@ class SceneReader:
             loading=loading,
             surroundings=surroundings,
             T_0=self._reference_temperature(),
-            initial=self._initial(interface, loading, moves=bool(normal or tangential)),
+            initial=self._initial(interface, loading, (first, second), moves=bool(normal or tangential)),
             normal=normal,
             tangential=tangential,
             programme=read_programme(self.top.get("programme"), self.units),
@@ -139,16 +143,20 @@ class SceneReader:
 
     def _body_fields(self, tree: Tree) -> dict[str, Tree]:
         parameters = [name for name, _ in self._body_kind(tree).specs()]
-        return mapping(tree, ["temperature", "capacity", *STIFFNESS_KEYS, *parameters])
+        return mapping(tree, [*BODY_KEYS, *parameters])
 
     def _body(self, k: int, name: str) -> Body:
         tree, temperature = self.bodies[name], self.temperatures[k]
         assert temperature is not None
         fields = self._body_fields(tree)
-        given = {key: child for key, child in fields.items() if key not in ("temperature", "capacity", *STIFFNESS_KEYS)}
-        if not given and "capacity" not in fields:
-            return Body(name, temperature)
-        return Body(name, temperature, build(self._body_kind(tree), tree, self.units, fields=given))
+        given = {key: child for key, child in fields.items() if key not in BODY_KEYS}
+        stores = given or "capacity" in fields
+        energy = build(self._body_kind(tree), tree, self.units, fields=given) if stores else None
+        if "conduction" not in fields:
+            return Body(name, temperature, energy)
+        if energy is None:
+            raise fields["conduction"].error(f"{name} conducts heat but stores none: give it a heat capacity C.")
+        return Body(name, temperature, energy, read_conduction(fields["conduction"], self.units, self._above_zero))
 
     # -- interface ------------------------------------------------------------------------------------------------
 
@@ -266,8 +274,13 @@ class SceneReader:
     def _reference_temperature(self) -> float | None:
         return number(self.top["T_0"], "K", "T_0", TEMPERATURE) if "T_0" in self.top else None
 
-    def _initial(self, interface: Interface, loading: Mapping[str, Load], moves: bool) -> dict[str, float]:
+    def _initial(
+        self, interface: Interface, loading: Mapping[str, Load], bodies: tuple[Body, Body], moves: bool
+    ) -> dict[str, float]:
         evolving = [name for name in self.nodes if name not in loading]
+        evolving += [
+            f"profile_{k}" for k, body in enumerate(bodies, start=1) if body.conduction and body.conduction.cells
+        ]
         if interface.limits or any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
             evolving += ["phi", "ln_phi"]
         if moves or "programme" in self.top or {"F_n", "F_t", "u_t"} & set(loading):

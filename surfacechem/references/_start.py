@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from surfacechem.integrate import Trajectory
 from surfacechem.references._energy import ConstantCapacity, QuadraticEnergy
+from surfacechem.references._slabs import HELD
 from surfacechem.scene import Scene
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ class Start:
         self.run, self.scene = run, scene
         system = run.model.system
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
-        self.initial = {state.name: run.values[f"initial.{state.name}"] for state in system.states}
+        self.initial = {state.name: run.values[state.path] for state in system.states}
 
     @cached_property
     def named(self) -> dict[str, float]:
@@ -36,6 +37,15 @@ class Start:
         """Rates of the states."""
         states = self.run.model.system.states
         return {state.name: float(rate) for state, rate in zip(states, self.run.rates[0], strict=True)}
+
+    def inside(self, k: int) -> float:
+        """Initial temperature inside body k, where it is not that of the contact."""
+        return self.run.values[f"initial.profile_{k}"]
+
+    def far_conductance(self, k: int) -> float:
+        """Conductance at the far side of body k, without end where that is held."""
+        given = f"h_far_{k}" in self.parameters
+        return self.parameters[f"h_far_{k}"] if given else HELD * (self.named[f"T_far_{k}"] > 0)
 
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
@@ -153,6 +163,11 @@ RULES: dict[str, Callable[[Start], float]] = {
     "delta_T": lambda s: s.parameters["H_r"] / s.capacity() if s.capacity() else 0.0,
     "h": lambda s: s.conductance(lambda ends: True),
     "H": lambda s: s.conductance(lambda ends: True),
+    "R": lambda s: 1 / s.conductance(lambda ends: True),
+    "T_1": lambda s: s.inside(1),
+    "T_2": lambda s: s.inside(2),
+    "h_far_1": lambda s: s.far_conductance(1),
+    "h_far_2": lambda s: s.far_conductance(2),
     "h_1": lambda s: s.into(1),
     "h_2": lambda s: s.into(2),
     "k": lambda s: s.held_at("k"),

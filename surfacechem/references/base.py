@@ -26,6 +26,8 @@ class Reference(ABC):
     """An exact solution. Subclasses become frozen, keyword-only dataclasses and state `quantities`."""
 
     name: ClassVar[str]
+    continuous: ClassVar[bool] = False
+    """Whether it solves for bodies without cells, so that a scene meets it but for the error of its cells."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

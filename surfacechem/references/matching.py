@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.integrate import Trajectory
+from surfacechem.references._across import across
 from surfacechem.references._start import Start
 from surfacechem.references.base import Reference
 from surfacechem.scene import Scene
@@ -38,6 +39,8 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
     reference = match(references.get(name), options, start)
     solution = partial(_solution, reference, start)
     exact = solution(run.result.times)
+    if reference.continuous:
+        return across(reference, exact, scene, run)
     _check_start(exact, run)
     _check(solution, run)
     return exact
@@ -71,7 +74,7 @@ def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     system = run.model.system
     known = [state.name for state in system.states] + [item.name for item in system.outputs]
     stands_for = {
-        "T": [state.name for state in system.states if state.quantity.unit == "K"],
+        "T": [s.name for s in system.states if s.quantity.unit == "K" and s.name not in system.inside],
         "R_c": [name for name in known if name.startswith("R_")],
         "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
     }
@@ -98,11 +101,11 @@ def _check(solution: Solution, run: Trajectory) -> None:
         return  # the run ended at its start
     probes, since = _probes(run)
     y, ydot = _along(solution, run, probes, since)
-    problem, program, n = run.result.problem, run.model.program, len(run.model.system.states)
+    problem, program = run.result.problem, run.model.program
     segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
     inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
     misses = program.residual(inputs)
-    terms = program.jacobian(inputs)[:, n * n :].reshape(-1, n, n) * ydot[:, None, :]
+    terms = program.derivatives(inputs)[1] * ydot[:, None, :]
     sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
     # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)

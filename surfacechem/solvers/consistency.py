@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.lu import factor, solve
+from surfacechem.solvers.chains import factor_with_chains, solve_with_chains
 from surfacechem.solvers.native import (
     COLUMNS,
     DELTA,
@@ -39,9 +39,26 @@ def _residual(w: Any) -> bool:
 
 
 @compiled
+def _chain_matrix(w: Any) -> None:
+    """Derivatives by the unknowns where chains are concerned; of a chain the rates are."""
+    core = w.real.shape[0]
+    for c in range(w.chains.shape[0]):
+        anchor = w.chains[c, 2]
+        for i in range(core):
+            w.real_border[i, c] = w.border_derivatives[1, i, c]
+        for i in range(w.chains[c, 0] - core, w.chains[c, 1] - core):
+            for side in range(3):
+                w.real_bands[i, side] = w.band_derivatives[1, i, side]
+            w.vector[COLUMNS, core + i] = 1.0
+        if anchor >= 0 and w.algebraic[anchor]:
+            w.real_bands[w.chains[c, 0] - core, 0] = w.band_derivatives[0, w.chains[c, 0] - core, 0]
+
+
+@compiled
 def _factor(w: Any) -> bool:
-    n = w.algebraic.shape[0]
+    n = w.real.shape[0]
     evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
+    _chain_matrix(w)
     for j in range(n):
         largest = 0.0
         for i in range(n):
@@ -52,7 +69,12 @@ def _factor(w: Any) -> bool:
                 row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]))
             largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
         w.vector[COLUMNS, j] = 1.0 / largest if largest > 0.0 else 1.0
-    return bool(factor(w.real, w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT))
+    parts = w.real_border, w.real_bands, w.chains
+    return bool(
+        factor_with_chains(
+            w.real, parts[0], parts[1], parts[2], w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT
+        )
+    )
 
 
 @compiled
@@ -61,7 +83,7 @@ def _correction(w: Any, delta: Any) -> float:
     norm = 0.0
     for j in range(delta.shape[0]):
         delta[j] = -w.vector[RHS, j]
-    solve(w.real, w.order[0], delta)
+    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], delta)
     for j in range(delta.shape[0]):
         if w.algebraic[j]:
             norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290))
@@ -97,12 +119,15 @@ def _damped(w: Any, delta: Any) -> bool:
 @compiled
 def _row_units(w: Any) -> None:
     """Inverse row sizes of the matrix into ERROR, the units of a residual."""
-    n = w.algebraic.shape[0]
+    n = w.real.shape[0]
     for i in range(n):
         row = 0.0
         for m in range(n):
             row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]) * w.vector[COLUMNS, m])
         w.vector[ERROR, i] = 1.0 / row if row > 0.0 else 0.0
+    for i in range(w.band_derivatives.shape[1]):
+        row = abs(w.band_derivatives[1, i, 1])
+        w.vector[ERROR, n + i] = 1.0 / row if row > 0.0 else 0.0
 
 
 @compiled

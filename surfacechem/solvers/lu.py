@@ -13,7 +13,8 @@ from surfacechem.solvers.native import compiled
 
 
 @compiled
-def _size(value: Any) -> float:
+def size_of(value: Any) -> float:
+    """Size of a real or complex number without a root."""
     return float(abs(value.real) + abs(value.imag))
 
 
@@ -23,7 +24,7 @@ def _row_scales(a: Any, columns: Any, rows: Any) -> bool:
     for i in range(n):
         largest = 0.0
         for j in range(n):
-            largest = max(largest, _size(a[i, j]) * columns[j])
+            largest = max(largest, size_of(a[i, j]) * columns[j])
         if not 0.0 < largest < np.inf:
             return False
         rows[i] = 1.0 / largest
@@ -41,7 +42,7 @@ def _swap(a: Any, rows: Any, k: int, p: int) -> None:
 def _pivot(a: Any, rows: Any, k: int) -> int:
     p, best = k, -1.0
     for i in range(k, a.shape[0]):
-        size = _size(a[i, k]) * rows[i]
+        size = size_of(a[i, k]) * rows[i]
         if size > best:
             p, best = i, size
     return p
@@ -57,7 +58,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
         return False
     for k in range(n):
         p = _pivot(a, rows, k)
-        if not _size(a[p, k]) * rows[p] * columns[k] > threshold:
+        if not size_of(a[p, k]) * rows[p] * columns[k] > threshold:
             return False
         order[k] = p
         if p != k:
@@ -74,7 +75,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
 
 @compiled
 def solve(a: Any, order: Any, x: Any) -> None:
-    """Overwrite the right-hand side by the solution."""
+    """Overwrite the right-hand side by the solution; entries of x beyond the matrix are left alone."""
     n = a.shape[0]
     for k in range(n):
         x[k], x[order[k]] = x[order[k]], x[k]

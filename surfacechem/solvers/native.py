@@ -34,7 +34,9 @@ def compiled(function: Any, counted: bool = False) -> Any:
 
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
-"""Rows of the table of addresses (code, user data)."""
+FUNCTIONS = 4
+"""Rows of the table of addresses (code, user data, function, place in its result); further rows are later parts of
+functions that are compiled in pieces."""
 
 ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = range(13)
 """Rows of the vectors of length n."""
@@ -56,6 +58,7 @@ class Work(NamedTuple):
 
     code: Any
     algebraic: Any
+    chains: Any
     inputs: Any
     clock: Any
     count: Any
@@ -65,8 +68,14 @@ class Work(NamedTuple):
     g: Any
     pairs: Any
     jacobian: Any
+    border_derivatives: Any
+    band_derivatives: Any
     real: Any
+    real_border: Any
+    real_bands: Any
     complex: Any
+    complex_border: Any
+    complex_bands: Any
     order: Any
     z_polynomial: Any
     ledger: Any
@@ -149,6 +158,9 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
 def evaluate(w: Any, which: int, out: int) -> None:
     """Call a function of the program on the current inputs; ``out`` is the address of the result."""
     _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
+    for part in range(FUNCTIONS, w.code.shape[0]):
+        if w.code[part, 2] == which:
+            _call(w.code[part, 0], out + 8 * w.code[part, 3], w.inputs.ctypes.data, w.code[part, 1])
 
 
 @compiled
@@ -215,14 +227,19 @@ def _take(_context: Any, cursor: Any, shape: Any, kind: Any) -> Any:
 
 
 @partial(compiled, counted=True)
-def lay_out(code: Any, algebraic: Any, cursor: Any, n_parameters: int, n_ledger: int, n_margins: int) -> Work:
+def lay_out(
+    code: Any, algebraic: Any, chains: Any, cursor: Any, n_parameters: int, n_ledger: int, n_margins: int
+) -> Work:
     """Workspace of a trajectory on the zeros from the cursor's address on; leaves their end there. No memory is
-    touched.
+    touched. The three arrays of derivatives follow each other, as the compiled function writes them.
     """
-    n = algebraic.shape[0]
+    n, links = algebraic.shape[0], chains.shape[0]
+    core = chains[0, 0] if links > 0 else n
+    cells = n - core
     return Work(
         code,
         algebraic,
+        chains,
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
         _take(cursor, (10,), np.float64),
         _take(cursor, (11,), np.int64),
@@ -231,10 +248,16 @@ def lay_out(code: Any, algebraic: Any, cursor: Any, n_parameters: int, n_ledger:
         _take(cursor, (7, n), np.float64),
         _take(cursor, (7, n), np.float64),
         _take(cursor, (3, n), np.complex128),
-        _take(cursor, (2, n, n), np.float64),
-        _take(cursor, (n, n), np.float64),
-        _take(cursor, (3, n, n), np.complex128),
-        _take(cursor, (4, n), np.int64),
+        _take(cursor, (2, core, core), np.float64),
+        _take(cursor, (2, core, links), np.float64),
+        _take(cursor, (2, cells, 3), np.float64),
+        _take(cursor, (core, core), np.float64),
+        _take(cursor, (core, links), np.float64),
+        _take(cursor, (cells, 3), np.float64),
+        _take(cursor, (3, core, core), np.complex128),
+        _take(cursor, (3, core, links), np.complex128),
+        _take(cursor, (3, cells, 3), np.complex128),
+        _take(cursor, (4, core), np.int64),
         _take(cursor, (n, 9), np.float64),
         _take(cursor, (4, n_ledger), np.float64),
         _take(cursor, (7, n_ledger), np.float64),

@@ -7,8 +7,8 @@ about to fail, so smooth runs do not pay for it.
 
 from typing import Any
 
-from surfacechem.solvers.lu import solve
-from surfacechem.solvers.native import DELTA, MEMBER, NOISE, SCALE, YDOT, Y, compiled
+from surfacechem.solvers.chains import solve_with_chains
+from surfacechem.solvers.native import DELTA, MEMBER, NOISE, SCALE, YDOT, Y, clear, compiled
 from surfacechem.solvers.radau_tables import GAMMA
 
 ULPS = 4.4e-16
@@ -22,9 +22,37 @@ LARGEST = 1e-6
 def _row_noise(w: Any, i: int) -> float:
     """Rounding error of equation i, whose terms are as large as its derivatives times their variables."""
     total = 0.0
-    for j in range(w.algebraic.shape[0]):
+    for j in range(w.jacobian.shape[1]):
         total += abs(w.jacobian[0, i, j] * w.vector[Y, j]) + abs(w.jacobian[1, i, j] * w.vector[YDOT, j])
+    for c in range(w.chains.shape[0]):
+        j = w.chains[c, 0]
+        total += abs(w.border_derivatives[0, i, c] * w.vector[Y, j])
+        total += abs(w.border_derivatives[1, i, c] * w.vector[YDOT, j])
     return ULPS * total
+
+
+@compiled
+def _chain_noise(w: Any, column: Any) -> None:
+    """Rounding errors of the equations of all chains, into their places in the column."""
+    core = w.jacobian.shape[1]
+    for c in range(w.chains.shape[0]):
+        first, end, anchor = w.chains[c, 0], w.chains[c, 1], w.chains[c, 2]
+        for i in range(first, end):
+            total = 0.0
+            for side in range(3):
+                j = anchor if side == 0 and i == first else i + side - 1
+                if 0 <= j < end:
+                    total += abs(w.band_derivatives[0, i - core, side] * w.vector[Y, j])
+                    total += abs(w.band_derivatives[1, i - core, side] * w.vector[YDOT, j])
+            column[i] = ULPS * total
+
+
+@compiled
+def _add_image(w: Any, column: Any) -> None:
+    """What this residual does to the solution, added to the noise."""
+    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], column)
+    for j in range(column.shape[0]):
+        w.vector[NOISE, j] += abs(column[j])
 
 
 @compiled
@@ -34,13 +62,15 @@ def find_noise(w: Any) -> None:
     column = w.vector[DELTA]
     for j in range(n):
         w.vector[NOISE, j] = ULPS * abs(w.vector[Y, j])
-    for i in range(n):
-        for j in range(n):
-            column[j] = 0.0
+    for i in range(w.jacobian.shape[1]):
+        clear(column)
         column[i] = _row_noise(w, i)
-        solve(w.real, w.order[0], column)
-        for j in range(n):
-            w.vector[NOISE, j] += abs(column[j])
+        _add_image(w, column)
+    if w.chains.shape[0] > 0:
+        # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
+        clear(column)
+        _chain_noise(w, column)
+        _add_image(w, column)
     for j in range(n):
         w.vector[NOISE, j] = min(w.vector[NOISE, j], LARGEST * w.vector[SCALE, j])
 

@@ -33,7 +33,7 @@ _STATUSES = tuple(Status)
 LOOSEST = 3e-5
 """Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
 
-TIMES = 10
+TIMES = 11
 """Where segments and output times stand among the arguments of the compiled entry point."""
 
 
@@ -70,6 +70,7 @@ class _Tables:
         self.arguments = (
             program.addresses,
             program.algebraic_mask,
+            program.chain_table,
             q,
             max_steps,
             self.stop,
@@ -300,7 +301,8 @@ def search_arguments(program: Program, ends: Array, table: Array, counts: NDArra
     """
     none, nothing = np.zeros(0), _no_rows(len(ends))
     return (
-        0, len(ends), program.addresses, program.algebraic_mask, 0, 0, counts[0], 1.0, np.ones(program.n), _kinds(()),
+        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, 0, 0, counts[0], 1.0,
+        np.ones(program.n), _kinds(()),
         ends, table, none, none, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 

@@ -224,6 +224,7 @@ def run_batch(
     last: int,
     code: Any,
     algebraic: Any,
+    chains: Any,
     n_ledger: int,
     max_steps: int,
     stop: Any,
@@ -244,10 +245,10 @@ def run_batch(
     threads. Without segments the rows of ``ends`` are made consistent; parameters may then be one row for all.
     """
     place = np.zeros(1, np.int64)
-    lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0])
+    lay_out(code, algebraic, chains, place, parameters.shape[2], n_ledger, kinds.shape[0])
     memory = np.zeros(place[0] // 8, np.int64)
     place[0] = memory.ctypes.data
-    w = reference(lay_out(code, algebraic, place, parameters.shape[2], n_ledger, kinds.shape[0]))
+    w = reference(lay_out(code, algebraic, chains, place, parameters.shape[2], n_ledger, kinds.shape[0]))
     w.clock[RTOL] = rtol
     w.clock[LOOSE] = loosening(rtol)
     copy(atol, w.vector[ATOL])

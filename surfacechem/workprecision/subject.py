@@ -31,7 +31,8 @@ class Subject:
     @property
     def states(self) -> list[str]:
         """Names of the states."""
-        return [state.name for state in self.model.system.states]
+        system = self.model.system
+        return [state.name for state in system.states if state.name not in system.inside]
 
     @property
     def names(self) -> list[str]:

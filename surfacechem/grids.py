@@ -1,0 +1,30 @@
+"""Grids across a body: points from the contact to the far side, as fractions of the thickness."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+
+def points(cells: int, grading: float = 1.0) -> tuple[float, ...]:
+    """Points of so many cells whose width grows from the contact by ``grading`` in all, in equal ratios.
+
+    The mapping is smooth and the same for every number of cells, so that halving the cells shows the error.
+
+    >>> points(4)
+    (0.0, 0.25, 0.5, 0.75, 1.0)
+    >>> points(2, grading=9.0)
+    (0.0, 0.25, 1.0)
+    """
+    if grading == 1.0:
+        return tuple(i / cells for i in range(cells + 1))
+    return (*((grading ** (i / cells) - 1) / (grading - 1) for i in range(cells)), 1.0)
+
+
+def shares(at: tuple[float, ...]) -> tuple[float, ...]:
+    """Part of the volume that belongs to each point: half of the cells on either side.
+
+    >>> shares((0.0, 0.25, 1.0))
+    (0.125, 0.5, 0.375)
+    """
+    widths = [b - a for a, b in pairwise(at)]
+    return tuple((a + b) / 2 for a, b in zip([0.0, *widths], [*widths, 0.0], strict=True))

@@ -1,0 +1,68 @@
+"""LU decomposition of a matrix whose last variables form chains, such as the temperatures across a body.
+
+The state is [core | chain | chain ...]. In a chain, numbered from the core outwards, each equation reads its own
+variable and its two neighbours; the first one's inner neighbour is one variable of the core, the anchor. The core reads
+the first variable of each chain. A chain is eliminated from its far end, which leaves a correction of one column of
+the core, at a cost proportional to its length. Nothing is exchanged within a chain: where heat is conducted between
+capacities its matrix is diagonally dominant.
+
+A chain is a row (first, end, anchor) of a table, the anchor -1 where the chain hangs on nothing; its equations are rows
+(inwards, own, outwards) of the bands; the border holds how the core reads the first variable of each chain.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solvers.lu import factor, size_of, solve
+from surfacechem.solvers.native import compiled
+
+
+@compiled
+def _eliminate(bands: Any, first: int, end: int) -> bool:
+    """Remove the outward entries; leaves inverse pivots and the factors of the right-hand side."""
+    for i in range(end - 1, first - 1, -1):
+        if i < end - 1:
+            bands[i, 2] *= bands[i + 1, 1]
+            bands[i, 1] -= bands[i, 2] * bands[i + 1, 0]
+        if not 0.0 < size_of(bands[i, 1]) < np.inf:
+            return False
+        bands[i, 1] = 1.0 / bands[i, 1]
+    return True
+
+
+@compiled
+def factor_with_chains(
+    core: Any, border: Any, bands: Any, chains: Any, order: Any, columns: Any, rows: Any, threshold: float
+) -> bool:
+    """Replace the matrix by its factors; False where a pivot vanishes."""
+    n = core.shape[0]
+    for c in range(chains.shape[0]):
+        first, anchor = chains[c, 0] - n, chains[c, 2]
+        if not _eliminate(bands, first, chains[c, 1] - n):
+            return False
+        for i in range(n):
+            border[i, c] *= bands[first, 1]
+            if anchor >= 0:
+                core[i, anchor] -= border[i, c] * bands[first, 0]
+    return bool(factor(core, order, columns, rows, threshold))
+
+
+@compiled
+def solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: Any, x: Any) -> None:
+    """Overwrite the right-hand side by the solution."""
+    n = core.shape[0]
+    for c in range(chains.shape[0]):
+        first = chains[c, 0]
+        for i in range(chains[c, 1] - 2, first - 1, -1):
+            x[i] -= bands[i - n, 2] * x[i + 1]
+        for i in range(n):
+            x[i] -= border[i, c] * x[first]
+    solve(core, order, x)
+    for c in range(chains.shape[0]):
+        first, anchor = chains[c, 0], chains[c, 2]
+        if anchor >= 0:
+            x[first] -= bands[first - n, 0] * x[anchor]
+        x[first] *= bands[first - n, 1]
+        for i in range(first + 1, chains[c, 1]):
+            x[i] = (x[i] - bands[i - n, 0] * x[i - 1]) * bands[i - n, 1]
