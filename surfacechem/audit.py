@@ -169,7 +169,7 @@ class _Books:
 
     def production(self) -> tuple[dict[str, float], dict[str, float]]:
         """Least and largest entropy production of each law over outputs and steps."""
-        values = self.trajectory.everywhere
+        values = self.trajectory.within_bounds
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
         columns = {law: values[f"sigma_{law}"] for law in laws if len(values.get(f"sigma_{law}", ()))}
         return (

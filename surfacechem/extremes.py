@@ -25,8 +25,7 @@ def capped_rates(trajectory: Trajectory) -> list[str]:
         if largest > EXPONENT_CAP:
             found.append(
                 f"{law.title}: an exponent of its rate reached {largest:.4g}; above {EXPONENT_CAP:g} the rate goes on "
-                "along its tangent, so that it is instantaneous, but not the one stated, and its balances are not "
-                "resolved"
+                "along its tangent: it is instantaneous, but not the one stated"
             )
     return found
 

@@ -114,6 +114,19 @@ class Trajectory:
         return dict(zip(names, states.T, strict=True)) | dict(zip(outputs, named.T, strict=True))
 
     @cached_property
+    def within_bounds(self) -> dict[str, Array]:
+        """Named quantities at the output times and at every step, where rounding has carried no bonds below none."""
+        result, steps = self.result, self.result.steps
+        bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
+        columns = np.array([state.name in bonds for state in self.model.system.states])
+        points = [(result.times, result.outputs, self.rates)] + ([(steps.t, steps.y, steps.ydot)] if steps else [])
+        if all(np.all(y[:, columns] >= 0) for _, y, _ in points):
+            return self.everywhere
+        clipped = [self.model.evaluate(result, t, np.where(columns, np.maximum(y, 0), y), v) for t, y, v in points]
+        names = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, np.concatenate(clipped).T, strict=True))
+
+    @cached_property
     def outputs(self) -> Array:
         """Named quantities at the output times, shape (times, outputs)."""
         return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)

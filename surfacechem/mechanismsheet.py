@@ -194,6 +194,7 @@ def _source(law: type[SurfaceReaction]) -> str:
 
 def remarks(curves: Curves) -> Iterator[str]:
     """What is odd about a mechanism, though not wrong."""
+    yield from curves.mechanism.remarks
     idle = set(curves.mechanism.species.values())
     around = [name for name, item in curves.species.items() if item.interactions]
     if around:

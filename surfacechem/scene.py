@@ -198,6 +198,8 @@ class Interface:
     medium: Medium | None = None
     engine: Engine | None = None
     """What evaluates those rates that are not formulas."""
+    remarks: Sequence[str] = ()
+    """What a reader of the results has to know about where the laws come from."""
 
 
 @dataclass(frozen=True)

@@ -207,18 +207,29 @@ class Sweep:
     @cached_property
     def destroys_entropy(self) -> NDArray[np.bool_]:
         """Which runs have a law that destroys entropy beyond their tolerance."""
-        largest = [np.nanmax(np.abs(rate), axis=1) for rate in self._productions]
+        rates = self._productions()
+        largest = [np.nanmax(np.abs(rate), axis=1) for rate in rates]
         rounding = EPSILON * np.max(largest, axis=0, initial=0.0)
-        low = [np.nanmin(rate, axis=1) for rate in self._productions]
+        low = [np.nanmin(rate, axis=1) for rate in rates]
         pairs = zip(low, largest, strict=True)
         found = [least < -(SLACK * self.run.rtol * high + rounding) for least, high in pairs]
         return np.any(found, axis=0) if found else np.zeros(len(self), dtype=bool)
 
-    @property
     def _productions(self) -> list[Array]:
-        """Entropy production of each law, [run, output]."""
-        laws = [account.law for account in self.model.system.ledger if account.kind == "entropy production"]
-        return [self.named[f"sigma_{law}"] for law in laws if f"sigma_{law}" in self.named]
+        """Entropy production of each law, [run, output], where rounding has carried no bonds below none."""
+        system, rows = self.model.system, self._inputs[self.reached]
+        bonds = {account.law for account in system.ledger if account.kind == "bonds"}
+        columns = [1 + j for j, state in enumerate(system.states) if state.name in bonds]
+        rows[:, columns] = np.maximum(rows[:, columns], 0.0)
+        outputs = self.model.output_function(rows)
+        laws = [account.law for account in system.ledger if account.kind == "entropy production"]
+        names = [item.name for item in system.outputs]
+        found = []
+        for name in (f"sigma_{law}" for law in laws if f"sigma_{law}" in names):
+            values = np.full(self.reached.shape, np.nan)
+            values[self.reached] = outputs[:, names.index(name)]
+            found.append(values)
+        return found
 
     def _residual(self, total: str, prefix: str, booked: Sequence[Array], exchanged: Sequence[Array]) -> Array:
         """What a total changed by without being booked, relative to the largest part that was exchanged."""

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import surfacechem
 from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, species_of, states
 from surfacechem.assembly import assemble
+from surfacechem.data import mechanisms
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity
@@ -204,3 +205,15 @@ def test_a_run_that_leaves_the_range_of_the_thermodynamic_data_says_so():
     assert inside.warnings == ()
     assert "ideal mixture is an extrapolation: T_c ran from" in outside.warnings[0]
     assert outside.attributes["warnings"] == outside.warnings[0]
+
+
+def test_what_cantera_warns_of_is_a_warning_of_the_run(tmp_path):
+    """Polynomials that do not meet make the heat content jump."""
+    text = (mechanisms() / "selectin.yaml").read_text()
+    constant = next(line for line in text.splitlines() if "model: constant-cp" in line and "h0: 0 kJ/mol" in line)
+    data = "[[2.5, 0, 0, 0, 0, -100, 1], [2.6, 0, 0, 0, 0, -100, 1]]"
+    broken = f"  thermo: {{model: NASA7, temperature-ranges: [200, 310, 1000], data: {data}}}"
+    (tmp_path / "broken.yaml").write_text(text.replace(constant, broken, 1))
+    mechanism = load_mechanism(tmp_path / "broken.yaml")
+    assert len(mechanism.remarks) == 2
+    assert all("broken.yaml: Cantera: NasaPoly2::validate: For species" in remark for remark in mechanism.remarks)

@@ -98,7 +98,11 @@ def assemble(scene: Scene) -> System:
         sinks=taking,
         given=dict(build.motion.given),
         fit=build.fit() if build.fit else None,
-        warnings=(*build.warnings, *(f"loading: {name} is prescribed but nothing reads it." for name in unread)),
+        warnings=(
+            *build.interface.remarks,
+            *build.warnings,
+            *(f"loading: {name} is prescribed but nothing reads it." for name in unread),
+        ),
         outside=_outside(build),
     )
 

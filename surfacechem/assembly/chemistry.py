@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import symengine
@@ -10,12 +10,16 @@ import symengine
 from surfacechem import balances
 from surfacechem.assembly.bounds import free_to_react
 from surfacechem.assembly.build import Bond, Build
+from surfacechem.assembly.force import RESOLUTION, SHARED
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.softening import softening
-from surfacechem.expressions import Expression, depends, derivative, exponents
+from surfacechem.expressions import Expression, depends, derivative, exponents, where
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Capped
 from surfacechem.terms import RateLaw
+
+MARGIN = 4
+"""How much faster than bonds count as ruptured they may still break."""
 
 
 def reactions(build: Build) -> None:
@@ -85,7 +89,25 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     build.law_ranges(law)
     if found := exponents(rate):
         build.capped.append(Capped(law.title, tuple(found)))
+        return _resolved(build, law, rate, found)
     return rate
+
+
+def _resolved(build: Build, law: RateLaw, rate: Expression, found: Sequence[Expression]) -> Expression:
+    """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case."""
+    loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
+    if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
+        return rate  # bonds that share a load rupture, which ends the run before
+    if not any(loads & exponent.free_symbols for exponent in found):
+        return rate
+    relaxation: Expression = symengine.Integer(0)
+    for name, nu in law.stoichiometry().items():
+        bond = build.bonding[name]
+        relaxation -= nu * derivative(rate, bond.symbol) / bond.density
+    if relaxation == 0:
+        return rate
+    steps = relaxation * (build.t * RESOLUTION / MARGIN)
+    return rate * where(steps > 1, 1 / steps, 1)
 
 
 def _prescribed_bonding(build: Build) -> None:

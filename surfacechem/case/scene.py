@@ -194,6 +194,7 @@ class SceneReader:
             loss,
             medium,
             mechanism.engine,
+            mechanism.remarks,
         )
 
     def _partition(self) -> tuple[float, float]:

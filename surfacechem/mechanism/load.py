@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,6 +48,8 @@ class Mechanism:
     """Range in which the thermo of every species holds [K]."""
     engine: Engine | None = None
     """What evaluates the rates that are not lowered."""
+    remarks: tuple[str, ...] = ()
+    """What is odd about the file, though not wrong."""
 
     def coverages(self, given: Mapping[str, float], place: Place | None = None) -> dict[str, float]:
         """Initial values from coverages by species; those not given are zero, and all must sum to one."""
@@ -76,7 +79,7 @@ def load_mechanism(
     source = Source(str(path), path.read_text(encoding="utf-8"))
     entry = source.phase(phase, place)
     check(source, entry, evaluate)
-    surface = _cantera(source, entry)
+    surface, remarks = _cantera(source, entry)
     species = _species(surface, source, entry)
     chosen = _bonds(species, bonds, place)
     density = surface.site_density * KILO * AVOGADRO
@@ -96,6 +99,7 @@ def load_mechanism(
         phase=str(entry["name"]),
         temperatures=temperatures,
         engine=_engine(surface, species, reactions),
+        remarks=remarks,
     )
 
 
@@ -114,14 +118,18 @@ def _find(path: Path, place: Place | None) -> Path:
     raise InputError(f"no mechanism file {path}.{suggestion(path.name, known)}", place)
 
 
-def _cantera(source: Source, phase: Any) -> Any:
-    """The phase as Cantera reads it; its errors keep their line."""
+def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
+    """The phase as Cantera reads it, and what it warns of; its errors keep their line."""
     import cantera
 
     try:
-        return cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            surface = cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
         raise _translated(str(error), source) from None
+    said = dict.fromkeys(" ".join(str(item.message).split()) for item in caught)
+    return surface, tuple(f"{source.file}: Cantera: {text}" for text in said)
 
 
 def _plain_text(source: Source, phase: Any) -> str:
@@ -141,7 +149,9 @@ def _translated(text: str, source: Source) -> InputError:
     found = re.search(r"[Ee]rror on lines? (\d+)", text)
     noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
     lines = [line.strip() for line in text.splitlines()]
-    message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
+    message = (
+        " ".join(line for line in dict.fromkeys(lines) if not noise.search(line)) or "the mechanism cannot be read"
+    )
     return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
 
 
