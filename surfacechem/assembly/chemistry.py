@@ -30,7 +30,7 @@ def reactions(build: Build) -> None:
     pairs = opposed(laws)
     together = {label: pair.label for pair in pairs for label in pair.labels}
     affinities = {label: sum(n * mu[x] for x, n in law.stoichiometry().items()) for label, law in laws.items()}
-    rates = {label: _rate(build, law, affinities[label]) for label, law in laws.items()}
+    rates = {label: _rate(build, law, label, affinities[label]) for label, law in laws.items()}
     free = _free(build, laws, rates)
     for label, law in laws.items():
         nu, affinity = law.stoichiometry(), affinities[label]
@@ -79,7 +79,7 @@ def _free(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Express
     return free_to_react(build, symengine.Add(*(nu[label] * rate for label, rate in rates.items())))
 
 
-def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
+def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:
     own = {"mu": affinity, "t": build.t}
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
@@ -89,11 +89,11 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     build.law_ranges(law)
     if found := exponents(rate):
         build.capped.append(Capped(law.title, tuple(found)))
-        return _resolved(build, law, rate, found)
+        return _resolved(build, law, label, rate, found)
     return rate
 
 
-def _resolved(build: Build, law: RateLaw, rate: Expression, found: Sequence[Expression]) -> Expression:
+def _resolved(build: Build, law: RateLaw, label: str, rate: Expression, found: Sequence[Expression]) -> Expression:
     """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case."""
     loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
     if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
@@ -106,7 +106,8 @@ def _resolved(build: Build, law: RateLaw, rate: Expression, found: Sequence[Expr
         relaxation -= nu * derivative(rate, bond.symbol) / bond.density
     if relaxation == 0:
         return rate
-    steps = relaxation * (build.t * RESOLUTION / MARGIN)
+    quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
+    steps = build.name(quantity, relaxation * (build.t * RESOLUTION / MARGIN), output=False)
     return rate * where(steps > 1, 1 / steps, 1)
 
 
