@@ -52,6 +52,8 @@ class Audit:
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
     largest: Mapping[str, float]
     """Largest entropy production of each dissipative law [W/(m^2 K)]."""
+    destroyed: Mapping[str, float]
+    """Part of what each dissipative law turns over that it destroys: nothing where it does so for no time at all."""
 
     @property
     def energy_error(self) -> float:
@@ -73,7 +75,10 @@ class Audit:
         """Laws that destroyed entropy beyond the tolerance of the run, or whose production is not a number."""
         rounding = EPSILON * max((abs(high) for high in self.largest.values()), default=0.0)
         allowed = {law: SLACK * self.rtol * abs(high) + rounding for law, high in self.largest.items()}
-        return tuple(law for law, low in self.least.items() if not low >= -allowed[law])
+        brief = SLACK * self.rtol
+        return tuple(
+            law for law, low in self.least.items() if not (low >= -allowed[law] or self.destroyed[law] <= brief)
+        )
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
@@ -144,7 +149,7 @@ class _Books:
     def audit(self) -> Audit:
         exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation"), self.between()]
         turned = [self.changes("S_"), self.booked("entropy supply"), self.booked("entropy production")]
-        low, high = self.production()
+        low, high, destroyed = self.production()
         return Audit(
             energy=self.residual("E_total", ("energy supply",)),
             entropy=self.residual("S_total", ("entropy supply", "entropy production")),
@@ -155,6 +160,7 @@ class _Books:
             energy_rounding=self.rounding(),
             least=low,
             largest=high,
+            destroyed=destroyed,
         )
 
     def sites(self) -> Array:
@@ -167,15 +173,28 @@ class _Books:
             residuals[:, k] = np.abs(bonds - bonds[:1] - self.ledger[:, j])
         return np.asarray(residuals.max(axis=1))
 
-    def production(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Least and largest entropy production of each law over outputs and steps."""
+    def production(self) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+        """Least and largest entropy production of each law over outputs and steps, and the part that it destroys."""
         values = self.trajectory.within_bounds
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
         columns = {law: values[f"sigma_{law}"] for law in laws if len(values.get(f"sigma_{law}", ()))}
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},
+            {law: self.destroyed(c) for law, c in columns.items()},
         )
+
+    def destroyed(self, column: Array) -> float:
+        """Part of the entropy of all steps that comes with the wrong sign; all of it where no step is known."""
+        steps = self.trajectory.result.steps
+        if steps is None or len(steps.t) < 2:
+            return 1.0
+        production = column[-len(steps.t) :] * np.diff(steps.t, prepend=steps.t[0])
+        return float(_share(-np.minimum(production, 0.0).sum(), np.abs(production).sum()))
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole != 0 else 0.0
 
 
 def _largest(columns: list[Array]) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from surfacechem.integrate import Model
 from surfacechem.lumping import lumpings
+from surfacechem.pacing import paces
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.scene import Scene
 from surfacechem.system import System
@@ -103,7 +104,7 @@ def groups(model: Model, scene: Scene, values: Mapping[str, float], end: float) 
         *_time_scales(start, end),
         *(
             Group("t / t_own", end / t, "1", f"length of the run in units of the {p.text}")
-            for p, t in model.paces(values)
+            for p, t in paces(model.system, values)
         ),
     ]
 

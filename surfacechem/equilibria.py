@@ -123,7 +123,8 @@ class Equilibria:
             if heat is not None:
                 heated = heat(rows)
                 rows = np.where(np.isfinite(heated), heated, rows)
-            return np.asarray(np.atleast_2d(self._balance(rows))[:, ::2] @ way.pulls)
+            tractions = np.atleast_2d(self._balance(rows))[:, ::2]
+            return np.asarray(np.where(way.pulls != 0, tractions, 0.0) @ way.pulls)
 
         return self._moved(point, way, march(driving, float(point.y[way.column]), direction))
 

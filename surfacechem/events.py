@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 NOISE = 1e-13
 """Margins below this part of the largest seen count as zero."""
 
+IDLE = 1.0
+"""Value of a margin in modes in which it plays no part."""
+
 REACHED = 1e-14
 """Part of the time of a run within which a stretch has reached its end."""
 
@@ -151,7 +154,7 @@ class Hybrid:
         self.steps += result.counters.steps
         self.written += len(result.times)
         if len(result.margins):
-            self.largest = np.maximum(self.largest, np.abs(result.margins))
+            self._see(result.margins)
         return part
 
     def _transition(self, part: Part, point: Point) -> int | None:
@@ -214,8 +217,20 @@ class Hybrid:
         margins = self.problem.program.margins
         assert margins is not None
         now = margins(point.inputs())
-        self.largest = np.maximum(self.largest, np.abs(now))
+        self._see(now)
         return now
+
+    def _see(self, margins: Array) -> None:
+        """Keep the largest margins seen; a margin that is out of play in the present modes is one."""
+        self.largest = np.maximum(self.largest, np.where(margins == IDLE, 0.0, np.abs(margins)))
+        for alike in self._alike:
+            self.largest[alike] = self.largest[alike].max()
+
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Margins that measure the same in different modes."""
+        measures = [item.measure for item in self.system.transitions]
+        return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
 
     def _ended(self, now: Array) -> bool:
         """Whether a jump has carried the state to where a law ends."""
@@ -305,4 +320,5 @@ class Hybrid:
             counters=all_counters(parts),
             steps=all_steps(parts) if problem.record_steps and parts else None,
             stepping=sum(part.result.stepping for part in parts),
+            segment=np.repeat(np.arange(len(parts)), [len(part.times) for part in parts]) if parts else None,
         )

@@ -18,11 +18,12 @@ from surfacechem.equilibria import Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
+from surfacechem.pacing import too_fast
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.starting import stable_start
-from surfacechem.system import Pace, System
+from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
 
@@ -42,9 +43,6 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
 
 STRAY, LARGEST_SLACK = 1e3, 1e-3
 """How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
-
-FEW, SHARP = 100.0, 1e-12
-"""Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 STALLED = 1e-3
 """A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
@@ -108,7 +106,7 @@ class Trajectory:
         states, named = result.outputs, self.outputs
         if steps is not None and len(steps.t):
             states = np.concatenate([states, steps.y])
-            named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot)])
+            named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)])
         names = [state.name for state in self.model.system.states]
         outputs = [item.name for item in self.model.system.outputs]
         return dict(zip(names, states.T, strict=True)) | dict(zip(outputs, named.T, strict=True))
@@ -119,10 +117,13 @@ class Trajectory:
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
         columns = np.array([state.name in bonds for state in self.model.system.states])
-        points = [(result.times, result.outputs, self.rates)] + ([(steps.t, steps.y, steps.ydot)] if steps else [])
-        if all(np.all(y[:, columns] >= 0) for _, y, _ in points):
+        points: list[tuple[Array, Array, Array, NDArray[np.int64] | None]]
+        points = [(result.times, result.outputs, self.rates, None)]
+        points += [(steps.t, steps.y, steps.ydot, steps.segment)] if steps else []
+        if all(np.all(y[:, columns] >= 0) for _, y, _, _ in points):
             return self.everywhere
-        clipped = [self.model.evaluate(result, t, np.where(columns, np.maximum(y, 0), y), v) for t, y, v in points]
+        within = [(t, np.where(columns, np.maximum(y, 0), y), rates, segment) for t, y, rates, segment in points]
+        clipped = [self.model.evaluate(result, *point) for point in within]
         names = [item.name for item in self.model.system.outputs]
         return dict(zip(names, np.concatenate(clipped).T, strict=True))
 
@@ -319,22 +320,7 @@ class Model:
             elif any(state.quantity.unit == "K" for state in algebraic):
                 reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
-        return "failed", f"{REASONS[result.status]} at {where}{self._too_fast(result, values)}"
-
-    def paces(self, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
-        """Times in which the gaps move by themselves [s], the shortest first."""
-        point = {parameter.symbol: values[parameter.path] for parameter in self.system.parameters}
-        found = [(pace, float(self.system.expand(pace.time).subs(point))) for pace in self.system.paces]
-        return sorted(found, key=lambda item: item[1])
-
-    def _too_fast(self, result: Result, values: Mapping[str, float]) -> str:
-        """What is too short to be followed, and what to do, where that is why a run could not go on."""
-        end = float(result.problem.segments[-1])
-        shortest = {Status.MAX_STEPS: FEW * end / result.problem.max_steps, Status.STEP_UNDERFLOW: SHARP * result.t}
-        for pace, time_ in self.paces(values):
-            if time_ < shortest.get(result.status, 0.0):
-                return f": the {pace.text}, {time_:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
-        return ""
+        return "failed", f"{REASONS[result.status]} at {where}{too_fast(self.system, result, values)}"
 
     def _closest_margin(self, result: Result) -> str | None:
         """Reason of the margin that is closed, or has all but closed, where a run could not go on."""
@@ -355,15 +341,18 @@ class Model:
         assert self.program.margins is not None
         return self.program.margins(np.concatenate([[t], y, ydot, result.problem.parameters[-1]]))
 
-    def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
-        """Named quantities along a trajectory, shape (len(t), outputs)."""
-        inputs = self.inputs(result, t, y, ydot)
+    def evaluate(
+        self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
+    ) -> Array:
+        """Named quantities along a trajectory, shape (len(t), outputs); times tell the segments that are not given."""
+        inputs = self.inputs(result, t, y, ydot, segment)
         return (
             self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))
         )
 
-    def inputs(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
+    def inputs(
+        self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
+    ) -> Array:
         """Arguments of compiled functions along a trajectory."""
-        problem = result.problem
-        segment = np.searchsorted(problem.segments[1:-1], t, side="left")
-        return np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
+        parameters = result.problem.parameters[result.segments_at(t, segment)]
+        return np.concatenate([t[:, None], y, ydot, parameters], axis=1)

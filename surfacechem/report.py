@@ -145,7 +145,9 @@ def _balances(books: Audit) -> str:
     if books.violations:
         worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
         return f"{residuals}; ENTROPY DESTROYED by {worst}"
-    return f"{residuals}; every law dissipates (least {min(books.least.values()):.2g} W/(m^2 K))"
+    least = min(books.least.values())
+    rounding = ", which is rounding" if least < 0 else ""
+    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){rounding})"
 
 
 def check_summary(

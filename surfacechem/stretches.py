@@ -58,13 +58,16 @@ def all_events(parts: Sequence[Part], n: int, q: int) -> Events:
 
 
 def all_steps(parts: Sequence[Part]) -> Points:
-    """All steps; the start of a stretch, which is the end of the one before in other modes, only once."""
-    found = [(part, part.result.steps, int(k > 0)) for k, part in enumerate(parts) if part.result.steps is not None]
+    """All steps. The start of a stretch, and what time cannot tell from it, is the event that is there already."""
+    found = [(k, part, part.result.steps) for k, part in enumerate(parts) if part.result.steps is not None]
+    kept = [(part.start.t + steps.t > part.start.t) if k else np.ones(len(steps.t), bool) for k, part, steps in found]
+    pieces = list(zip(found, kept, strict=True))
     return Points(
-        np.concatenate([part.start.t + steps.t[skip:] for part, steps, skip in found]),
-        np.concatenate([steps.y[skip:] for _, steps, skip in found]),
-        np.concatenate([steps.ydot[skip:] for _, steps, skip in found]),
-        np.concatenate([part.booked + steps.ledger[skip:] for part, steps, skip in found]),
+        np.concatenate([part.start.t + steps.t[keep] for (_, part, steps), keep in pieces]),
+        np.concatenate([steps.y[keep] for (_, _, steps), keep in pieces]),
+        np.concatenate([steps.ydot[keep] for (_, _, steps), keep in pieces]),
+        np.concatenate([part.booked + steps.ledger[keep] for (_, part, steps), keep in pieces]),
+        segment=np.concatenate([np.full(int(keep.sum()), k) for (k, _, _), keep in pieces]),
     )
 
 

@@ -158,6 +158,8 @@ class Transition:
     """What makes it a fold, where it is one."""
     passes: bool = False
     """Whether nothing happens to the interface: a stage of the loading ends."""
+    measure: str = ""
+    """What its margin measures, where that of other transitions measures the same."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
 

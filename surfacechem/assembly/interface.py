@@ -172,7 +172,8 @@ def _sides_of_touch(build: Build) -> None:
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
         margin = where(value * side > 0, where(build.t < build.held_until, 1, value * g), 1)
-        build.transitions.append(Transition(name, margin, reason, {side: symengine.Integer(-value)}, settles=True))
+        other = {side: symengine.Integer(-value)}
+        build.transitions.append(Transition(name, margin, reason, other, settles=True, measure="g_n"))
 
 
 def _known(build: Build) -> set[Any]:

@@ -137,6 +137,8 @@ class Points:
     y: Array
     ydot: Array
     ledger: Array
+    segment: NDArray[np.int64] | None = field(default=None, kw_only=True)
+    """Segment of each, where several lie so close that their times do not tell."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,12 @@ class Result:
     """What a library said of its failure."""
     stepping: float = float("nan")
     """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
+    segment: NDArray[np.int64] | None = None
+    """Segment of each output, where their times do not tell."""
+
+    def segments_at(self, t: Array, known: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+        """Segment of each time; a breakpoint belongs to the one that it ends."""
+        return np.searchsorted(self.problem.segments[1:-1], t, side="left") if known is None else known
 
     @property
     def success(self) -> bool:

@@ -11,6 +11,6 @@ def output_rates(result: Result) -> Array:
     problem = result.problem
     if not len(result.times):
         return np.empty_like(result.outputs)
-    segment = np.searchsorted(problem.segments[1:-1], result.times, side="left")
+    segment = result.segments_at(result.times, result.segment)
     guess = np.zeros_like(result.outputs)
     return consistent(problem.program, result.times, result.outputs, guess, problem.parameters[segment]).ydot
