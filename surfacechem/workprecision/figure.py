@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from surfacechem.plots import COLOURS, STYLE, Plot, opened
+from surfacechem.workprecision.columns import LABELS
 
 AXES = {
     "error_max": "largest relative error",
@@ -36,7 +37,7 @@ def figure(data: xarray.Dataset | str | Path) -> Figure:
     marks in the shaded region are below the uncertainty of the reference; crosses at the right edge are failed
     solves, at the time that they took to fail.
     """
-    dataset = opened(data)
+    dataset = opened(data).set_index(LABELS)
     columns = [name for name in AXES if bool(np.isfinite(dataset[name]).any())]
     columns = columns or ["energy_error"]
     rows = dataset.sizes["case"]

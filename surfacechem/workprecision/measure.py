@@ -20,8 +20,8 @@ from surfacechem.workprecision.errors import Errors
 from surfacechem.workprecision.subject import Subject
 from surfacechem.workprecision.truth import Truth
 
-BRIEF, MOST_REPEATS = 2e-3, 20
-"""Runs are repeated within a round up to this time [s], and so often at most."""
+BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.01, 3, 20
+"""Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
 
 BUDGET = 10.0
 """A solver at one tolerance is not timed again once it has taken this long [s]."""
@@ -83,7 +83,7 @@ def _objection(trajectory: Trajectory, truth: Truth | None) -> str:
 
 def _again(subject: Subject, point: Point) -> None:
     once = max(min(point.seconds), 1e-9)
-    for _ in range(min(max(int(BRIEF / once), 1), MOST_REPEATS)):
+    for _ in range(min(max(int(BRIEF / once), LEAST_REPEATS), MOST_REPEATS) if once < BRIEF else 1):
         trajectory = subject.solve(point.solver, point.rtol)
         assert isinstance(trajectory, Trajectory)  # it ran before
         point.seconds.append(trajectory.seconds)
