@@ -1,8 +1,9 @@
 # %% [markdown]
 # # Work and precision
 #
-# `surfacechem precision` measures the error of a case against run time, for several solvers and tolerances. Its dataset is
-# an ordinary netCDF file. This notebook makes one, reads it with plain `xarray`, and draws its own figure from it.
+# `surfacechem precision` measures the error of a case against run time, for several solvers and tolerances. Its
+# dataset is an ordinary netCDF file. This notebook makes one, reads it with plain `xarray`, and draws its own figure
+# from it.
 
 # %%
 import tempfile
@@ -25,8 +26,8 @@ for path in study.write(folder / "study"):
     print(path.name)
 
 # %% [markdown]
-# From here on surfacechem is not used. Names of cases and solvers are variables along their dimensions; made an index, they
-# are found by `sel`.
+# From here on surfacechem is not used. Names of cases and solvers are variables along their dimensions; made an index,
+# they are found by `sel`.
 
 # %%
 data = xarray.open_dataset(folder / "study.nc").set_index(case="case_name", solver="solver_name")
@@ -43,8 +44,8 @@ for case in data["case"].values:
 # %% [markdown]
 # ## A figure of one's own
 #
-# Error on x, right-hand sides instead of seconds on y: that does not depend on the machine, nor on the language from which
-# a library is called. Points below the uncertainty of the reference would be left out.
+# Error on x, right-hand sides instead of seconds on y: that does not depend on the machine, nor on the language from
+# which a library is called. Points below the uncertainty of the reference would be left out.
 
 # %%
 figure, axes = plt.subplots(1, data.sizes["case"], figsize=(8, 3.2), sharey=True, layout="constrained")
@@ -61,8 +62,8 @@ figure
 # %% [markdown]
 # ## The time to reach an error
 #
-# Between two tolerances both error and time are close to powers of each other, so times at equal error are interpolated in
-# logarithms.
+# Between two tolerances both error and time are close to powers of each other, so times at equal error are interpolated
+# in logarithms; errors beyond those of the loosest and the tightest tolerance give `nan`.
 
 
 # %%
