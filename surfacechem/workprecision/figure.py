@@ -33,9 +33,9 @@ FAILED, BELOW, INSIDE = "failed", "below the uncertainty of the reference", "ins
 def figure(data: xarray.Dataset | str | Path) -> Figure:
     """The figure of a study, from its dataset or its netCDF file.
 
-    Dashed lines are the times inside a library's own steps, without what an adapter adds for events and outputs. Hollow
-    marks in the shaded region are below the uncertainty of the reference; crosses at the right edge are failed
-    solves, at the time that they took to fail.
+    Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without what
+    an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
+    reference; crosses at the right edge are failed solves, at the time that they took to fail.
     """
     dataset = opened(data).set_index(LABELS)
     columns = [name for name in AXES if bool(np.isfinite(dataset[name]).any())]
