@@ -192,7 +192,8 @@ def test_a_failing_solver_is_shown_as_failed():
     assert np.isnan(data["error_max"].values[1])
     assert data["count_steps"].values[1] == 40
     for text in (few.page.text(), few.page.html()):
-        assert re.search(r"failed.*the number of steps allowed was used up", text)
+        assert re.search(r"bdf\W.*1e-10\W.*failed", text)
+        assert re.search(r"bdf\W.*1e-10\W.*the number of steps allowed was used up", text)
     assert "tr class=marked" in few.page.html()
 
 
@@ -295,6 +296,11 @@ def test_hollow_marks_are_below_the_uncertainty(study):
     assert np.all(hollow < 1e-6)
     assert np.all(solid[np.isfinite(solid)] >= 1e-6)
     assert any(handle.get_text() == "below the uncertainty of the reference" for handle in plot.legends[0].get_texts())
+
+
+def test_a_case_without_energy_has_no_panel_of_it(study):
+    plot = figure(study.dataset.assign(energy_error=study.dataset["energy_error"] * 0))
+    assert [ax.get_xlabel() for ax in plot.axes] == ["largest relative error"]
 
 
 # -- the report --------------------------------------------------------------------------------------------------------

@@ -57,7 +57,10 @@ def _case(case: Measured) -> Section:
         lines.append(f"uncertain  {_uncertainty(case.truth)}")
     lines.append(f"variables  {', '.join(case.variables)}")
     lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
-    return Section(lines[0], lines[1:], [Table(HEADING, rows, marked=marked)])
+    failures = [(point.solver, f"{point.rtol:.0e}", point.reason) for point in case.points if point.status == "failed"]
+    tables = [Table(HEADING, rows, marked=marked)]
+    tables += [Table(("failed", "rtol", "why"), failures)] if failures else []
+    return Section(lines[0], lines[1:], tables)
 
 
 def _uncertainty(truth: Truth) -> str:
@@ -73,7 +76,7 @@ def _row(point: Point, truth: Truth | None) -> list[str]:
     times.append("" if math.isnan(inside) else duration(inside))
     counts = [_whole(count(point, name)) for name in COUNTS]
     if point.status == "failed":
-        return [point.solver, f"{point.rtol:.0e}", "failed", point.reason, "", "", "", *times, *counts]
+        return [point.solver, f"{point.rtol:.0e}", "failed", "", "", "", "", *times, *counts]
     errors = [_error(point, truth, kind) for kind in (*KINDS, "event")]
     return [point.solver, f"{point.rtol:.0e}", *errors, f"{point.energy:.1e}", *times, *counts]
 
