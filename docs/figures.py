@@ -152,6 +152,12 @@ def force_spectrum() -> Figure:
     return sweep_plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
 
 
+def precision() -> Figure:
+    """Run time against error of three solvers."""
+    tolerances = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
+    return surfacechem.precision("exothermic", ["radau", "lsoda", "scipy-radau"], tolerances, repeat=3).figure()
+
+
 GALLERY: dict[str, tuple[list[str], str | None]] = {
     "adhesion-cluster": (["phi"], None),
     "adhesion-cluster-held": (["phi"], None),
@@ -238,6 +244,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     **{f"gallery-{name}.svg": partial(gallery, name) for name in case.names()},
     "gallery-gas-network.svg": gas_network,
     "accuracy.svg": accuracy,
+    "precision.svg": precision,
     "signs.svg": signs,
     "press.svg": press,
     "closing-gap.svg": closing_gap,

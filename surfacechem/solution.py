@@ -25,6 +25,7 @@ from surfacechem.event_table import event_columns, event_findings, event_violati
 from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.profiles import profile_columns
+from surfacechem.solvers import solver
 from surfacechem.solvers.contract import Status
 
 if TYPE_CHECKING:
@@ -264,7 +265,10 @@ class Solution:
     def attributes(self) -> dict[str, str | float | int]:
         """Global attributes: scalars and strings only."""
         run, result = self.trajectory.run, self.trajectory.result
-        counters = {f"count_{name}": int(value) for name, value in result.counters._asdict().items()}
+        told = result.counters._asdict()
+        if not solver(run.solver).counts_rejected:
+            del told["rejected"]
+        counters = {f"count_{name}": int(value) for name, value in told.items()}
         books = self.audit
         return {
             "Conventions": CONVENTIONS,

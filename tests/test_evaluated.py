@@ -159,3 +159,13 @@ def test_an_interface_without_capacity(case):
 def test_a_run_again_from_its_file(case, tmp_path):
     record = rerun.read(surfacechem.run(case(FOREIGN)).write(tmp_path / "run.nc"))
     assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+def test_the_precision_of_a_case_that_only_cantera_can_run(case):
+    study = surfacechem.precision(case(BLOWERS_MASEL), ["radau", "cantera"], [1e-4, 1e-7], repeat=1)
+    data = study.dataset.isel(case=0)
+    assert data["status"].values.tolist() == [["omitted", "omitted"], ["finished", "finished"]]
+    assert str(data["reference"].values) == "cantera alone, which no second method confirms"
+    loose, tight = data["error_max"].values[1]
+    assert float(data["uncertainty_max"]) < tight < loose
+    assert any("radau: rates of the mechanism come from Cantera itself" in line for line in study.page.omissions)

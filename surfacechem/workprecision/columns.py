@@ -16,7 +16,9 @@ from surfacechem.workprecision.measure import Point
 from surfacechem.workprecision.plan import Measured, Plan
 
 POINT = ("case", "solver", "tolerance")
-COORDINATES = (*POINT, "variable")
+
+LABELS = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
+"""Variables that name what lies along a dimension; CF allows coordinate variables of numbers only."""
 
 COUNTS = {
     "steps": "steps taken",
@@ -38,12 +40,12 @@ def columns(plan: Plan, cases: Sequence[Measured]) -> tuple[Column, ...]:
     """Every variable, the coordinates first."""
     names = list(dict.fromkeys(name for case in cases for name in case.variables))
     axes = [
+        ("tolerance", np.array(plan.tolerances), "relative tolerance asked for"),
         ("case", _words([case.subject.name for case in cases]), "name of the case"),
         ("solver", _words(plan.solvers), "name of the solver"),
-        ("tolerance", np.array(plan.tolerances), "relative tolerance asked for"),
         ("variable", _words(names), "name of the compared variable"),
     ]
-    coordinates = [Column(name, (name,), values, "1", text) for name, values, text in axes]
+    coordinates = [Column(LABELS.get(name, name), (name,), values, "1", text) for name, values, text in axes]
     points = [Column(name, POINT, _table(plan, cases, read), unit, text) for name, read, unit, text in _point_readers()]
     return (*coordinates, *_of_cases(cases), *points, *_of_variables(plan, cases, names))
 
@@ -106,7 +108,7 @@ def _of_variables(plan: Plan, cases: Sequence[Measured], names: Sequence[str]) -
     for kind in KINDS:
         tables = [_table(plan, cases, partial(_error, kind=kind, variable=name)) for name in names]
         text = f"{MEANING[kind]} of each variable"
-        found.append(Column(f"variable_error_{kind}", COORDINATES, np.stack(tables, axis=-1), "1", text))
+        found.append(Column(f"variable_error_{kind}", (*POINT, "variable"), np.stack(tables, axis=-1), "1", text))
     return found
 
 

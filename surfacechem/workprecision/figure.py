@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from surfacechem.plots import COLOURS, STYLE, Plot, opened
+from surfacechem.workprecision.columns import LABELS
 
 AXES = {
     "error_max": "largest relative error",
@@ -32,12 +33,12 @@ FAILED, BELOW, INSIDE = "failed", "below the uncertainty of the reference", "ins
 def figure(data: xarray.Dataset | str | Path) -> Figure:
     """The figure of a study, from its dataset or its netCDF file.
 
-    Dashed lines are the times inside a library's own steps, without what an adapter adds for events and outputs. Hollow
-    marks in the shaded region are below the uncertainty of the reference; crosses at the right edge are failed
-    solves, at the time that they took to fail.
+    Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without what
+    an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
+    reference; crosses at the right edge are failed solves, at the time that they took to fail.
     """
-    dataset = opened(data)
-    columns = [name for name in AXES if bool(np.isfinite(dataset[name]).any())]
+    dataset = opened(data).set_index(LABELS)
+    columns = [name for name in AXES if bool((dataset[name] > 0).any())]
     columns = columns or ["energy_error"]
     rows = dataset.sizes["case"]
     with matplotlib.rc_context(STYLE):
@@ -68,7 +69,7 @@ def _draw(ax: Axes, case: xarray.Dataset, name: str) -> None:
 
 def _draw_solver(ax: Axes, case: xarray.Dataset, name: str, limit: float, k: int) -> None:
     x, y = np.maximum(case[name].values, SMALLEST), case["run_seconds"].values
-    shown = np.isfinite(x) & np.isfinite(y)
+    shown = np.isfinite(x) & np.isfinite(y) & ((case[name].values > 0) | np.isfinite(limit))
     colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
     middle = case["run_seconds_median"].values
     ax.plot(x[shown], y[shown], color=colour, linewidth=1.0)
@@ -98,6 +99,6 @@ def _legend(dataset: xarray.Dataset) -> list[Line2D]:
     grey = {"color": "0.4", "linestyle": "none"}
     if bool((status == FAILED).any()):
         handles.append(Line2D([], [], marker="x", label=FAILED, **grey))  # type: ignore[arg-type]
-    if bool((dataset["error_max"] < dataset["uncertainty_max"]).any()):
+    if any(bool((dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"]).any()) for kind in ("max", "event")):
         handles.append(Line2D([], [], marker="o", markerfacecolor="white", label=BELOW, **grey))  # type: ignore[arg-type]
     return handles

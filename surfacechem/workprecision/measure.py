@@ -20,8 +20,8 @@ from surfacechem.workprecision.errors import Errors
 from surfacechem.workprecision.subject import Subject
 from surfacechem.workprecision.truth import Truth
 
-BRIEF, MOST_REPEATS = 2e-3, 20
-"""Runs are repeated within a round up to this time [s], and so often at most."""
+BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.01, 3, 20
+"""Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
 
 BUDGET = 10.0
 """A solver at one tolerance is not timed again once it has taken this long [s]."""
@@ -82,12 +82,21 @@ def _objection(trajectory: Trajectory, truth: Truth | None) -> str:
 
 
 def _again(subject: Subject, point: Point) -> None:
-    once = max(min(point.seconds), 1e-9)
-    for _ in range(min(max(int(BRIEF / once), 1), MOST_REPEATS)):
+    """A round of a point; one that ends otherwise, where the machine is too busy for its time limit, does not count."""
+    spent: list[float] = []
+    while not _enough(point, spent):
         trajectory = subject.solve(point.solver, point.rtol)
-        assert isinstance(trajectory, Trajectory)  # it ran before
+        if isinstance(trajectory, str) or trajectory.status != point.status:
+            return
+        spent.append(trajectory.seconds)
         point.seconds.append(trajectory.seconds)
         point.stepping.append(trajectory.result.stepping)
+
+
+def _enough(point: Point, spent: list[float]) -> bool:
+    if min(point.seconds) > BRIEF:
+        return len(spent) > 0
+    return len(spent) >= MOST_REPEATS or (len(spent) >= LEAST_REPEATS and sum(spent) > BRIEF)
 
 
 def _without_first(point: Point) -> Point:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from statistics import median
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,8 @@ from surfacechem.workprecision.measure import BRIEF, BUDGET, Point
 from surfacechem.workprecision.plan import Measured
 
 if TYPE_CHECKING:
-    from surfacechem.workprecision.study import Study
+    from matplotlib.figure import Figure
+
     from surfacechem.workprecision.truth import Truth
 
 HEADING = ("solver", "rtol", "final", "max", "L2", "events", "energy", "time", "median", "longest", "in steps", *COUNTS)
@@ -38,14 +40,13 @@ tolerances above {LOOSEST:g} as {LOOSEST:g}. A count that a library does not tel
 """
 
 
-def page(study: Study) -> Page:
+def page(title: str, command: str, measured: Sequence[Measured], figure: Figure) -> Page:
     """The report."""
-    overview = Section("Run time against error", figures=[study.figure()], details=True)
+    overview = Section("Run time against error", figures=[figure], details=True)
     method = Section("How it was measured", METHOD.split("\n\n"), details=True)
-    cases = [section for case in study.cases for section in (_case(case), _variables(case))]
-    texts = [Section(f"Case {c.subject.name}", [c.subject.text], details=True) for c in study.cases]
-    title = str(study.attributes["title"])
-    return Page(title, study.command, [overview, *cases, method, *texts], _omissions(study))
+    cases = [section for case in measured for section in (_case(case), _variables(case))]
+    texts = [Section(f"Case {c.subject.name}", [c.subject.text], details=True) for c in measured]
+    return Page(title, command, [overview, *cases, method, *texts], _omissions(measured))
 
 
 def _case(case: Measured) -> Section:
@@ -56,7 +57,10 @@ def _case(case: Measured) -> Section:
         lines.append(f"uncertain  {_uncertainty(case.truth)}")
     lines.append(f"variables  {', '.join(case.variables)}")
     lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
-    return Section(lines[0], lines[1:], [Table(HEADING, rows, marked=marked)])
+    failures = [(point.solver, f"{point.rtol:.0e}", point.reason) for point in case.points if point.status == "failed"]
+    tables = [Table(HEADING, rows, marked=marked)]
+    tables += [Table(("failed", "rtol", "why"), failures)] if failures else []
+    return Section(lines[0], lines[1:], tables)
 
 
 def _uncertainty(truth: Truth) -> str:
@@ -72,7 +76,7 @@ def _row(point: Point, truth: Truth | None) -> list[str]:
     times.append("" if math.isnan(inside) else duration(inside))
     counts = [_whole(count(point, name)) for name in COUNTS]
     if point.status == "failed":
-        return [point.solver, f"{point.rtol:.0e}", "failed", point.reason, "", "", "", *times, *counts]
+        return [point.solver, f"{point.rtol:.0e}", "failed", "", "", "", "", *times, *counts]
     errors = [_error(point, truth, kind) for kind in (*KINDS, "event")]
     return [point.solver, f"{point.rtol:.0e}", *errors, f"{point.energy:.1e}", *times, *counts]
 
@@ -102,13 +106,13 @@ def _variables(case: Measured) -> Section:
     return Section(f"{case.subject.name}, variable by variable", tables=[table], details=True)
 
 
-def _omissions(study: Study) -> list[str]:
+def _omissions(cases: Sequence[Measured]) -> list[str]:
     """Solvers that cannot run a case, and cases without a reference."""
     found = [
         f"{case.subject.name}: {point.solver}: {point.reason}"
-        for case in study.cases
+        for case in cases
         for point in case.points
         if point.status == "omitted"
     ]
-    missing = [f"{case.subject.name}: no errors: {case.untrue}" for case in study.cases if not case.truth]
+    missing = [f"{case.subject.name}: no errors: {case.untrue}" for case in cases if not case.truth]
     return [*dict.fromkeys(found), *missing]

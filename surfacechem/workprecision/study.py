@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from surfacechem.solution import CONVENTIONS, Column
 from surfacechem.studyreport import Page, as_dataset, machine, write
-from surfacechem.workprecision.columns import COORDINATES, columns
+from surfacechem.workprecision.columns import columns
 from surfacechem.workprecision.plan import Measured, Plan
 
 if TYPE_CHECKING:
@@ -65,8 +65,12 @@ class Study:
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
-        """The study as an xarray Dataset over case, solver and tolerance."""
-        return as_dataset(self.columns, COORDINATES, self.attributes)
+        """The study as an xarray Dataset over case, solver and tolerance.
+
+        ``dataset.set_index(case="case_name", solver="solver_name")`` lets ``sel`` find cases and solvers by name; since
+        ``tolerance`` is also an argument of ``sel``, tolerances are asked for by ``sel({"tolerance": 1e-8})``.
+        """
+        return as_dataset(self.columns, ["tolerance"], self.attributes)
 
     def figure(self) -> Figure:
         """Run time against error."""
@@ -79,7 +83,7 @@ class Study:
         """The report; ``page.text()`` is its tables, ``page.html()`` all of it."""
         from surfacechem.workprecision.page import page
 
-        return page(self)
+        return page(str(self.attributes["title"]), self.command, self.cases, self.figure())
 
     def write(self, path: str | Path) -> list[Path]:
         """Save as netCDF, SVG, PNG and HTML side by side; returns the files."""

@@ -62,6 +62,8 @@ class Truth:
             return trajectory.reason
         if trajectory.status != self.status:
             return f"ended otherwise than the reference: {trajectory.reason}"
+        if abs(len(trajectory.result.times) - len(self.times)) > 1:  # an output may lie between the two ends
+            return f"ended elsewhere than the reference: {trajectory.reason}"
         return difference(event_times(trajectory), self.events)
 
 
