@@ -274,10 +274,9 @@ class Model:
 
     def _visited(self, result: Result, temperature: str) -> Array:
         """A temperature at all steps and at the end."""
-        steps = result.steps
-        assert steps is not None
-        t = np.append(steps.t, result.t)
-        y, ydot = np.vstack([steps.y, result.y]), np.vstack([steps.ydot, result.ydot])
+        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+        if (steps := result.steps) is not None:  # a run may end at its start
+            t, y, ydot = np.append(steps.t, t), np.vstack([steps.y, y]), np.vstack([steps.ydot, ydot])
         names = [state.name for state in self.system.states]
         if temperature in names:
             return y[:, names.index(temperature)]

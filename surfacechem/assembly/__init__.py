@@ -91,7 +91,7 @@ def assemble(scene: Scene) -> System:
         conductors=tuple(conductors(build)),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
-        cycles=tuple(build.cycles) if build.transitions else (),
+        cycles=tuple(build.cycles),
         modes=tuple(build.modes),
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),

@@ -260,6 +260,16 @@ class Build:
         for name, (low, high) in law.ranges.items():
             self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
+    def refuse_never_positive(self, law: Law, own: Mapping[str, Expression]) -> None:
+        """A law that divides by what is zero, whatever the state, is none for this scene."""
+        for name in law.positive:
+            value = symengine.sympify(own[name] if name in own else self.variables.get(name, law))
+            if value.is_Number and not value > 0:
+                raise InputError(
+                    f"{law.name()} holds for {name} > 0 only; with the laws of this scene {name} is always {value}.",
+                    law.place,
+                )
+
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""
         for name in law.positive:

@@ -149,6 +149,7 @@ def free_energy(build: Build) -> None:
         build.refuse_foreign(F, _known(build), law)
         build.psi += F
         build.law_ranges(law)
+    _sides_of_touch(build)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]
         node.energies["interface"] = build.psi
@@ -157,7 +158,6 @@ def free_energy(build: Build) -> None:
             "the interface's potential depends on temperature, but the interface has none. "
             "Give `interface.temperature` a name."
         )
-    _sides_of_touch(build)
     _tractions(build)
 
 
