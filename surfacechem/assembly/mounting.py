@@ -96,6 +96,10 @@ class FarField:
             return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
 
+    def yielding(self, g: Expression, traction: Expression) -> Expression:
+        """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
+        return (self.k * (self.w - g) + self.c_b * self.w_dot + self.F - traction) / (self.c_b + self.c_g)
+
     def book(self, build: Build, g: Expression, rate: Expression) -> None:
         """Energies of the bodies, work of the far field, heat of the dampers."""
         text = AXES[self.axis]

@@ -101,6 +101,17 @@ def _displacement(build: Build, kind: Kind) -> None:
         velocity = _state(build, name)
         build.variables.define(name, lambda: velocity, "evolved", "mechanics.tangential")
         build.motion.gap_rates["u_t"] = velocity
+    elif kind.elastic and kind.mount is not None and kind.mount.damped:
+        build.motion.gap_rates["u_t"] = symengine.Symbol("v_t")
+        build.variables.define("v_t", partial(_yielding, build, kind.mount), "derived", "mechanics.tangential")
+
+
+def _yielding(build: Build, mount: Held) -> Expression:
+    """Velocity at which the dampers bear what is out of balance with the elastic gap."""
+    far = far_field(build, mount)
+    return build.name(
+        VARIABLES["v_t"], far.yielding(symengine.Symbol("u_t"), derivative(build.psi, symengine.Symbol("g_t")))
+    )
 
 
 def _elastic_gap(build: Build, kind: Kind) -> None:
@@ -117,6 +128,8 @@ def _sliding_velocity(build: Build, kind: Kind) -> Expression:
     if not kind.slides:
         return NONE
     rate = build.motion.gap_rates["u_t"]
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "sliding")
     if kind.elastic:
         rate = rate - build.motion.gap_rates["g_t"]
     slip = build.variables.get("direction", "sliding")
@@ -129,6 +142,8 @@ def tangential_motion(build: Build) -> None:
     if kind is None:
         return
     far = far_field(build, kind.mount) if kind.mount else None
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "the mechanics")
     v, rate = build.variables.get("v", "the friction"), build.motion.gap_rates["u_t"]
     t_f = sum(build.motion.sliding_tractions, NONE)
     t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
@@ -196,7 +211,7 @@ def _elastic_balance(
 ) -> None:
     """The body's spring and damper in series with the elastic gap, which ``follows`` at once what cannot slide."""
     if far.c_b != 0 or far.c_g != 0:
-        build.rows["u_t"] = (far.c_b + far.c_g) * du - far.k * (far.w - u) - far.c_b * far.w_dot - far.F + t_e
+        build.rows["u_t"] = du - build.motion.gap_rates["u_t"]
         return
     residual = far.k * (far.w - u) + far.F - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
