@@ -171,11 +171,17 @@ class _Books:
         """Least and largest entropy production of each law over outputs and steps."""
         values = self.trajectory.everywhere
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
-        columns = {law: values[f"sigma_{law}"] for law in laws if len(values.get(f"sigma_{law}", ()))}
+        columns = {law: self._before_end(values[f"sigma_{law}"]) for law in laws if len(values.get(f"sigma_{law}", ()))}
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},
         )
+
+
+    def _before_end(self, values: Array) -> Array:
+        """The values but for that of the last step, where a law that ends there may have none."""
+        ended = self.trajectory.status == "stopped" and len(values) > 1 and not np.isfinite(values[-1])
+        return values[:-1] if ended else values
 
 
 def _largest(columns: list[Array]) -> float:

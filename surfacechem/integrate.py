@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
-from surfacechem.equilibria import Point
+from surfacechem.equilibria import Equilibria, Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
+from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
 from surfacechem.system import Pace, System
 from surfacechem.terms import Spec
@@ -214,8 +215,9 @@ class Model:
 
     def _start(self, y: Array, parameters: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
-        if self.jumper is not None and self.system.equilibria:
-            settled = self.jumper.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
+        if self.system.equilibria:
+            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system)
+            settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
@@ -265,7 +267,7 @@ class Model:
     def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
         """The result, its jumps, and how the run ended where a jump ended it."""
         if self.jumper is None:
-            return method.solve(problem), (), None
+            return solve(method, problem, self.system.sliding), (), None
         hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
         result = hybrid.run()
         word = "failed" if hybrid.status is Status.FAILED else "stopped"

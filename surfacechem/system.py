@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import symengine
+from numpy.typing import NDArray
 
 from surfacechem.conductors import Conductor, Profile
 from surfacechem.expressions import Expression
@@ -336,6 +338,11 @@ class System:
     def origins(self) -> list[int]:
         """Columns of the times from which pieces of histories count; a stretch gives them in its own time."""
         return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which states are velocities without inertia, shape (states,)."""
+        return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
 
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run."""

@@ -59,7 +59,7 @@ class Composer:
         """A law that reads some of what is wanted and nothing that this scene does not have."""
         known = [law for law in laws(contract).values() if self._fits(law, without)]
         known = [law for law in known if not wanted or {*wanted} & formulas_read(law)]
-        return self.dice.law(self.dice.random.choice(known), tuple({"T_c", "phi"} & self.readable), **options)
+        return self.dice.law(self.dice.random.choice(known), tuple(sorted({"T_c", "phi"} & self.readable)), **options)
 
     def _fits(self, law: type[Law], without: tuple = ()) -> bool:
         return not issubclass(law, without) and formulas_read(law) <= self.readable
@@ -275,7 +275,7 @@ class Composer:
             self.loading["g_t"] = dice.history(dice.near(sizes["g_t"]))
         if "phi" in needs and not self.reactions and not self.limits:
             self.loading["phi"] = dice.history(0.5 * self.sites.phi_max, positive=True)
-        for name in {"v", "v_2"} & needs:
+        for name in sorted({"v", "v_2"} & needs):
             if self.slip == "prescribed" or name == "v_2":
                 self.loading[name] = dice.history(dice.near(10 * sizes[name]))
         if "v" in needs or self.frictions:

@@ -25,7 +25,7 @@ FLOORS = {
         "compile",
         "kernelcache",
     ],
-    "time": ["solvers.*", "marching", "equilibria", "jumps", "stretches", "events", "starting", "integrate"],
+    "time": ["solvers.*", "marching", "equilibria", "jumps", "stretches", "stalls", "events", "starting", "integrate"],
     "results": ["accuracy", "profiles", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",

@@ -73,6 +73,9 @@ def assemble(scene: Scene) -> System:
     taking = sinks(build)
     if build.transitions:
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
+    own = {str(item.symbol) for item in build.parameters.items if not item.internal}
+    shared = own & {item.name for item in build.named}
+    assert not shared, f"parameters and quantities share the names {shared}"
     unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,

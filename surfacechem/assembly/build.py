@@ -36,6 +36,9 @@ from surfacechem.variables import Parameters, Variables, unit_of
 
 MANY = range(2, 1000)
 
+NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
+"""Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
+
 NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
 
@@ -77,7 +80,10 @@ class Build:
         self.scene = scene
         self.interface = scene.interface
         custom = [body.temperature for body in scene.bodies if isinstance(body.temperature, str)]
-        self.parameters = Parameters([*custom, *(variable.name for variable in self.interface.variables)])
+        capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
+        self.parameters = Parameters(
+            [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
+        )
         self.variables = Variables(self.parameters)
         self.t = symengine.Symbol("t")
         self.nodes: dict[str, Node] = {}

@@ -74,6 +74,8 @@ def tangential_gap(build: Build) -> None:
     if kind.rate_dependent and not (kind.inertial and not kind.elastic):
         symbol = _state(build, "v", algebraic=True)
         build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
+        if not kind.elastic:
+            build.motion.gap_rates["u_t"] = symbol
     elif not kind.inertial or kind.elastic:
         build.variables.define("v", partial(_sliding_velocity, build, kind), "derived", "what does not stick")
 
@@ -233,6 +235,15 @@ def _elastic_rows(
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
     build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
+    _carried(build, slides, derivative(t_e, g))
+
+
+def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
+    """Sliding needs something that carries its friction."""
+    if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
+        reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
+        margin = where(slides > 0, where(stiffness > 0, stiffness, -1), 1)
+        build.margins.append(Margin("tangential stiffness", margin, reason))
 
 
 def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
