@@ -177,7 +177,6 @@ class _Books:
             {law: float(c.max()) for law, c in columns.items()},
         )
 
-
     def _before_end(self, values: Array) -> Array:
         """The values but for that of the last step, where a law that ends there may have none."""
         ended = self.trajectory.status == "stopped" and len(values) > 1 and not np.isfinite(values[-1])

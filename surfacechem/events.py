@@ -66,7 +66,7 @@ class Hybrid:
     hold: float = HOLD
     calm: int = 0
     """Number of transitions before the last chatter that was resolved."""
-    sharpened: float = -1.0
+    sharpened: float = -np.inf
     """Time [s] at which the largest margins seen were last forgotten."""
     steps: int = 0
     renewed: int = 0
@@ -206,14 +206,15 @@ class Hybrid:
     def _chatters(self, t: float) -> bool:
         """Whether more transitions have followed each other without time going on than any cause needs."""
         recent = len(self.jumps) - self.calm
-        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t * (1 - REACHED)
+        moment = REACHED * max(t, LATE * self.problem.segments[-1])
+        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - moment
 
     def _hold(self, point: Point) -> bool:
         """Let what begins and ends without end stay as it is for a while, and friction stick; whether that could be.
 
         It may only seem to do so where what moves now is rounding of what has moved before: that is forgotten first.
         """
-        if self.sharpened != point.t:
+        if point.t > self.sharpened + HOLD * self.problem.segments[-1]:
             self.sharpened, self.calm, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
             return True
         columns = {p.path: j for j, p in enumerate(self.system.parameters)}
@@ -263,12 +264,8 @@ class Hybrid:
         jump = self.jumper.make(index, point, self._since(point.t))
         self.jumps.append(jump)
         if jump.stops:
-            self.status, self.reason = (
-                Status.EVENT,
-                f"{jump.transition.reason}, which is {jump.verdict}"
-                if jump.verdict == "impossible"
-                else f"{jump.transition.reason}, which {jump.verdict}",
-            )
+            word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
+            self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
         self.booked = self.booked + np.array(
             [self._booking(account.law, account.kind, account.quantity.name, jump) for account in self.system.ledger]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers import ASKING, solver
-from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
+from surfacechem.solvers.contract import REASONS, Margin, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
@@ -48,7 +48,11 @@ FEW, SHARP = 100.0, 1e-12
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 STALLED = 1e-3
-"""A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
+"""A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
+left to close, explains why a run cannot go on."""
+
+RUNAWAY = 1e-9
+"""Part of the time that has passed within which a state that runs away would change by itself."""
 
 
 @dataclass(frozen=True)
@@ -307,6 +311,9 @@ class Model:
             elif any(state.quantity.unit == "K" for state in algebraic):
                 reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
+        runaway = self._runaway(result)
+        if runaway is not None:
+            return "stopped", f"{runaway} near {where}"
         return "failed", f"{REASONS[result.status]} at {where}{self._too_fast(result, values)}"
 
     def paces(self, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
@@ -325,23 +332,44 @@ class Model:
         return ""
 
     def _closest_margin(self, result: Result) -> str | None:
-        """Reason of the margin that is closed, or has all but closed, where a run could not go on."""
-        if self.program.margins is None:
+        """Reason of the margin that is closed, or all but closed and goes on closing, where a run could not go on."""
+        if self.program.margins is None or not self.margins:
             return None
-        last = self._margins(result, result.t, result.y, result.ydot)
-        first, steps = last, result.steps
-        if steps is not None and len(steps.t):
-            k = int(np.searchsorted(steps.t, result.problem.segments[-2]))
-            k = min(k, len(steps.t) - 1)
-            first = self._margins(result, steps.t[k], steps.y[k], steps.ydot[k])
-        shrink = [0.0 if b <= 0 else abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
-        order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
-        return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
+        end = Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
+        terminal = np.array([margin.terminal for margin in self.margins])
+        last = self._margins(result, end, side="right")[0, : len(self.margins)]
+        if np.any(closed := terminal & (last <= 0)):
+            return self.margins[int(np.argmax(closed))].reason
+        if result.steps is None or len(result.steps.t) < 2:
+            return None
+        seen, t = self._margins(result, result.steps)[:, : len(self.margins)], result.steps.t
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shrink = seen[-1] / np.max(np.abs(seen), axis=0)
+            left = seen[-1] / (seen[-2] - seen[-1]) * (t[-1] - t[-2])
+        closing = terminal & (seen[-1] < seen[-2]) & (left < STALLED * t[-1])
+        nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
+        return self.margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
 
-    def _margins(self, result: Result, t: float, y: Array, ydot: Array) -> Array:
-        """Margins at a point of the last stretch."""
-        assert self.program.margins is not None
-        return self.program.margins(np.concatenate([[t], y, ydot, result.problem.parameters[-1]]))
+    def _margins(self, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:
+        """Margins at all steps, shape (steps, margins); at a breakpoint those of the piece on one side of it."""
+        margins, problem = self.program.margins, result.problem
+        assert margins is not None
+        segment = np.searchsorted(problem.segments[1:-1], steps.t, side=side)
+        inputs = [steps.t[:, None], steps.y, steps.ydot, problem.parameters[segment]]
+        return np.atleast_2d(margins(self.program.filled(np.concatenate(inputs, axis=1))))
+
+    def _runaway(self, result: Result) -> str | None:
+        """The state that changes so fast that time cannot resolve it, where a run could not go on."""
+        scales = np.array([state.scale for state in self.system.states])
+        with np.errstate(over="ignore", invalid="ignore"):
+            speed = np.abs(result.ydot) / (np.abs(result.y) + ABSOLUTE * scales)
+        j = int(np.argmax(np.nan_to_num(speed)))
+        if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE) or not speed[j] * result.t > 1 / RUNAWAY:
+            return None
+        state = self.system.states[j]
+        return (
+            f"{state.name} runs away: it changes by {result.ydot[j]:.3g} {state.quantity.unit}/s and faster and faster"
+        )
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""

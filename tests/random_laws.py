@@ -38,12 +38,32 @@ class Dice:
         L, end, E, N = self.length, self.end, self.energy, self.sites
         bond = BOLTZMANN * T_0
         return {
-            **{"Pa/m": self.stiffness, "Pa": self.traction, "m": L, "J/m^2": E, "m/s": L / end, "1/s": 1 / end},
-            **{"s": end, "J/(m^2 K)": self.capacity, "W/(m^2 K)": self.capacity / end, "J": 5 * bond},
-            **{"W/(m K)": self.capacity / end * L, "N/m": 2 * bond / L**2, "J/mol": 2e4, "1/(J s)": N / (end * E)},
-            **{"1/(J s m^2)": N**2 / (end * E), "J s/m^2": end * E, "Pa s": self.traction * end},
-            **{"Pa s/m": self.stiffness * end, "1/m^2": N, "m^2": L**2, "m^2/s": 1 / (N * end), "K": 100.0},
-            **{"1/m": 1 / L, "C/m^2": (1.8e-11 * self.traction) ** 0.5, "F/m": 9e-12, "W/m^2": self.capacity / end},
+            "Pa/m": self.stiffness,
+            "Pa": self.traction,
+            "m": L,
+            "J/m^2": E,
+            "m/s": L / end,
+            "1/s": 1 / end,
+            "s": end,
+            "J/(m^2 K)": self.capacity,
+            "W/(m^2 K)": self.capacity / end,
+            "J": 5 * bond,
+            "W/(m K)": self.capacity / end * L,
+            "N/m": 2 * bond / L**2,
+            "J/mol": 2e4,
+            "1/(J s)": N / (end * E),
+            "1/(J s m^2)": N**2 / (end * E),
+            "J s/m^2": end * E,
+            "Pa s": self.traction * end,
+            "Pa s/m": self.stiffness * end,
+            "1/m^2": N,
+            "m^2": L**2,
+            "m^2/s": 1 / (N * end),
+            "K": 100.0,
+            "1/m": 1 / L,
+            "C/m^2": (1.8e-11 * self.traction) ** 0.5,
+            "F/m": 9e-12,
+            "W/m^2": self.capacity / end,
         }
 
     def decades(self, low: float, high: float) -> float:
@@ -156,5 +176,3 @@ class Dice:
             Table(times=[0.0, *times], values=[self.random.uniform(low, size) for _ in range(6)]),
             Table(times=[0.0, pulse, pulse + brief, pulse + 2 * brief], values=[rest, rest, sign * size, rest]),
         )
-
-

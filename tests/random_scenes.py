@@ -1,14 +1,16 @@
 """Random scenes: laws drawn from all there are, ways to hold the gap, loads, programmes, temperatures; from one seed."""
 
+from functools import cache
+
 from random_laws import T_0, Dice
 
+from surfacechem.data import mechanisms
 from surfacechem.laws import laws
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.mechanism import load_mechanism
-from surfacechem.data import mechanisms
 from surfacechem.media.coolprop import CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites, Stage
 from surfacechem.substances import Property
@@ -38,6 +40,9 @@ def asked(law: Law) -> set[str]:
             for factor in value.factors:
                 found |= {factor.of, *reads(factor.factor)} - {"x"}
     return found
+
+
+_mechanism = cache(load_mechanism)
 
 
 class Composer:
@@ -79,7 +84,9 @@ class Composer:
 
     def scene(self) -> Scene:
         dice = self.dice
-        self.kind = dice.pick("together", "together", "apart", "apart", "bare", "one side", "reservoirs", "held", "no medium")
+        self.kind = dice.pick(
+            "together", "together", "apart", "apart", "bare", "one side", "reservoirs", "held", "no medium"
+        )
         self.gap = dice.pick("none", "prescribed", "moving", "moving", "moving", "dead", "rigid")
         self.bonds = dice.chance(0.55)
         self.slip = dice.pick("none", "none", "prescribed", "moving", "moving", "moving", "dead", "elastic only")
@@ -108,8 +115,7 @@ class Composer:
     # -- laws -----------------------------------------------------------------------------------------------------
 
     def _mechanism(self) -> None:
-        file = self.dice.pick(*sorted(mechanisms().glob("*.yaml")))
-        self.mechanism, self.bonds = load_mechanism(file), False
+        self.mechanism, self.bonds = _mechanism(self.dice.pick(*sorted(mechanisms().glob("*.yaml")))), False
         first, *_, last = self.mechanism.species
         share = self.dice.pick(0.0, 1e-9, self.dice.random.random(), 1.0)
         self.initial |= self.mechanism.coverages({first: 1 - share, last: share})
@@ -337,7 +343,9 @@ class Composer:
     def _start(self) -> None:
         dice = self.dice
         if self.bonds and (self.reactions or self.limits):
-            self.initial["phi"] = self.sites.phi_max * dice.pick(0.0, 1e-12, 1e-3, *[dice.random.random()] * 3, 1 - 1e-9, 1.0)
+            self.initial["phi"] = self.sites.phi_max * dice.pick(
+                0.0, 1e-12, 1e-3, *[dice.random.random()] * 3, 1 - 1e-9, 1.0
+            )
         if self.limits and not self.reactions and self.mechanism is None:
             self.initial["phi"] = self.sites.phi_max * dice.random.random()
         opened = self._needs_open_gap()

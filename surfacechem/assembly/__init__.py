@@ -69,6 +69,7 @@ def assemble(scene: Scene) -> System:
     build = Build(scene)
     for stage in STAGES:
         stage(build)
+    build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
     if build.transitions:

@@ -305,6 +305,19 @@ class Build:
         slab = self.slabs[body]
         return list(zip(slab.nodes, grids.shares(slab.points), strict=True))
 
+    def varying_margins(self) -> None:
+        """Parameters stay in their range as they vary; what may be zero may be so by rounding."""
+        found = []
+        for law, name, spec, value in self.variables.varying:
+            slack = NOTHING * abs(getattr(law, name).value)
+            low, why = max(spec.above, spec.at_least), f"{law.title}: {name} left its range ({spec.range}) as it varies"
+            if math.isfinite(low):
+                above = value - low + (slack if spec.at_least >= low else 0)
+                found.append(Margin(f"{name} of {law.label} {spec.range}", above, why))
+            if math.isfinite(spec.at_most):
+                found.append(Margin(f"{name} of {law.label} at most", spec.at_most + slack - value, why))
+        self.margins[:0] = found
+
     def shares(self) -> dict[str, Expression]:
         """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""
         alpha = self._share("alpha", "interface.partition", self.interface.partition, "body 1")

@@ -254,7 +254,10 @@ def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Ex
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
             "mass or a damper."
         )
-    reason = "no steady sliding velocity: friction falls faster with velocity than anything else resists; a mass would"
+    reason = (
+        "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
+        "resists; a mass or a viscous resistance would give one"
+    )
     build.margins.append(Margin("stable v", where(slides > 0, slope, 1), reason))
 
 
