@@ -38,8 +38,9 @@ ABSOLUTE = 1e-6
 STATE = Spec("", "initial value")
 """Initial values need only be finite here; margins say where they may be."""
 
-PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
-"""Parts into which the period of a load is cut, and the number of them above which it is left to the steps."""
+PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
+"""Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
+which it is left to the steps."""
 
 STRAY, LARGEST_SLACK = 1e3, 1e-3
 """How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""

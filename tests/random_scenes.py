@@ -1,4 +1,4 @@
-"""Random scenes: laws drawn from all there are, ways to hold the gap, loads, programmes, temperatures; from one seed."""
+"""Random scenes from one seed: laws drawn from all there are, ways to hold the gap, loads, programmes, temperatures."""
 
 from functools import cache
 
@@ -104,10 +104,10 @@ class Composer:
         self._prescribed()
         programme = self._programme()
         self._start()
-        interface = Interface(
-            T_c, self.potentials, self.frictions, self.reactions, self.mechanism.sites if self.mechanism else self.sites, limits=self.limits,
-            partition=dice.random.random(), medium=self._medium(), **self._species(),
-        )  # fmt: skip
+        sites, medium = self.mechanism.sites if self.mechanism else self.sites, self._medium()
+        laws_of = {"limits": self.limits, "partition": dice.random.random(), "medium": medium}
+        reading = (self.potentials, self.frictions, self.reactions)
+        interface = Interface(T_c, *reading, sites, **laws_of, **self._species())
         return Scene(
             bodies, interface, self.heat, self.loading, surroundings, T_0, self.initial, programme=programme, **mounts
         )
@@ -284,9 +284,8 @@ class Composer:
         for name in sorted({"v", "v_2"} & needs):
             if self.slip == "prescribed" or name == "v_2":
                 self.loading[name] = dice.history(dice.near(10 * sizes[name]))
-        if "v" in needs or self.frictions:
-            if self.slip == "prescribed" and "v" not in self.loading:
-                self.loading["v"] = dice.history(dice.near(10 * sizes["v"]))
+        if ("v" in needs or self.frictions) and self.slip == "prescribed" and "v" not in self.loading:
+            self.loading["v"] = dice.history(dice.near(10 * sizes["v"]))
         if {"p", "f", "t_n"} & needs and not gap_is_read and self.gap != "rigid":
             if "p" in needs:
                 self.loading["p"] = dice.history(dice.near(dice.traction), positive=True)

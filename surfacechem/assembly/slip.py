@@ -235,7 +235,7 @@ def _elastic_rows(
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
     build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
-    _carried(build, slides, derivative(t_e, g))
+    _carried(build, slides, derivative(t_e, symengine.Symbol("g_t")))
 
 
 def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
