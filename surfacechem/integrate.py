@@ -8,18 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
+from surfacechem.ends import closest_margin, runaway
 from surfacechem.equilibria import Equilibria, Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers import ASKING, solver
-from surfacechem.solvers.contract import REASONS, Margin, Points, Problem, Result, Solver, Status
+from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
@@ -47,13 +48,6 @@ STRAY, LARGEST_SLACK = 1e3, 1e-3
 
 FEW, SHARP = 100.0, 1e-12
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
-
-STALLED = 1e-3
-"""A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
-left to close, explains why a run cannot go on."""
-
-RUNAWAY = 1e-9
-"""Part of the time that has passed within which a state that runs away would change by itself."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +189,7 @@ class Model:
         self._start_modes(parameters, values)
         return Problem(
             program=self.program,
-            y0=self._start(np.array(list(initial.values())), parameters[0]),
+            y0=self._start(np.array(list(initial.values())), parameters),
             times=np.asarray(run.times, dtype=float),
             segments=segments,
             parameters=parameters,
@@ -218,15 +212,17 @@ class Model:
                 start = float(self.system.expand(mode.start).subs(initial))
                 parameters[:, symbols.index(mode.symbol)] = start
 
-    def _start(self, y: Array, parameters: Array) -> Array:
+    def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.system.equilibria:
+            parameters = table[0].copy()
             equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system)
             settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
-        return stable_start(self.system, self.program, y, parameters)
+            table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
+        return stable_start(self.system, self.program, y, table[0])
 
     def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
         rows = np.empty((len(starts), len(self.system.parameters)))
@@ -300,7 +296,7 @@ class Model:
             fitted = fit is not None and margin.name == fit.margin
             why = fit.reason(values, self._visited(result, fit.temperature)[-1]) if fit and fitted else margin.reason
             return "stopped", f"{why} at {where}"
-        shrunk = self._closest_margin(result)
+        shrunk = closest_margin(self.program, self.margins, result)
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"
         algebraic = [state for state in self.system.states if state.algebraic]
@@ -312,9 +308,8 @@ class Model:
             elif any(state.quantity.unit == "K" for state in algebraic):
                 reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
-        runaway = self._runaway(result)
-        if runaway is not None:
-            return "stopped", f"{runaway} near {where}"
+        if (fast := runaway(self.system.states, result)) is not None:
+            return "stopped", f"{fast} near {where}"
         return "failed", f"{REASONS[result.status]} at {where}{self._too_fast(result, values)}"
 
     def paces(self, values: Mapping[str, float]) -> list[tuple[Pace, float]]:
@@ -331,46 +326,6 @@ class Model:
             if time_ < shortest.get(result.status, 0.0):
                 return f": the {pace.text}, {time_:.3g} s, is too short for a run of {end:.3g} s; {pace.remedy}"
         return ""
-
-    def _closest_margin(self, result: Result) -> str | None:
-        """Reason of the margin that is closed, or all but closed and goes on closing, where a run could not go on."""
-        if self.program.margins is None or not self.margins:
-            return None
-        end = Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
-        terminal = np.array([margin.terminal for margin in self.margins])
-        last = self._margins(result, end, side="right")[0, : len(self.margins)]
-        if np.any(closed := terminal & (last <= 0)):
-            return self.margins[int(np.argmax(closed))].reason
-        if result.steps is None or len(result.steps.t) < 2:
-            return None
-        seen, t = self._margins(result, result.steps)[:, : len(self.margins)], result.steps.t
-        with np.errstate(invalid="ignore", divide="ignore"):
-            shrink = seen[-1] / np.max(np.abs(seen), axis=0)
-            left = seen[-1] / (seen[-2] - seen[-1]) * (t[-1] - t[-2])
-        closing = terminal & (seen[-1] < seen[-2]) & (left < STALLED * t[-1])
-        nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
-        return self.margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
-
-    def _margins(self, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:
-        """Margins at all steps, shape (steps, margins); at a breakpoint those of the piece on one side of it."""
-        margins, problem = self.program.margins, result.problem
-        assert margins is not None
-        segment = np.searchsorted(problem.segments[1:-1], steps.t, side=side)
-        inputs = [steps.t[:, None], steps.y, steps.ydot, problem.parameters[segment]]
-        return np.atleast_2d(margins(self.program.filled(np.concatenate(inputs, axis=1))))
-
-    def _runaway(self, result: Result) -> str | None:
-        """The state that changes so fast that time cannot resolve it, where a run could not go on."""
-        scales = np.array([state.scale for state in self.system.states])
-        with np.errstate(over="ignore", invalid="ignore"):
-            speed = np.abs(result.ydot) / (np.abs(result.y) + ABSOLUTE * scales)
-        j = int(np.argmax(np.nan_to_num(speed)))
-        if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE) or not speed[j] * result.t > 1 / RUNAWAY:
-            return None
-        state = self.system.states[j]
-        return (
-            f"{state.name} runs away: it changes by {result.ydot[j]:.3g} {state.quantity.unit}/s and faster and faster"
-        )
 
     def evaluate(self, result: Result, t: Array, y: Array, ydot: Array) -> Array:
         """Named quantities along a trajectory, shape (len(t), outputs)."""

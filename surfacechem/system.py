@@ -18,6 +18,9 @@ from surfacechem.refit import Fit
 from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
 
+SIDE = "mode.side"
+"""Path of the mode that says on which side of touch the gap is."""
+
 HELD = "run.held_until"
 """Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
 

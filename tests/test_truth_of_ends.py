@@ -9,11 +9,13 @@ from scenes_mechanics import TOGETHER, inertial_gap, overdamped_gap
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.adhesion import AdhesionIntensity
 from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import DudkoHummerSzabo
 from surfacechem.laws.bulk import Constant
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
@@ -23,7 +25,6 @@ from surfacechem.laws.gap_conductance import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
-from surfacechem.laws.rate_and_state import RateAndStateAging
 from surfacechem.scene import Interface, Medium, Mounting, Scene, Stage
 from surfacechem.solution import Solution
 
@@ -76,7 +77,7 @@ def test_equations_are_linear_in_the_rates(make):
     system = assemble(make())
     rates = [s.dot for s in system.states]
     for row in system.residual():
-        assert all(symengine.diff(row, a, b) == 0 for a in rates for b in rates)
+        assert all(derivative(derivative(row, a), b) == 0 for a in rates for b in rates)
 
 
 def test_work_on_a_state_at_rest_is_followed_without_transitions():
@@ -94,7 +95,7 @@ def test_reversals_are_events_under_a_periodic_load():
 
 
 def test_relaxation_needs_a_potential_that_curves():
-    with pytest.raises(InputError, match="relaxation holds for dmu_dphi > 0 only; .* always 0"):
+    with pytest.raises(InputError, match=r"relaxation holds for dmu_dphi > 0 only; .* always 0"):
         assemble(perfect_contact([LinearEnthalpy(H_r=1.0)], [Relaxation(tau=1.0)]))
 
 
@@ -117,7 +118,7 @@ def test_a_slider_without_transitions_starts_in_equilibrium():
     interface = Interface("T", [TangentialStiffness(E_t=1e12)], [Viscous(eta=1e3)])
     scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
     trajectory = run(scene, 1.0)
-    assert state(trajectory, "u_t")[0] == pytest.approx(-4e-8, rel=1e-9)
+    assert state(trajectory, "u_t")[0] == pytest.approx(-2e-8, rel=1e-9)
     balance = 1e12 * (column(trajectory, "w_t") - state(trajectory, "u_t")) - column(trajectory, "t_e")
     assert np.max(np.abs(balance)) < 1e-9 * np.max(np.abs(column(trajectory, "t_e")))
 
@@ -128,7 +129,7 @@ def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     scene = Scene(bodies(), Interface(None), [law], loading, None, 300.0, APART)
     trajectory = run(scene, 1.5)
     assert trajectory.status == "stopped"
-    assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies at t = 1.13333")
+    assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies near t = 1.13333")
 
 
 def test_a_programme_moves_a_dead_load():
@@ -153,28 +154,6 @@ def test_an_overdamped_slider_starts_from_rest():
     )
 
 
-def test_a_slider_of_rate_and_state_with_mass_comes_to_rest():
-    law = RateAndStateAging(mu_0=0.73, a=0.0104, b=0.0119, L=8.7e-8, v_0=1.1e-3)
-    loading = {"w_t": Hold(level=0.0)}
-    interface = Interface("T", frictions=[law])
-    initial = TOGETHER | {"theta": 0.01, "v": 1e-4}
-    programme = (Stage("press", {"p": 1.0}, duration=1e-3), Stage("rest", {}))
-    mount = Mounting(k=7.7e9, m=1.1e5)
-    scene = Scene(
-        bodies("T", "T"),
-        interface,
-        (),
-        loading,
-        None,
-        300.0,
-        initial | {"p": 1e5},
-        tangential=mount,
-        programme=programme,
-    )
-    trajectory = run(scene, 1e-2)
-    assert trajectory.status == "finished"
-
-
 def test_an_open_contact_does_not_stick_and_slide_without_end():
     adhesion = AdhesionIntensity(C_N=1.8e9, C_T=1.8e7, w=1.5e-7, E_n=1.2e9)
     pulse = Table(times=[0.0, 0.31, 0.310000002, 0.310000004], values=[0.0, 0.0, 3e-9, 0.0])
@@ -195,11 +174,20 @@ def test_a_film_that_closes_before_the_last_breakpoint_is_named():
 
 
 def test_an_impossible_jump_says_what_is_in_the_way():
-    interface = Interface("T", [VanDerWaalsFlatFlat(A_H=1e-19)])
-    loading = {"w_n": Ramp(start=5e-9, rate=-1e-9)}
-    scene = Scene(
-        bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER | {"g_n": 5e-9}, normal=Mounting(k=1e13)
-    )
-    trajectory = run(scene, 10.0)
+    interface = Interface("T", [ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)])
+    loading = {"F_n": Ramp(start=0.0, rate=1e5)}
+    trajectory = run(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER), 20.0)
     assert trajectory.status == "stopped"
     assert "is impossible: no gap follows at which the tractions are in equilibrium" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(10.0, rel=1e-6)
+
+
+def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_side():
+    interface = Interface("T", [VanDerWaalsFlatFlat(A_H=1e-19)])
+    loading = {"w_n": Ramp(start=5e-9, rate=-1e-9)}
+    initial = TOGETHER | {"g_n": 5e-9}
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    trajectory = run(scene, 10.0)
+    # In contact the attraction is what it is at touch: A_H / (6 pi D_0^3).
+    pull = 1e-19 / (6 * np.pi * 1.65e-10**3)
+    assert state(trajectory, "g_n")[0] == pytest.approx(5e-9 - pull / 1e13, rel=1e-9)
