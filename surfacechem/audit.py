@@ -177,7 +177,7 @@ class _Books:
         """Least and largest entropy production of each law over outputs and steps, and the part that it destroys."""
         values = self.trajectory.within_bounds
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
-        columns = {law: values[f"sigma_{law}"] for law in laws if len(values.get(f"sigma_{law}", ()))}
+        columns = {law: self._before_end(values[f"sigma_{law}"]) for law in laws if len(values.get(f"sigma_{law}", ()))}
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},
@@ -189,8 +189,14 @@ class _Books:
         steps = self.trajectory.result.steps
         if steps is None or len(steps.t) < 2:
             return 1.0
-        production = column[-len(steps.t) :] * np.diff(steps.t, prepend=steps.t[0])
+        within = column[len(self.trajectory.result.times) :]
+        production = within * np.diff(steps.t, prepend=steps.t[0])[: len(within)]
         return float(_share(-np.minimum(production, 0.0).sum(), np.abs(production).sum()))
+
+    def _before_end(self, values: Array) -> Array:
+        """The values but for that of the last step, where a law that ends there may have none."""
+        ended = self.trajectory.status == "stopped" and len(values) > 1 and not np.isfinite(values[-1])
+        return values[:-1] if ended else values
 
 
 def _share(part: float, whole: float) -> float:

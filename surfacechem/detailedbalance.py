@@ -65,6 +65,8 @@ def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
     found = []
     for pair in trajectory.model.system.pairs:
         values = trajectory.everywhere[pair.departure]
+        if not len(values):  # a run that ends at its start
+            continue
         low, high = float(np.min(values)), float(np.max(values))
         found.append(Verdict(pair.title, low, high, pair.law not in audit.violations))
     return tuple(found)

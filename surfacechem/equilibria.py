@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surfacechem.compile import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.marching import march, zero_ahead
-from surfacechem.system import Equilibrium, Fold, System
+from surfacechem.system import SIDE, Equilibrium, Fold, System
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -105,12 +105,23 @@ class Equilibria:
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
         rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
         rows[:, 1 + way.column] = gaps
+        if self._side is not None:
+            # A law that changes at touch holds on its own side only; beyond it may have poles.
+            column, g = self._side, rows[:, 1 + self.states.index("g_n")]
+            rows[:, column] = np.where(g == 0, rows[:, column], np.sign(g))
         return rows
+
+    @cached_property
+    def _side(self) -> int | None:
+        """Column of the mode that says on which side of touch the gap is, where there is one."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        return 1 + 2 * len(self.states) + paths.index(SIDE) if SIDE in paths and "g_n" in self.states else None
 
     def _moved(self, point: Point, way: Way, gap: float | None) -> Point | None:
         if gap is None:
             return None
-        return replace(point, y=self._rows(point, way, [gap])[0, 1 : 1 + len(point.y)])
+        row, n = self._rows(point, way, [gap])[0], len(point.y)
+        return replace(point, y=row[1 : 1 + n], parameters=row[1 + 2 * n :])
 
     def march(self, point: Point, way: Way, direction: float = 0.0, heat: Heat | None = None) -> Point | None:
         """The next point along a way at which the driving traction along it ends, in the direction in which it pushes.

@@ -17,6 +17,7 @@ from surfacechem.equilibria import DRIFT, Point
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
+from surfacechem.stalls import solve
 from surfacechem.stretches import Part, all_counters, all_events, all_steps, changed, joined
 from surfacechem.system import HELD, START, System
 
@@ -33,6 +34,9 @@ REACHED = 1e-14
 
 LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
+
+LATE, RENEWALS = 1e-6, 4
+"""Part of a run below which a stretch is short, and the number of short ones that may follow each other."""
 
 ATOM = 1e-20
 """Gap [m] that counts as none where a run stalls."""
@@ -65,7 +69,11 @@ class Hybrid:
     hold: float = HOLD
     calm: int = 0
     """Number of transitions before the last chatter that was resolved."""
+    sharpened: float = -np.inf
+    """Time [s] at which the largest margins seen were last forgotten."""
     steps: int = 0
+    renewed: int = 0
+    """Number of short stretches in a row that time could not resolve."""
     written: int = 0
     """Number of outputs written."""
     status: Status = Status.FINISHED
@@ -108,8 +116,8 @@ class Hybrid:
                 return point
             index = self._transition(part, point)
             across = self._across_kink(part, point) if index is None else None
-            if across is not None:
-                point = across
+            if across is not None or self._renews(part):
+                point = across or point
                 continue
             if index is None:
                 self.status = part.status
@@ -140,7 +148,7 @@ class Hybrid:
             max_steps=problem.max_steps - self.steps,
             max_seconds=seconds,
         )
-        return self._keep(self.method.solve(part), start, times, end)
+        return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
     def _keep(self, result: Result, start: Point, times: Array, end: float) -> Part:
         """The stretch with its times as those of the run, and the ledger up to its end."""
@@ -163,6 +171,11 @@ class Hybrid:
             index = int(part.result.events.index[-1]) - self.first
             return index if index >= 0 else None
         return self.jumper.equilibria.lost(point, self.problem.rtol) if part.status in LOST else None
+
+    def _renews(self, part: Part) -> bool:
+        """Whether a stretch that time could not resolve any more goes on in a time of its own."""
+        self.renewed = self.renewed + 1 if part.result.t < LATE * self.problem.segments[-1] else 0
+        return part.status is Status.STEP_UNDERFLOW and part.result.t > 0 and self.renewed < RENEWALS
 
     def _across_kink(self, part: Part, point: Point) -> Point | None:
         """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
@@ -196,10 +209,17 @@ class Hybrid:
     def _chatters(self, t: float) -> bool:
         """Whether more transitions have followed each other without time going on than any cause needs."""
         recent = len(self.jumps) - self.calm
-        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t * (1 - REACHED)
+        moment = REACHED * max(t, LATE * self.problem.segments[-1])
+        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - moment
 
     def _hold(self, point: Point) -> bool:
-        """Let what begins and ends without end stay as it is for a while, and friction stick; whether that could be."""
+        """Let what begins and ends without end stay as it is for a while, and friction stick; whether that could be.
+
+        It may only seem to do so where what moves now is rounding of what has moved before: that is forgotten first.
+        """
+        if point.t > self.sharpened + HOLD * self.problem.segments[-1]:
+            self.sharpened, self.calm, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
+            return True
         columns = {p.path: j for j, p in enumerate(self.system.parameters)}
         if HELD not in columns or len(self.jumps) - self.calm > 2 * AT_ONCE or self.hold > LONGEST_HOLD:
             return False
@@ -259,12 +279,8 @@ class Hybrid:
         jump = self.jumper.make(index, point, self._since(point.t))
         self.jumps.append(jump)
         if jump.stops:
-            self.status, self.reason = (
-                Status.EVENT,
-                f"{jump.transition.reason}, which is {jump.verdict}"
-                if jump.verdict == "impossible"
-                else f"{jump.transition.reason}, which {jump.verdict}",
-            )
+            word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
+            self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
         self.booked = self.booked + np.array(
             [self._booking(account.law, account.kind, account.quantity.name, jump) for account in self.system.ledger]

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
-from surfacechem.equilibria import Point
+from surfacechem.ends import closest_margin, runaway
+from surfacechem.equilibria import Equilibria, Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
@@ -22,6 +23,7 @@ from surfacechem.pacing import too_fast
 from surfacechem.solvers import ASKING, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
+from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
 from surfacechem.system import System
 from surfacechem.terms import Spec
@@ -38,14 +40,12 @@ ABSOLUTE = 1e-6
 STATE = Spec("", "initial value")
 """Initial values need only be finite here; margins say where they may be."""
 
-PARTS_OF_A_PERIOD, MOST_PARTS = 8, 20_000
-"""Parts into which the period of a load is cut, and the number of them above which it is left to the steps."""
+PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
+"""Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
+which it is left to the steps."""
 
 STRAY, LARGEST_SLACK = 1e3, 1e-3
 """How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
-
-STALLED = 1e-3
-"""A margin that has shrunk to this part of its initial value explains why a run cannot go on."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ class Model:
         self._start_modes(parameters, values)
         return Problem(
             program=self.program,
-            y0=self._start(np.array(list(initial.values())), parameters[0]),
+            y0=self._start(np.array(list(initial.values())), parameters),
             times=np.asarray(run.times, dtype=float),
             segments=segments,
             parameters=parameters,
@@ -226,14 +226,17 @@ class Model:
                 start = float(self.system.expand(mode.start).subs(initial))
                 parameters[:, symbols.index(mode.symbol)] = start
 
-    def _start(self, y: Array, parameters: Array) -> Array:
+    def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
-        if self.jumper is not None and self.system.equilibria:
-            settled = self.jumper.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
+        if self.system.equilibria:
+            parameters = table[0].copy()
+            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system)
+            settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
-        return stable_start(self.system, self.program, y, parameters)
+            table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
+        return stable_start(self.system, self.program, y, table[0])
 
     def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
         rows = np.empty((len(starts), len(self.system.parameters)))
@@ -279,7 +282,7 @@ class Model:
     def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
         """The result, its jumps, and how the run ended where a jump ended it."""
         if self.jumper is None:
-            return method.solve(problem), (), None
+            return solve(method, problem, self.system.sliding), (), None
         hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
         result = hybrid.run()
         word = "failed" if hybrid.status is Status.FAILED else "stopped"
@@ -288,10 +291,9 @@ class Model:
 
     def _visited(self, result: Result, temperature: str) -> Array:
         """A temperature at all steps and at the end."""
-        steps = result.steps
-        assert steps is not None
-        t = np.append(steps.t, result.t)
-        y, ydot = np.vstack([steps.y, result.y]), np.vstack([steps.ydot, result.ydot])
+        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+        if (steps := result.steps) is not None:  # a run may end at its start
+            t, y, ydot = np.append(steps.t, t), np.vstack([steps.y, y]), np.vstack([steps.ydot, ydot])
         names = [state.name for state in self.system.states]
         if temperature in names:
             return y[:, names.index(temperature)]
@@ -308,7 +310,7 @@ class Model:
             fitted = fit is not None and margin.name == fit.margin
             why = fit.reason(values, self._visited(result, fit.temperature)[-1]) if fit and fitted else margin.reason
             return "stopped", f"{why} at {where}"
-        shrunk = self._closest_margin(result)
+        shrunk = closest_margin(self.program, self.margins, result)
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"
         algebraic = [state for state in self.system.states if state.algebraic]
@@ -320,26 +322,9 @@ class Model:
             elif any(state.quantity.unit == "K" for state in algebraic):
                 reason += ": ignition, or sliding that nothing steadies"
             return "stopped", f"{reason} at {where}"
+        if (fast := runaway(self.system.states, result)) is not None:
+            return "stopped", f"{fast} near {where}"
         return "failed", f"{REASONS[result.status]} at {where}{too_fast(self.system, result, values)}"
-
-    def _closest_margin(self, result: Result) -> str | None:
-        """Reason of the margin that is closed, or has all but closed, where a run could not go on."""
-        if self.program.margins is None:
-            return None
-        last = self._margins(result, result.t, result.y, result.ydot)
-        first, steps = last, result.steps
-        if steps is not None and len(steps.t):
-            k = int(np.searchsorted(steps.t, result.problem.segments[-2]))
-            k = min(k, len(steps.t) - 1)
-            first = self._margins(result, steps.t[k], steps.y[k], steps.ydot[k])
-        shrink = [0.0 if b <= 0 else abs(b / a) if a else 1.0 for a, b in zip(first, last, strict=True)]
-        order = [i for i in np.argsort(shrink[: len(self.margins)]) if self.margins[i].terminal]
-        return self.margins[order[0]].reason if order and shrink[order[0]] < STALLED else None
-
-    def _margins(self, result: Result, t: float, y: Array, ydot: Array) -> Array:
-        """Margins at a point of the last stretch."""
-        assert self.program.margins is not None
-        return self.program.margins(np.concatenate([[t], y, ydot, result.problem.parameters[-1]]))
 
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 
+NO_REST = "no gap follows at which the tractions are in equilibrium; with a mass or a damper it would move on"
+NO_HEAT = "it would take more heat than there is"
+
 ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
 
@@ -47,6 +50,8 @@ class Jump:
     """Time since the transition before [s], sharper than the difference of their times late in a run."""
     work: Mapping[str, float] = field(default_factory=dict)
     """Work of the far-field tractions [J/m^2], by account."""
+    obstacle: str = ""
+    """Why it is impossible, where it is."""
     heat_out: float = 0.0
     """Heat passed to prescribed temperatures [J/m^2]."""
     entropy_out: float = 0.0
@@ -147,7 +152,8 @@ class Jumper:
                 after = self.equilibria.settle(start, heat)
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
-            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since)
+            obstacle = NO_REST if after is None else NO_HEAT
+            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
         return self._judged(
             Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import symengine
+from numpy.typing import NDArray
 
 from surfacechem.conductors import Conductor, Profile
 from surfacechem.expressions import Expression
@@ -15,6 +17,9 @@ from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
 from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
+
+SIDE = "mode.side"
+"""Path of the mode that says on which side of touch the gap is."""
 
 HELD = "run.held_until"
 """Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
@@ -340,6 +345,11 @@ class System:
     def origins(self) -> list[int]:
         """Columns of the times from which pieces of histories count; a stretch gives them in its own time."""
         return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which states are velocities without inertia, shape (states,)."""
+        return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
 
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run."""

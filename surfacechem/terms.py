@@ -213,6 +213,9 @@ class Factor(Law):
     contract = "factor"
     formula = "factor"
 
+    keeps_sign: ClassVar[bool] = False
+    """Whether the factor is positive whatever the variable is."""
+
     of: str = option("variable it depends on", default="T_c")
 
     factor: ClassVar[Callable[..., Expression]]

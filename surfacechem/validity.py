@@ -24,7 +24,14 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
     point[system.t] = symengine.Integer(0)
     for margin in system.margins:
         if margin.terminal:
-            _check(margin, system.expand(margin.expression).subs(point))
+            _check(margin, _at(system.expand(margin.expression), point))
+
+
+def _at(expression: Expression, point: Mapping[Any, Any]) -> Expression:
+    try:
+        return expression.subs(point)
+    except RuntimeError:  # a condition on a number that is undefined
+        return symengine.nan
 
 
 def _check(margin: Margin, value: Expression) -> None:

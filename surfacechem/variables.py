@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TypeVar
@@ -83,6 +84,8 @@ class Variables:
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.roles: list[Role] = []
+        self.varying: list[tuple[Law, str, Spec, Expression]] = []
+        """Parameters whose factors may carry them out of their range: law, name, range and expression."""
         self._makers: dict[str, Callable[[], Expression]] = {}
         self._symbols: dict[str, Expression] = {}
 
@@ -151,6 +154,10 @@ class Variables:
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
             for factor in value.factors:
                 symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}", unit=unit_of(factor.of)))
+            low = max(spec.above, spec.at_least)
+            bounded = low > 0 or math.isfinite(spec.at_most)
+            if bounded or not all(factor.keeps_sign for factor in value.factors):
+                self.varying.append((law, name, spec, symbol))
             return symbol
         if value is None:
             return None

@@ -69,10 +69,14 @@ def assemble(scene: Scene) -> System:
     build = Build(scene)
     for stage in STAGES:
         stage(build)
+    build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
     if build.transitions:
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
+    own = {str(item.symbol) for item in build.parameters.items if not item.internal}
+    shared = own & {item.name for item in build.named}
+    assert not shared, f"parameters and quantities share the names {shared}"
     unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,
@@ -91,7 +95,7 @@ def assemble(scene: Scene) -> System:
         conductors=tuple(conductors(build)),
         regime=regime(build),
         breakpoints=tuple(sorted(build.breakpoints)),
-        cycles=tuple(build.cycles) if build.transitions else (),
+        cycles=tuple(build.cycles),
         modes=tuple(build.modes),
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),

@@ -36,6 +36,9 @@ from surfacechem.variables import Parameters, Variables, unit_of
 
 MANY = range(2, 1000)
 
+NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
+"""Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
+
 NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
 
@@ -77,7 +80,10 @@ class Build:
         self.scene = scene
         self.interface = scene.interface
         custom = [body.temperature for body in scene.bodies if isinstance(body.temperature, str)]
-        self.parameters = Parameters([*custom, *(variable.name for variable in self.interface.variables)])
+        capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
+        self.parameters = Parameters(
+            [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
+        )
         self.variables = Variables(self.parameters)
         self.t = symengine.Symbol("t")
         self.nodes: dict[str, Node] = {}
@@ -267,6 +273,16 @@ class Build:
         for name, (low, high) in law.ranges.items():
             self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
+    def refuse_never_positive(self, law: Law, own: Mapping[str, Expression]) -> None:
+        """A law that divides by what is zero, whatever the state, is none for this scene."""
+        for name in law.positive:
+            value = symengine.sympify(own[name] if name in own else self.variables.get(name, law))
+            if value.is_Number and not value > 0:
+                raise InputError(
+                    f"{law.name()} holds for {name} > 0 only; with the laws of this scene {name} is always {value}.",
+                    law.place,
+                )
+
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""
         for name in law.positive:
@@ -295,6 +311,19 @@ class Build:
             return [(self.node_of[body], symengine.Integer(1))]
         slab = self.slabs[body]
         return list(zip(slab.nodes, grids.shares(slab.points), strict=True))
+
+    def varying_margins(self) -> None:
+        """Parameters stay in their range as they vary; what may be zero may be so by rounding."""
+        found = []
+        for law, name, spec, value in self.variables.varying:
+            slack = NOTHING * abs(getattr(law, name).value)
+            low, why = max(spec.above, spec.at_least), f"{law.title}: {name} left its range ({spec.range}) as it varies"
+            if math.isfinite(low):
+                above = value - low + (slack if spec.at_least >= low else 0)
+                found.append(Margin(f"{name} of {law.label} {spec.range}", above, why))
+            if math.isfinite(spec.at_most):
+                found.append(Margin(f"{name} of {law.label} at most", spec.at_most + slack - value, why))
+        self.margins[:0] = found
 
     def shares(self) -> dict[str, Expression]:
         """Fractions of the interface's heat that go into the bodies and the surroundings where there is no medium."""

@@ -27,6 +27,8 @@ def reactions(build: Build) -> None:
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
     change = {name: symengine.Integer(0) for name in build.bonding}
     laws = {build.label(law): _bound(build, law) for law in build.interface.reactions}
+    for law in build.interface.reactions:
+        build.law_ranges(law)
     pairs = opposed(laws)
     together = {label: pair.label for pair in pairs for label in pair.labels}
     affinities = {label: sum(n * mu[x] for x, n in law.stoichiometry().items()) for label, law in laws.items()}
@@ -84,9 +86,9 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
         own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
+    build.refuse_never_positive(law, own)
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
-    build.law_ranges(law)
     if found := exponents(rate):
         build.capped.append(Capped(law.title, tuple(found)))
         return _resolved(build, law, label, rate, found)

@@ -38,7 +38,16 @@ def _moving(build: Build, mount: Held) -> Expression:
         build.states.append(State(VARIABLES["v_n"], velocity, change, start, LENGTH, algebraic=False))
         build.variables.define("v_n", lambda: velocity, "evolved", mount.by)
         build.motion.gap_rates["g_n"] = velocity
+    elif mount.damped:
+        build.motion.gap_rates["g_n"] = symengine.Symbol("v_n")
+        build.variables.define("v_n", partial(_yielding, build, mount), "derived", mount.by)
     return symbol
+
+
+def _yielding(build: Build, mount: Held) -> Expression:
+    """Velocity at which dampers bear what is out of balance; given by the state, so that power is linear in rates."""
+    g = symengine.Symbol("g_n")
+    return build.name(VARIABLES["v_n"], far_field(build, mount).yielding(g, derivative(build.psi, g)))
 
 
 def _rigid(build: Build, mount: Held) -> None:
@@ -91,13 +100,15 @@ def normal_motion(build: Build) -> None:
         return
     rate = build.motion.gap_rates["g_n"]
     t_n = derivative(build.psi, g)
+    if not mount.quasi_static:
+        build.variables.get("v_n", "the mechanics")
     far.book(build, g, rate)
     if mount.inertial:
         build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate
         force = far.force(g, rate) - t_n - far.c_g * rate
         build.rows["v_n"] = symengine.Symbol("dv_n_dt") - force / far.m
     elif mount.damped:
-        build.rows["g_n"] = (far.c_b + far.c_g) * rate + t_n - far.k * (far.w - g) - far.c_b * far.w_dot - far.F
+        build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate
     else:
         _quasi_static(build, g, far, t_n)
 

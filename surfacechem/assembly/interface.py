@@ -149,15 +149,15 @@ def free_energy(build: Build) -> None:
         build.refuse_foreign(F, _known(build), law)
         build.psi += F
         build.law_ranges(law)
+    _sides_of_touch(build)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]
         node.energies["interface"] = build.psi
-    elif any(depends(build.psi, symengine.Symbol(name)) for name in build.nodes):
+    elif any(depends(build.psi, symengine.Symbol(name)) for name in (*build.nodes, "T_c")):
         raise InputError(
             "the interface's potential depends on temperature, but the interface has none. "
             "Give `interface.temperature` a name."
         )
-    _sides_of_touch(build)
     _tractions(build)
 
 

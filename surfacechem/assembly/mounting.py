@@ -47,12 +47,18 @@ def held(build: Build, axis: str) -> Held | None:
     scene = build.scene
     law = scene.normal if axis == "n" else scene.tangential
     if law is not None:
-        if not (law.k or law.m or law.c_b or law.c_g or f"F_{axis}" in scene.loading):
+        if not (law.k or law.m or law.c_b or law.c_g or pulled(build, axis)):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
         return Held(law, axis, law.path)
-    if f"F_{axis}" in scene.loading:
-        return Held(Mounting(), axis, f"loading.F_{axis}")
+    if pulled(build, axis):
+        return Held(Mounting(), axis, f"loading.F_{axis}" if f"F_{axis}" in scene.loading else "programme")
     return None
+
+
+def pulled(build: Build, axis: str) -> bool:
+    """Whether a history or the programme gives a far-field traction."""
+    name = f"F_{axis}"
+    return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
 
 
 def read_by_potentials(build: Build, name: str) -> bool:
@@ -95,6 +101,10 @@ class FarField:
             remedy = "leave out the damper, so that it snaps where it loses its equilibrium"
             return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
+
+    def yielding(self, g: Expression, traction: Expression) -> Expression:
+        """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
+        return (self.k * (self.w - g) + self.c_b * self.w_dot + self.F - traction) / (self.c_b + self.c_g)
 
     def book(self, build: Build, g: Expression, rate: Expression) -> None:
         """Energies of the bodies, work of the far field, heat of the dampers."""

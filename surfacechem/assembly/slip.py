@@ -75,6 +75,8 @@ def tangential_gap(build: Build) -> None:
     if kind.rate_dependent and not (kind.inertial and not kind.elastic):
         symbol = _state(build, "v", algebraic=True)
         build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
+        if not kind.elastic:
+            build.motion.gap_rates["u_t"] = symbol
     elif not kind.inertial or kind.elastic:
         build.variables.define("v", partial(_sliding_velocity, build, kind), "derived", "what does not stick")
 
@@ -102,6 +104,17 @@ def _displacement(build: Build, kind: Kind) -> None:
         velocity = _state(build, name)
         build.variables.define(name, lambda: velocity, "evolved", "mechanics.tangential")
         build.motion.gap_rates["u_t"] = velocity
+    elif kind.elastic and kind.mount is not None and kind.mount.damped:
+        build.motion.gap_rates["u_t"] = symengine.Symbol("v_t")
+        build.variables.define("v_t", partial(_yielding, build, kind.mount), "derived", "mechanics.tangential")
+
+
+def _yielding(build: Build, mount: Held) -> Expression:
+    """Velocity at which the dampers bear what is out of balance with the elastic gap."""
+    far = far_field(build, mount)
+    return build.name(
+        VARIABLES["v_t"], far.yielding(symengine.Symbol("u_t"), derivative(build.psi, symengine.Symbol("g_t")))
+    )
 
 
 def _elastic_gap(build: Build, kind: Kind) -> None:
@@ -118,6 +131,8 @@ def _sliding_velocity(build: Build, kind: Kind) -> Expression:
     if not kind.slides:
         return NONE
     rate = build.motion.gap_rates["u_t"]
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "sliding")
     if kind.elastic:
         rate = rate - build.motion.gap_rates["g_t"]
     slip = build.variables.get("direction", "sliding")
@@ -130,6 +145,8 @@ def tangential_motion(build: Build) -> None:
     if kind is None:
         return
     far = far_field(build, kind.mount) if kind.mount else None
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "the mechanics")
     v, rate = build.variables.get("v", "the friction"), build.motion.gap_rates["u_t"]
     t_f = sum(build.motion.sliding_tractions, NONE)
     t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
@@ -199,7 +216,7 @@ def _elastic_balance(
 ) -> None:
     """The body's spring and damper in series with the elastic gap, which ``follows`` at once what cannot slide."""
     if far.c_b != 0 or far.c_g != 0:
-        build.rows["u_t"] = (far.c_b + far.c_g) * du - far.k * (far.w - u) - far.c_b * far.w_dot - far.F + t_e
+        build.rows["u_t"] = du - build.motion.gap_rates["u_t"]
         return
     residual = far.k * (far.w - u) + far.F - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
@@ -221,6 +238,15 @@ def _elastic_rows(
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
     build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
+    _carried(build, slides, derivative(t_e, symengine.Symbol("g_t")))
+
+
+def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
+    """Sliding needs something that carries its friction."""
+    if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
+        reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
+        margin = where(slides > 0, where(stiffness > 0, stiffness, -1), 1)
+        build.margins.append(Margin("tangential stiffness", margin, reason))
 
 
 def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
@@ -232,7 +258,10 @@ def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Ex
             "mass or a damper.",
             PLACE,
         )
-    reason = "no steady sliding velocity: friction falls faster with velocity than anything else resists; a mass would"
+    reason = (
+        "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
+        "resists; a mass or a viscous resistance would give one"
+    )
     build.margins.append(Margin("stable v", where(slides > 0, slope, 1), reason))
 
 

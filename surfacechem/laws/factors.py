@@ -73,6 +73,8 @@ class Power(Factor):
     0.25
     """
 
+    keeps_sign = True
+
     exponent: float = parameter("1", "exponent of T/T_0", varies=False)
 
     def factor(self, x: Expression, T_0: Expression) -> Expression:
@@ -112,6 +114,8 @@ class Exponential(Factor):
     0.67032
     """
 
+    keeps_sign = True
+
     beta: float = parameter("1/K", "decay per kelvin", varies=False)
 
     def factor(self, x: Expression, T_0: Expression) -> Expression:
@@ -129,6 +133,8 @@ class Activated(Factor):
     >>> round(Activated(E_a=3e4).factor(x=320.0, T_0=300.0), 6)
     2.120607
     """
+
+    keeps_sign = True
 
     E_a: float = parameter("J/mol", "activation energy", varies=False)
 

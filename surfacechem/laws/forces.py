@@ -123,7 +123,7 @@ class DudkoFactor(RateFactor):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Forces below that at which the barrier vanishes."""
-        numbers: tuple[Any, ...] = (self.barrier, self.x_beta)
+        numbers: tuple[Any, ...] = (self.barrier, self.x_beta, self.nu)
         if any(isinstance(number, Varying) for number in numbers):
             return {}
         return {"f": (-math.inf, self.barrier / (self.nu * self.x_beta))}

@@ -63,7 +63,7 @@ class CoolPropFluid(Fluid):
         if not low <= T <= high:
             span = f"CoolProp's range is {low:g} to {high:g} K"
             raise InputError(f"{self.title} has no properties at {T:g} K: {span}.")
-        end = f"{self.title} has no properties beyond"
+        end = f"{self.title} has no known properties"
         boils, condenses = self._saturation(0), self._saturation(1)
         if boils is not None and boils > T:
             return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")

@@ -1,0 +1,67 @@
+"""Why a run could not go on: which margin closes there, or which state runs away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Program
+from surfacechem.solvers.contract import Points, Result, Status
+from surfacechem.system import Margin, State
+
+Array = NDArray[np.float64]
+
+STALLED = 1e-3
+"""A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
+left to close, explains why a run cannot go on."""
+
+RUNAWAY = 1e-9
+"""Part of the time that has passed within which a state that runs away would change by itself."""
+
+SMALL = 1e-6
+"""Size of a state that is none, in units of its scale."""
+
+
+def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> str | None:
+    """Reason of the margin that is closed, or all but closed and goes on closing, where a run could not go on."""
+    if program.margins is None or not margins:
+        return None
+    count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
+    terminal = np.array([margin.terminal for margin in margins])
+    last = _values(program, result, end, side="right")[0, :count]
+    if np.any(closed := terminal & (last <= 0)):
+        return margins[int(np.argmax(closed))].reason
+    if result.steps is None or len(result.steps.t) < 2:
+        return None
+    seen, t = _values(program, result, result.steps)[:, :count], result.steps.t
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shrink = seen[-1] / np.max(np.abs(seen), axis=0)
+        left = seen[-1] / (seen[-2] - seen[-1]) * (t[-1] - t[-2])
+    closing = terminal & (seen[-1] < seen[-2]) & (left < STALLED * t[-1])
+    nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
+    return margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
+
+
+def _values(program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:
+    """Margins at all steps, shape (steps, margins); at a breakpoint those of the piece on one side of it."""
+    assert program.margins is not None
+    segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
+    inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]
+    return np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
+
+
+def runaway(states: Sequence[State], result: Result) -> str | None:
+    """The state that changes so fast that time cannot resolve it, where a run could not go on."""
+    if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE):
+        return None
+    scales = np.array([state.scale for state in states])
+    with np.errstate(over="ignore", invalid="ignore"):
+        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
+    j = int(np.argmax(speed))
+    if not speed[j] * result.t > 1 / RUNAWAY:
+        return None
+    unit = states[j].quantity.unit
+    return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"
