@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mechanisms import KMOL, call, values
+from surfacechem.errors import InputError
 from surfacechem.extension import LoadedInterface
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.affinity import AffinityReaction
@@ -167,7 +168,7 @@ def test_against_the_work_of_an_electric_potential(f, T):
     "chosen", [None, {"length": "nm", "quantity": "molec", "activation-energy": "K", "time": "min"}]
 )
 def test_round_trip(both, tmp_path, chosen):
-    _, surface = both
+    mechanism, surface = both
     surface.f, surface.g_n = 20e-12, 6e-9
     path = tmp_path / "written.yaml"
     surface.write_yaml(path, units=chosen)
@@ -177,6 +178,21 @@ def test_round_trip(both, tmp_path, chosen):
     again.coverages = surface.coverages
     np.testing.assert_allclose(again.forward_rates_of_progress, surface.forward_rates_of_progress, rtol=1e-12)
     assert [r.rate.type for r in again.reactions()] == [r.rate.type for r in surface.reactions()]
+    lowered = load_mechanism(path)
+    assert lowered.sites.density == pytest.approx(mechanism.sites.density, rel=1e-12)
+    for ours, theirs in zip(lowered.reactions, mechanism.reactions, strict=True):
+        assert type(ours) is type(theirs)
+        for name, _ in theirs.specs():
+            assert getattr(ours, name) == pytest.approx(getattr(theirs, name), rel=1e-12)
+
+
+def test_a_spring_that_cantera_has_written_without_its_unit_is_refused(tmp_path):
+    text = HEAD.replace("{length: m,", "{length: nm,").replace("1e-6 mol/m^2", "1e-24") + entry("Bell")
+    elastic = "-60 J/mol/K}, bond: {stiffness: 1 pN/nm, rest-length: 5}}"
+    surface = LoadedInterface(yaml=text.replace("-60 J/mol/K}}", elastic), name="contact")
+    surface.write_yaml(tmp_path / "written.yaml")
+    with pytest.raises(InputError, match=r"written\.yaml:\d+: species AB\(s\): bond: .*rest-length"):
+        load_mechanism(tmp_path / "written.yaml")
 
 
 def test_a_load_that_is_missing_is_no_zero():

@@ -70,6 +70,8 @@ REACTION = frozenset(
 BOND = {"stiffness": "N/m", "rest-length": "m"}
 """Keys of the elasticity of a bond with the units they have."""
 STATE = frozenset(("T", "P", "coverages"))
+WRITTEN_SPECIES, WRITTEN_STATE = frozenset(("size", "charge")), frozenset(("X", "Y"))
+"""Keys that Cantera writes beside those that it documents; the state of a file is not used."""
 
 REMEDIES = {
     "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
@@ -167,7 +169,7 @@ def _check_state(source: Source, phase: Any, names: Iterable[str]) -> None:
     state = phase.get("state")
     if not isinstance(state, Mapping):
         return
-    _keys(source, state, STATE, "state")
+    _keys(source, state, STATE | (WRITTEN_STATE if source.written else set()), "state")
     values.check_kelvin(source, state, "T", "state")
     if isinstance(state.get("coverages"), Mapping):
         _known(source, state["coverages"], names, "state: coverages")
@@ -175,7 +177,7 @@ def _check_state(source: Source, phase: Any, names: Iterable[str]) -> None:
 
 def _check_species(source: Source, entry: Any) -> None:
     title = f"species {entry.get('name')}"
-    _keys(source, entry, SPECIES, title)
+    _keys(source, entry, SPECIES | (WRITTEN_SPECIES if source.written else set()), title)
     values.check_units(source, entry)
     values.check_positive(source, entry, "sites", title)
     thermo = entry.get("thermo")
@@ -195,6 +197,9 @@ def _check_species(source: Source, entry: Any) -> None:
         _keys(source, entry["bond"], BOND, f"{title}: bond", source.place(entry, "bond"))
         for key, unit in BOND.items():
             values.check_dimension(source, entry["bond"], key, f"{title}: bond", unit, entry)
+            if source.written and isinstance(entry["bond"].get(key), int | float) and entry["bond"][key]:
+                message = f"{title}: bond: {key}: Cantera has written this number without its unit [{unit}]; add it."
+                raise InputError(message, source.place(entry["bond"], key))
 
 
 def _check_composition(source: Source, phase: Any, entry: Any) -> None:

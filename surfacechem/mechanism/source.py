@@ -13,6 +13,12 @@ from surfacechem.errors import InputError, Place, suggestion
 ARROWS = ("<=>", "=>", "=")
 """What stands between the sides of an equation; only the second is one way."""
 
+WRITER = "YamlWriter"
+"""How Cantera signs the files that it writes."""
+
+CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-energy": "J/kmol"}
+"""What numbers in such a file count in where it does not say otherwise."""
+
 
 class Source:
     """The text of a mechanism with the line of every entry."""
@@ -75,10 +81,16 @@ class Source:
         if phase.get("reactions", "all") != "none":
             yield from self._entries(phase, "reactions")
 
+    @property
+    def written(self) -> bool:
+        """Whether Cantera itself has written the file."""
+        return str(self.data.get("generator")) == WRITER
+
     def defaults(self, entry: Any) -> Mapping[str, Any]:
-        """Units that a bare number in the entry has."""
+        """Units that a bare number in the entry has; what Cantera itself has written counts in its own."""
         own = entry.get("units") if isinstance(entry, Mapping) else None
-        return {**_mapping(self.data.get("units")), **_mapping(own)}
+        written = CANTERA_UNITS if self.written else {}
+        return {**written, **_mapping(self.data.get("units")), **_mapping(own)}
 
     def _entries(self, phase: Any, key: str) -> Iterator[Any]:
         for name in sections(phase.get(key, "all"), key):
