@@ -12,8 +12,8 @@ import numpy as np
 from surfacechem.assembly import assemble
 from surfacechem.case import Case
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import depends
-from surfacechem.integrate import Model, Run
+from surfacechem.expressions import TINY, depends
+from surfacechem.integrate import STALLED, Model, Run
 from surfacechem.reactor import coupling
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.evaluation import Evaluation
@@ -115,6 +115,19 @@ class EmbeddedScene:
         if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
         return evaluation.rates()
+
+    def closest(self, t: float, x: Array) -> str:
+        """Why the scene ends where the integrator goes on no more: the limit that has come closest."""
+        evaluation, start = self.evaluation, self.start()
+        n = len(self.states)
+        evaluation.put(0.0, start[:n])
+        before = evaluation.margins()[self._terminal].copy()
+        evaluation.put(t, x[:n])
+        left = np.abs(evaluation.margins()[self._terminal]) / np.maximum(np.abs(before), TINY)
+        if not len(left) or left.min() > STALLED:
+            return "the step size fell to rounding level; the scene may end"
+        reasons = [margin.reason for margin in self.model.margins if margin.terminal]
+        return reasons[int(left.argmin())]
 
     def quantity(self, name: str, t: float, x: Array) -> float:
         """A state or a named quantity in SI units."""

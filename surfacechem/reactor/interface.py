@@ -30,6 +30,9 @@ LEDGER_UNIT = 1e100
 LOCATED = 1e-12
 """Relative distance in time at which the end of a scene counts as found."""
 
+STANDSTILL = 2e-15
+"""Relative length of a step that is rounding of the time: the integrator goes on no more."""
+
 
 class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing went wrong
     """The scene ends here, with the reason in words."""
@@ -142,6 +145,10 @@ class InterfaceReactor(HeldReactor):
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
         self._listen()
+        if self._last is not None and 0 < t - self._last[0] <= STANDSTILL * t:
+            self.reason = f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s"
+            self.error = InterfaceStopped(self.reason)
+            raise self.error
         try:
             rates = self.scene.rates(t, self.x)
         except EndError as end:
