@@ -14,7 +14,7 @@ UNIT = SURFACE["k"] * SURFACE["m"] / SURFACE["sigma"]
 
 
 def separation(area: np.ndarray) -> np.ndarray:
-    """Distance of the mean planes of Gaussian surfaces over sigma, from the part of the area that the profiles share."""
+    """Distance of the mean planes of Gaussian surfaces over sigma, where their profiles share a part of the area."""
     return np.sqrt(2) * erfcinv(2 * area)
 
 

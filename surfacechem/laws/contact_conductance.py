@@ -149,8 +149,8 @@ class SongYovanovich(HeatTransfer):
               \frac{p}{H_c} = \left[\frac{p}{c_1 (1.62\,\sigma / (\sigma_0 m))^{c_2}}\right]^{1/(1 + 0.071 c_2)}
 
     The Vickers micro-hardness of the softer body is :math:`c_1 (d / \sigma_0)^{c_2}` with the diagonal d of the indent
-    and :math:`\sigma_0` = 1 um. Source: Song & Yovanovich (1988), Journal of Thermophysics and Heat Transfer 2, 43, with
-    the correlation of cooper-mikic-yovanovich. Range 1e-6 <= p/H_c <= 2.3e-2; a run outside this says so.
+    and :math:`\sigma_0` = 1 um. Source: Song & Yovanovich (1988), Journal of Thermophysics and Heat Transfer 2, 43,
+    with the correlation of cooper-mikic-yovanovich. Range 1e-6 <= p/H_c <= 2.3e-2; a run outside this says so.
 
     >>> law = SongYovanovich(between=("lower", "upper"), k=20.0, m=0.1, sigma=1e-6, c_1=6e9, c_2=-0.26)
     >>> round(law.relative_pressure(2e6), 9)
