@@ -25,7 +25,7 @@ from surfacechem.assembly.softening import softening_mode
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.scene import Scene
 from surfacechem.system import START, Outside, Role, System
 from surfacechem.terms import Spec
@@ -118,7 +118,8 @@ def _outside(build: Build) -> Outside | None:
     if algebraic:
         raise InputError(
             f"{algebraic[0].name} has no heat capacity, so it would have to be found together with rates that are "
-            "evaluated outside. Give the interface a capacity, or let it share the temperature of a body."
+            "evaluated outside. Give the interface a capacity, or let it share the temperature of a body.",
+            Place(path="interface.mechanism"),
         )
     return Outside(engine, reads)
 

@@ -10,7 +10,7 @@ import symengine
 from surfacechem import balances
 from surfacechem.assembly.build import Build
 from surfacechem.balances import Node
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Account, Margin, State
@@ -44,7 +44,8 @@ def equations(build: Build) -> None:
             build.margins.append(_warm(node))
             _recovered_heat(build, node, rates)
     if not (build.states or build.slabs):
-        raise InputError("there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve.")
+        message = "there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve."
+        raise InputError(message, Place(path="bodies"))
 
 
 def _centre(build: Build, free: Mapping[str, Expression]) -> str:
@@ -171,7 +172,8 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     if slope == 0:
         raise InputError(
             f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
-            "interface a capacity or a heat path, or let it share the temperature of a body."
+            "interface a capacity or a heat path, or let it share the temperature of a body.",
+            Place(path="interface.temperature"),
         )
     reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
     if not slope.free_symbols & {state.symbol for state in build.states}:

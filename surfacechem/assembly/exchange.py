@@ -11,7 +11,7 @@ from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.memory import memory
 from surfacechem.assembly.slip import stick_limit
 from surfacechem.balances import Node
-from surfacechem.errors import InputError, suggestion
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, positive
 from surfacechem.quantities import Quantity
 from surfacechem.system import Margin
@@ -101,7 +101,7 @@ def receive(build: Build, end: str, heat: Expression, channel: str) -> None:
 
 def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
     """Conductances of a law [W/(m^2 K)], by what carries the heat."""
-    from_node, to_node = (end_node(build, end) for end in law.between)
+    from_node, to_node = (end_node(build, end, law.place) for end in law.between)
     bound = build.variables.bind(law, f"heat.{law.name()}")
     own = {"T_from": from_node.T, "T_to": to_node.T}
     channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
@@ -138,7 +138,7 @@ def _by_ends(build: Build) -> list[list[_Path]]:
 def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
     """The path of a law, or through the medium two paths of twice the conductance."""
     a, b = law.between
-    from_node, to_node = end_node(build, a), end_node(build, b)
+    from_node, to_node = (end_node(build, end, law.place) for end in law.between)
     if from_node is to_node:
         raise InputError(
             f"the heat path between {a} and {b} has one temperature, {from_node.name}; remove it.", law.place
@@ -150,7 +150,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
     check_closure(build, law)
     double = {name: 2 * h for name, h in channels.items()}
     for ends in ((a, "interface"), ("interface", b)):
-        if end_node(build, ends[0]) is not end_node(build, ends[1]):
+        if end_node(build, ends[0], law.place) is not end_node(build, ends[1], law.place):
             yield _Path(ends, double)
 
 
@@ -203,15 +203,17 @@ def _path_name(build: Build, a: str, b: str) -> str:
     return build.unique(f"q_{short[a]}{short[b]}")
 
 
-def end_node(build: Build, end: str) -> Node:
-    """The temperature node of an end; InputError where it has none."""
+def end_node(build: Build, end: str, place: Place | None = None) -> Node:
+    """The temperature node of an end of a heat path; InputError where it has none."""
     if end in build.node_of:
         return build.node_of[end]
     if end == "interface":
-        raise InputError("a heat path ends at the interface, which has no temperature. Give `interface.temperature`.")
+        message = "a heat path ends at the interface, which has no temperature. Give `interface.temperature`."
+        raise InputError(message, place)
     if end == "surroundings":
-        raise InputError("a heat path ends at the surroundings. Give `surroundings: {temperature: ...}`.")
-    raise InputError(f"heat path: no end '{end}'.{suggestion(end, [*build.node_of, 'interface', 'surroundings'])}")
+        raise InputError("a heat path ends at the surroundings. Give `surroundings: {temperature: ...}`.", place)
+    known = [*build.node_of, "interface", "surroundings"]
+    raise InputError(f"heat path: no end '{end}'.{suggestion(end, known)}", place)
 
 
 def _external_heat(build: Build, member: str, name: str) -> None:

@@ -9,7 +9,7 @@ import symengine
 from surfacechem.assembly.breaking import bonds_left
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Equilibrium, State
@@ -44,7 +44,9 @@ def _moving(build: Build, mount: Held) -> Expression:
 def _rigid(build: Build, mount: Held) -> None:
     """An interface that no potential lets open: closed it carries any traction, open it carries none."""
     if not mount.law.k:
-        raise InputError("a rigid interface under dead load has no opening. Give the mounting a stiffness k.")
+        raise InputError(
+            "a rigid interface under dead load has no opening. Give the mounting a stiffness k.", Place(path=mount.by)
+        )
     closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, starts_closed(build, mount))
     build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
     build.variables.define("t_n", partial(_reaction, build, mount, closed), "derived", "equilibrium with the far field")

@@ -12,7 +12,7 @@ from functools import cache, partial
 
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.fluid import FluidFit
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Medium
@@ -75,14 +75,15 @@ def _given(build: Build, name: str, value: float | Property) -> Expression:
 def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | None) -> Expression:
     """Thermal free energy per volume, whose second derivative is the heat capacity."""
     if found.thickness is None:
-        raise InputError("a film that stores heat needs a thickness. Add `interface.medium.thickness`.")
+        raise InputError("a film that stores heat needs a thickness. Add `thickness`.", Place(path=PATH))
     given = [name for name in ("rho_m", "cp_m") if name in found.properties]
     if not given and fluid is not None:
         return fluid().energy()
     if len(given) < 2 or any(isinstance(found.properties[name], Property) for name in given):
         raise InputError(
             "a film that stores heat needs the density and the heat capacity of its medium both from a fluid, or both "
-            "as numbers."
+            "as numbers.",
+            Place(path=PATH),
         )
     rho, cp, T, T_0 = (build.variables.get(name, "the film") for name in ("rho_m", "cp_m", "T_c", "T_0"))
     return rho * cp * (T - T_0 - T * log(T / T_0))

@@ -15,13 +15,14 @@ import symengine
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Equilibrium, Margin, State, Transition
 from surfacechem.terms import Friction, reads
 
 NONE = symengine.Integer(0)
+PLACE = Place(path="mechanics.tangential")
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
@@ -186,7 +187,9 @@ def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None
     build.rows["u_t"] = du
     limit = build.motion.stick_limit
     if limit is None:
-        raise InputError("nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper.")
+        raise InputError(
+            "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper.", PLACE
+        )
     reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
     build.margins.append(Margin("sticks", limit - absolute(driving), reason))
 
@@ -226,7 +229,8 @@ def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Ex
     if slope == 0:
         raise InputError(
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
-            "mass or a damper."
+            "mass or a damper.",
+            PLACE,
         )
     reason = "no steady sliding velocity: friction falls faster with velocity than anything else resists; a mass would"
     build.margins.append(Margin("stable v", where(slides > 0, slope, 1), reason))

@@ -9,7 +9,7 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.balances import Node
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
@@ -40,16 +40,23 @@ def _join(build: Build, variable: str, temperature: str | Load, member: str) -> 
     load = temperature if isinstance(temperature, Load) else build.scene.loading.get(temperature)
     name = variable if isinstance(temperature, Load) else temperature
     if own_history and name in build.nodes:
-        raise InputError(f"{name} has two roles: the temperature of {member}, and a node of another member.")
-    node = build.nodes.get(name) or _new_node(build, name, load)
+        raise InputError(
+            f"{name} has two roles: the temperature of {member}, and a node of another member.", _place(member)
+        )
+    node = build.nodes.get(name) or _new_node(build, name, load, member)
     build.node_of[member] = node
     role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
     build.variables.define(variable, lambda: node.T, role, f"{member}: {name}")
 
 
-def _new_node(build: Build, name: str, load: Load | None) -> Node:
+def _place(member: str) -> Place:
+    return Place(path="interface.temperature" if member == "interface" else f"bodies.{member}.temperature")
+
+
+def _new_node(build: Build, name: str, load: Load | None, member: str) -> Node:
     if name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
-        raise InputError(f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0.")
+        message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
+        raise InputError(message, _place(member))
     symbol = symengine.Symbol(name)
     quantity = VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name))
     if load is None:
