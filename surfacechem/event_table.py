@@ -82,6 +82,18 @@ def event_findings(jumps: Sequence[Jump]) -> list[str]:
     ]
 
 
+def event_waits(trajectory: Trajectory) -> list[str]:
+    """What a run that reached its end was still waiting for."""
+    parameters, last = trajectory.model.system.parameters, trajectory.jumps[-1:]
+    findings = []
+    for mode in trajectory.model.system.modes:
+        j = next(j for j, parameter in enumerate(parameters) if parameter.symbol == mode.symbol)
+        value = float(last[0].after.parameters[j]) if last else mode.initial
+        if trajectory.status == "finished" and value in mode.waits:
+            findings.append(f"the {mode.name} {mode.words[value]} did not end: it goes on until {mode.waits[value]}")
+    return findings
+
+
 def event_violations(jumps: Sequence[Jump]) -> list[str]:
     """Names of the transitions that have destroyed entropy, or would have."""
     return list(dict.fromkeys(jump.transition.name for jump in jumps if jump.verdict != ADMISSIBLE))

@@ -24,6 +24,7 @@ REGIMES = {
     "perfect contact": "both bodies and the interface share one temperature; the heat fluxes follow from the balances.",
     "one-sided perfect contact": "the interface shares the temperature of one body; heat passes to the other by laws.",
     "separate interface temperature": "the interface has its own temperature; heat passes to the bodies by laws.",
+    "medium without temperature": "heat crosses it by laws; interface heat goes into the bodies in fixed shares.",
     "no medium": "the bodies touch directly; interface heat goes into them in fixed shares.",
     "perfect contact without a medium": "the bodies share one temperature and there is no medium between them.",
 }

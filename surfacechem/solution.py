@@ -21,7 +21,7 @@ import numpy as np
 from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.errors import InputError, Place
-from surfacechem.event_table import event_columns, event_findings, event_violations
+from surfacechem.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.profiles import profile_columns
@@ -34,6 +34,9 @@ CONVENTIONS = "CF-1.11"
 
 LOST = 1e-4
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
+
+ROUNDING = 1e-12
+"""Values beyond a range by less than this part of their largest have not left it."""
 
 LOST_HEAT = 1e-9
 """Heat that rounding of a flux may carry in a run, relative to the total energy."""
@@ -146,6 +149,7 @@ class Solution:
             *self.audit.findings,
             *unbalanced,
             *jumps,
+            *event_waits(self.trajectory),
             *self._extrapolations(),
             *capped_rates(self.trajectory),
             *self._lost_fluxes(),
@@ -170,7 +174,8 @@ class Solution:
         for limit in self.trajectory.model.system.ranges:
             values = self.trajectory.everywhere[limit.variable]
             low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
-            if low < limit.low or high > limit.high:
+            rounding = ROUNDING * max(abs(low), abs(high))
+            if low < limit.low - rounding or high > limit.high + rounding:
                 span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
                 found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
         return found

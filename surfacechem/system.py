@@ -122,6 +122,8 @@ class Mode:
     """What each value means."""
     start: Expression | None = None
     """The value at the start as it follows from the initial state, where it does."""
+    waits: Mapping[float, str] = field(default_factory=dict)
+    """Until when a value holds, in words, where it is meant to be left."""
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,10 @@ class Variables:
         return InputError(message, reader.place if isinstance(reader, Law) else None)
 
     def _described(self, name: str) -> str:
-        return f"the {VARIABLES[name].long_name} {name}" if name in VARIABLES else f"the variable {name}"
+        words = VARIABLES[name].long_name.partition(":")[0] if name in VARIABLES else "variable"
+        if words.startswith("one while"):
+            return f"the variable {name}"
+        return f"the {words}" if name in words.split() else f"the {words} {name}"
 
     def call(
         self, law: Law, formula: Callable[..., Expression], extra: Mapping[str, Expression] | None = None

@@ -68,6 +68,32 @@ def test_both_laws_hold_on_the_equations(simulations, name):
     assert laws.second_law_holds(system, point, digits)
 
 
+@pytest.mark.parametrize(
+    ("name", "regime"),
+    [
+        ("closing-gas-gap", "medium without temperature"),
+        ("thermal-press", "medium without temperature"),
+        ("press-conductance", "no medium"),
+        ("no-medium", "no medium"),
+    ],
+)
+def test_a_gas_gap_is_a_medium(simulations, name, regime):
+    assert load(simulations, name).system.regime == regime
+
+
+def test_a_stage_that_does_not_end_is_reported(simulations):
+    press = load(simulations, "press-hold-pull")
+    assert press.run().warnings == ()
+    early = surfacechem.run("press-hold-pull", ["run.until=22 s"])
+    assert early.warnings == ("the stage pull did not end: it goes on until theta_bond_s falls to 1e-06",)
+    held = surfacechem.run("press-hold-pull", ["run.until=10 s"])
+    assert held.warnings == ("the stage hold did not end: it goes on until 20 s have passed",)
+    changes = ["programme=[{pull: {w_n: 1 nm/s, until: release}}]", "run.until=1 s"]
+    assert surfacechem.run("press-hold-pull", changes).warnings == (
+        "the stage pull did not end: it goes on until the event 'release'",
+    )
+
+
 def test_a_repeated_run_has_the_same_bytes(simulations):
     first, second = (load(simulations, "exothermic").run() for _ in range(2))
     for a, b in zip(first.columns, second.columns, strict=True):

@@ -42,6 +42,15 @@ def labels(plot):
     return [[text.get_text() for text in ax.get_legend().get_texts()] for ax in plot.axes if ax.get_legend()]
 
 
+def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
+    t = np.linspace(0.0, 2.0, 21)
+    more = {"g_n": ("m", t), "u_t": ("m", 2 * t), "ln_theta": ("1", t), "gamma_m": ("1", 1 + t)}
+    plot = figure(dataset(**more))
+    titles = [ax.get_ylabel() for ax in plot.axes]
+    assert titles[1:4] == ["Bonding [1]", "Gap [m]", "Tangential displacement [m]"]
+    assert labels(plot)[1:4] == [[r"$\phi$"], ["$g_{n}$"], ["$u_{t}$"]]
+
+
 def test_panels_of_the_usual_figure():
     plot = figure(dataset())
     titles = [ax.get_ylabel() for ax in plot.axes]

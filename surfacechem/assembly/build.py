@@ -198,11 +198,18 @@ class Build:
                 law.place,
             )
 
-    def mode(self, name: str, initial: float, words: Mapping[float, str], start: Expression | None = None) -> Any:
+    def mode(
+        self,
+        name: str,
+        initial: float,
+        words: Mapping[float, str],
+        start: Expression | None = None,
+        waits: Mapping[float, str] | None = None,
+    ) -> Any:
         """A discrete variable; its symbol is a parameter that only transitions change."""
         spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in words.items()))
         symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
-        self.modes.append(Mode(name, symbol, initial, words, start))
+        self.modes.append(Mode(name, symbol, initial, words, start, waits or {}))
         return symbol
 
     @property

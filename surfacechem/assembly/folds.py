@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import symengine
 
 from surfacechem.assembly.build import Build
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
 from surfacechem.system import Equilibrium, Fold, Transition
 
@@ -75,7 +75,8 @@ def _thermal(build: Build, residual: Expression, j: Equilibrium) -> Expression:
     if capacity == 0:
         raise InputError(
             f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the interface "
-            "one, or mount the bodies with a damper or a mass."
+            "one, or mount the bodies with a damper or a mass.",
+            Place(path="interface.temperature"),
         )
     return derivative(residual, node.T) * node.T * coupling / capacity
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -26,12 +27,29 @@ def programme(build: Build) -> None:
     if not stages:
         return
     words = {float(i): stage.name for i, stage in enumerate(stages)} | {float(len(stages)): "after the last stage"}
-    stage = build.mode("stage", 0.0, words)
+    _refuse_twins(stages)
+    waits = {float(i): _awaited(stage) for i, stage in enumerate(stages) if _awaited(stage)}
+    stage = build.mode("stage", 0.0, words, waits=waits)
     for name in dict.fromkeys(name for item in stages for name in item.rates):
         if name not in LOADABLE:
             message = f"a programme cannot move '{name}'.{suggestion(name, LOADABLE)}"
             raise InputError(message, stages[0].place)
         build.variables.define(name, partial(_driven, build, name, stage), "driven", "programme")
+
+
+def _refuse_twins(stages: Sequence[Stage]) -> None:
+    for i, stage in enumerate(stages):
+        if stage.name in [other.name for other in stages[:i]]:
+            raise InputError(f"two stages are called '{stage.name}'. Give each a name of its own.", stage.place)
+
+
+def _awaited(stage: Stage) -> str:
+    """What ends a stage, in words; nothing where it has no end."""
+    if stage.variable:
+        return f"{stage.variable} {'rises' if stage.rising else 'falls'} to {stage.value:g}"
+    if stage.duration is not None:
+        return f"{stage.duration:g} s have passed"
+    return f"the event '{stage.event}'" if stage.event else ""
 
 
 def _driven(build: Build, name: str, stage: Expression) -> Expression:

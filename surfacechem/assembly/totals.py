@@ -151,12 +151,20 @@ def _merged(shares: list[tuple[Node, Expression]]) -> tuple[Sink, ...]:
     )
 
 
+def _has_medium(build: Build) -> bool:
+    """Whether something between the bodies conducts: a medium that the case names, or a law of a film or a gap."""
+    channels = {channel for law in build.scene.heat for channel in law.channels()}
+    return build.interface.medium is not None or bool(channels & {"film", "gas", "gap"})
+
+
 def regime(build: Build) -> str:
     """The thermal regime in words."""
     nodes = [build.node_of[body.name] for body in build.scene.bodies]
     centre = build.node_of.get("interface")
     if centre is None:
-        return "no medium" if nodes[0] is not nodes[1] else "perfect contact without a medium"
+        if nodes[0] is nodes[1]:
+            return "perfect contact without a medium"
+        return "medium without temperature" if _has_medium(build) else "no medium"
     if nodes[0] is nodes[1] is centre:
         return "perfect contact"
     if centre in nodes:
