@@ -25,6 +25,9 @@ SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
 """Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
 least a nanometre."""
 
+DIGITS = 64 * float(np.finfo(float).eps)
+"""Last digits of a sum of tractions."""
+
 POLISH = 3
 DRIFTED = 1e-3
 """Largest relative drift of a gap from its equilibrium that is corrected without a search."""
@@ -137,7 +140,11 @@ class Equilibria:
             tractions = np.atleast_2d(self._balance(rows))[:, ::2]
             return np.asarray(np.where(way.pulls != 0, tractions, 0.0) @ way.pulls)
 
-        return self._moved(point, way, march(driving, float(point.y[way.column]), direction))
+        def noise(gaps: Sequence[float] | Array) -> Array:
+            sizes = np.atleast_2d(self._balance(self._rows(point, way, gaps)))[:, 1::2]
+            return np.asarray(DIGITS * np.where(way.pulls != 0, sizes, 0.0) @ np.abs(way.pulls))
+
+        return self._moved(point, way, march(driving, float(point.y[way.column]), direction, noise))
 
     def settle(self, point: Point, heat: Heat | None = None) -> Point | None:
         """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat."""

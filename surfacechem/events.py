@@ -46,8 +46,11 @@ AT_ONCE = 12
 
 HOLDABLE = ("stop", "touch", "release")
 HOLD, LONGEST_HOLD = 1e-9, 1e-4
-"""Transitions whose chatter is resolved, and the parts of a run for which it is: the first time, then longer, and at
-most."""
+"""Transitions whose chatter is resolved, and the parts of a piece of time for which it is: the first time, then
+longer, and at most."""
+
+MOMENT = 1e-15
+"""Part of the time that is told from it."""
 
 
 @dataclass
@@ -227,9 +230,15 @@ class Hybrid:
         if name in HOLDABLE:
             if name == "stop":
                 point.parameters[columns["mode.slip"]] = 0.0
-            point.parameters[columns[HELD]] = point.t + self.hold * self.problem.segments[-1]
+            point.parameters[columns[HELD]] = point.t + max(self.hold * self._piece(point.t), MOMENT * point.t)
             self.hold, self.calm = 10 * self.hold, len(self.jumps)
         return True
+
+    def _piece(self, t: float) -> float:
+        """Length of the piece of time in which a time lies [s]: no brief pulse is held through."""
+        segments = self.problem.segments
+        j = int(np.clip(np.searchsorted(segments, t, side="right"), 1, len(segments) - 1))
+        return float(segments[j] - segments[j - 1])
 
     def _margins(self, point: Point) -> Array:
         if self.jumper.margins_read_rates:

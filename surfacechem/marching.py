@@ -21,22 +21,26 @@ SMALLEST_GAP = 1e-12
 """Gap [m] below which the search starts as if from this one."""
 
 
-def march(driving: Curve, start: float, direction: float) -> float | None:
-    """The gap at which the push of the driving traction, or that from a fold, ends."""
+def march(driving: Curve, start: float, direction: float, noise: Curve) -> float | None:
+    """The gap at which the push of the driving traction, or that from a fold, ends.
+
+    At a fold the push begins as rounding: it counts from where it is more than the ``noise`` of the tractions.
+    """
     push = float(np.sign(driving([start])[0]))
     if push == 0.0 and direction == 0.0:
         return start
-    return zero_ahead(driving, start, direction or push, direction or push)
+    return zero_ahead(driving, start, direction or push, direction or push, noise if direction else None)
 
 
-def zero_ahead(curve: Curve, start: float, direction: float, sign: float) -> float | None:
+def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
     """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
     from scipy.optimize import brentq
 
     size = FIRST * max(abs(start), SMALLEST_GAP)
-    gaps = start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1)
-    values = sign * curve(np.asarray(gaps))
-    first = int(np.argmax(values > 0))
+    gaps: Array = np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))
+    values = sign * curve(gaps)
+    least = 0.0 if noise is None else noise(gaps)
+    first = int(np.argmax(values > least))
     crossed = np.nonzero(~(values[first:] > 0))[0]
     if not values[first] > 0 or len(crossed) == 0 or not np.isfinite(values[first + crossed[0]]):
         return None

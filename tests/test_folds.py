@@ -12,9 +12,9 @@ from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.cohesive import XuNeedleman
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.friction import Coulomb, MohrCoulomb
-from surfacechem.laws.loading import Harmonic, Hold, Ramp
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.scene import Interface, Mounting, Scene
 
 PHI, G_N, G_T = 0.1, 1e-8, 2e-8
@@ -138,3 +138,28 @@ def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
     trajectory = solve({"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)})
     assert trajectory.status == "stopped"
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("rtol", [1e-13, 1e-11, 1e-6])
+@pytest.mark.parametrize("k", [1e10, 3e12])
+def test_a_pull_off_snaps_at_any_tolerance(k, rtol):
+    """At the tightest the run reaches the fold itself, where the push is rounding."""
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
+    top = 1.2e6 / k + 5e-8
+    history = Table(times=[0.0, 1.0, 2.0, 3.0, 4.0], values=[0.0, top, -1e-9, top, 0.0])
+    scene = Scene(
+        bodies("T", "T"),
+        Interface("T", [zone]),
+        loading={"w_n": history},
+        T_0=300.0,
+        initial={"T": 300.0},
+        normal=Mounting(k=k),
+    )
+    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 4.0, 11), rtol=rtol))
+    assert trajectory.status == "finished", trajectory.reason
+    off, _, again, _ = snaps(trajectory)
+    ratio = k * 1e-8 / 1e6
+    g = 1e-8 * (1 - lambertw(-ratio).real)
+    w = g + 1e6 * g / 1e-8 * math.exp(1 - g / 1e-8) / k
+    assert off.t == pytest.approx(w / top, rel=max(1e-9, rtol))
+    assert again.t == pytest.approx(2 + (w + 1e-9) / (top + 1e-9), rel=max(1e-9, rtol))

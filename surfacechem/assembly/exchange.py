@@ -52,7 +52,12 @@ def _across(build: Build, law: Friction, bound: Friction, label: str, pressed: d
     if not hasattr(bound, "transverse"):
         return symengine.Integer(0)
     if build.motion.slip is not None:
-        raise InputError("a law with two directions needs both velocities prescribed, `v` and `v_2`.", law.place)
+        raise InputError(
+            f"{law.name()} resists in two directions, but a mounting moves the interface in one: across it there is no "
+            "displacement, and no limit of sticking that both share. Prescribe `v` and `v_2` under `loading`, or give "
+            "the law of the direction that moves: `coulomb` or `viscous`.",
+            law.place,
+        )
     traction = build.variables.call(bound, bound.transverse, pressed)
     quantity = Quantity(f"t_2_{label}", "Pa", f"tangential traction of {law.title} across v")
     return build.stretch * build.name(quantity, traction) * build.variables.get("v_2", law)
