@@ -20,7 +20,7 @@ from surfacechem.workprecision.errors import Errors
 from surfacechem.workprecision.subject import Subject
 from surfacechem.workprecision.truth import Truth
 
-BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.01, 3, 20
+BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 """Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
 
 BUDGET = 10.0

@@ -39,16 +39,16 @@ class Subject:
         """Names of all that may be compared."""
         return [*self.states, *(item.name for item in self.model.system.outputs)]
 
-    def settings(self, name: str, rtol: float) -> Run:
+    def settings(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Run:
         """The run of the case with another solver and tolerance, its absolute tolerance in proportion."""
         run = self.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
-        return replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=run.max_seconds or MOST_SECONDS)
+        return replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=run.max_seconds or limit)
 
-    def solve(self, name: str, rtol: float) -> Trajectory | str:
+    def solve(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Trajectory | str:
         """A run, or in words why the solver could not even say how it failed."""
         try:
-            return self.model.solve(self.settings(name, rtol), self.changes)
+            return self.model.solve(self.settings(name, rtol, limit), self.changes)
         except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError) as error:
             return f"{type(error).__name__}: {error}"
 

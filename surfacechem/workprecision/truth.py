@@ -31,6 +31,9 @@ METHODS = ("radau", "scipy-radau", "lsoda", "cantera")
 DECADE = 10.0
 """Ratio of the two tolerances from which a method is extrapolated."""
 
+LONGEST = 900.0
+"""A run for a reference may take so long [s]: which methods it is made of must not depend on how busy a machine is."""
+
 AGREE = 1e-6
 """Methods that differ by more than this do not agree."""
 
@@ -92,7 +95,7 @@ def _able(subject: Subject) -> list[str]:
 
 
 def _tight(subject: Subject, method: str, rtol: float) -> Trajectory:
-    trajectory = subject.solve(method, rtol)
+    trajectory = subject.solve(method, rtol, LONGEST)
     if isinstance(trajectory, str) or trajectory.status == "failed" or len(trajectory.result.times) < 2:
         why = trajectory if isinstance(trajectory, str) else trajectory.reason
         raise InputError(f"{subject.name} has no reference: {method} at rtol {rtol:.0e}: {why}")
