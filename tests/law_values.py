@@ -10,6 +10,7 @@ import json
 import math
 import random
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from surfacechem.terms import Law, Load, RateFactor
 
 TABLE = Path(__file__).with_suffix(".json")
 POINTS = 8
+FAR = 6
+"""Points at which what may have either sign is a thousand times as large or as small, or of usual size."""
 CONTRACTS = (*FAMILIES, RateFactor)
 USUAL = {
     "K": 300.0, "m": 1e-9, "N": 1e-11, "J": 1e-20, "J/mol": 2e4, "1/m^2": 1e18, "N/m": 1e-3, "Pa": 1e5, "m/s": 1e-3,
@@ -51,24 +54,27 @@ def every() -> dict[str, type[Law]]:
     return found | {f"rate factor {law.name()}": law for law in of_loads}
 
 
-def instance(law: type[Law], draw: random.Random) -> Law:
-    """A law with parameters of usual size."""
+def instance(law: type[Law], draw: random.Random, far: bool = False) -> Law:
+    """A law with parameters of usual size, or at their largest where they have one."""
     values = {}
     for name, spec in law.specs():
         ends = max(spec.above, spec.at_least, 0.0), min(spec.at_most, math.inf)
         usual = USUAL.get(spec.unit, 1.0) * draw.uniform(0.3, 0.9)
-        values[name] = usual if ends[0] <= usual <= ends[1] else ends[0] + draw.uniform(0.3, 0.9)
+        inside = usual if ends[0] <= usual <= ends[1] else ends[0] + draw.uniform(0.3, 0.9)
+        values[name] = spec.at_most if far and math.isfinite(spec.at_most) else inside
     made = law(**values, **{name: OPTIONS[name] for name, _ in law.options()})
     return made.bind(made.piece(0.5)) if isinstance(made, Load) else made
 
 
-def argument(law: Law, name: str, draw: random.Random) -> float:
+def argument(law: Law, name: str, draw: random.Random, far: bool = False) -> float:
     """A value of a variable: a fraction where it is one, of either sign where it may be."""
     known = VARIABLES.get(name)
     unit = MORE_UNITS.get(name) or (known.unit if known else "1")
     size = USUAL.get(unit, 1.0) * draw.uniform(0.7, 1.6)
     if name in ("phi", "sticking"):
         return size / 2
+    if name in SIGNED and far:
+        size *= draw.choice((1e-3, 1, 1e3))
     either = name in SIGNED and name not in (*law.positive, *law.nonnegative)
     return size * draw.choice((1, 1, -1)) if either else size
 
@@ -83,6 +89,8 @@ def formulas(law: Law) -> Iterator[tuple[str, Callable[..., Any]]]:
         item = getattr(law, name, None)
         if name == "channels" and item is not None:
             yield from item().items()
+        elif name in ("ranges", "limits"):
+            yield name, partial(getattr(type(law), name).fget, law)
         elif callable(item) and name not in ("breakpoints", "jumps", "piece", "stoichiometry", "is_default", "refine"):
             yield name, item
 
@@ -101,11 +109,12 @@ def parts(value: Any) -> Iterator[Any]:
 def computed(law: type[Law]) -> dict[str, list[float]]:
     """All values of a law, by formula."""
     result: dict[str, list[float]] = {}
-    for seed in range(POINTS):
+    for seed in range(POINTS + FAR):
         draw = random.Random(f"{law.name()}{seed}")
-        made = instance(law, draw)
+        far = seed >= POINTS
+        made = instance(law, draw, far)
         for name, formula in formulas(made):
-            arguments = {x: argument(made, x, draw) for x in inspect.signature(formula).parameters}
+            arguments = {x: argument(made, x, draw, far) for x in inspect.signature(formula).parameters}
             result.setdefault(name, []).extend(map(float, parts(formula(**arguments))))
     return result
 

@@ -84,7 +84,7 @@ def test_derivatives_of_every_law(name):
         for _formula, method in law_values.formulas(made):
             symbols = {x: symengine.Symbol(x) for x in inspect.signature(method).parameters}
             point = {s: mpmath.mpf(law_values.argument(made, x, draw)) for x, s in symbols.items()}
-            for expression in law_values.parts(method(**symbols)):
+            for expression in law_values.parts(method(**symbols) if symbols else ()):
                 value = abs(laws.number(expression, point))
                 for x in symbols.values():
                     found = laws.number(derivative(expression, x), point)

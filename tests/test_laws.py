@@ -155,6 +155,12 @@ def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest(
         find(Friction, "colomb")
 
 
+def test_a_table_of_time_holds_its_ends():
+    table = find(Load, "table")(times=(0.0, 1.0, 3.0), values=(1.0, 2.0, 5.0))
+    found = [table.bind(table.piece(t)).value(t) for t in (-1.0, 0.5, 2.0, 3.0, 9.0)]
+    assert found == [1.0, 1.5, 3.5, 5.0, 5.0]
+
+
 def test_a_parameter_that_varies_is_its_value_times_factors():
     factor = find(Factor, "linear")(of="phi", slope=0.5)
     law = find(Friction, "coulomb")(mu=Varying(0.3, (factor,)))
