@@ -44,7 +44,7 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
         for symbol, value in {**transition.modes, **transition.jump}.items():
             yield f"{transition.name}: {symbol}", value
         if transition.fold:
-            yield f"{transition.name}: curvature", transition.fold.curvature
+            yield f"{transition.name}: tangent", transition.fold.tangent
     for kind, sinks in system.sinks.items():
         for sink in sinks:
             yield f"{kind} sink {sink.node}", sink.share

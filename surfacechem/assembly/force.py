@@ -77,7 +77,9 @@ def rupture(build: Build) -> None:
     """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
     carriers = list(_carriers(build))
     for name, bonds in carriers:
-        losses = (derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items())
+        losses = (
+            derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items()
+        )
         loss = symengine.Add(*losses)
         if loss != 0:
             left = bonds - RESOLUTION * (build.t + INSTANT) * loss + NOTHING
