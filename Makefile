@@ -6,7 +6,7 @@ BIN := $(abspath $(VENV))/bin
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
 
-.PHONY: run test lint unit slow docs cases wheel bench clean
+.PHONY: run test lint unit slow docs cases wheel coverage mutation bench clean
 
 run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 	mkdir -p results
@@ -42,8 +42,20 @@ wheel: $(TOOLS)  ## the wheel, by itself, in an empty environment and another fo
 	build/wheel/bin/pip install --quiet dist/*.whl
 	cd build/wheel && bin/surfacechem run exothermic -o exothermic.nc
 
-bench: $(RUNTIME)  ## time against error of every solver
+coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
+	rm -rf build/coverage
+	mkdir -p build/coverage
+	$(BIN)/coverage run -m pytest -n 2
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
+
+mutation: $(TOOLS)  ## a sign of each balance and law is changed, and a test has to fail
+	$(BIN)/pip install --quiet --editable '.[mutation]'
+	$(BIN)/python tests/mutation.py
+
+bench: $(RUNTIME)  ## time against error of every solver, kept in benchmarks/results, and where the time of a run goes
 	$(BIN)/python benchmarks/steppers.py
+	$(BIN)/python benchmarks/startup.py
 
 clean:  ## all that make has made
 	rm -rf $(VENV) build dist results site

@@ -1,13 +1,19 @@
 """Time against achieved error of every solver, in one interleaved run, and the throughput of a sweep.
 
-    python benchmarks/steppers.py [output folder]
+    python benchmarks/steppers.py [--quick] [output folder]
+
+Keeps, in benchmarks/results if no folder is given, the times (steppers.csv), how many times longer than ours each
+solver takes to the same error (ratios.csv), the machine and the versions (environment.json) and figures.
 
 P1 is exothermic bonding with 200 outputs (exact solution), P2 a Bell cluster to its rupture, P3 a stick-slip slider
 through 24 events, P4 Robertson's problem to 1e11 s. "scipy-LSODA" and "scikit-sundae-CVODE" are the libraries
 called directly with a Python right-hand side, as a user would write it today.
 """
 
+import argparse
 import csv
+import itertools
+import json
 import os
 import platform
 import statistics
@@ -16,6 +22,7 @@ import time
 import timeit
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 import matplotlib
@@ -246,39 +253,58 @@ def seconds_at(curves: list[Curve], case: str, name: str, error: float) -> float
     return float(np.exp(np.interp(np.log(error), errors, fastest)))
 
 
-def compare(curves: list[Curve]) -> None:
-    """Times at equal error and how many times longer than ours."""
-    for case in CASES:
-        for error in (1e-4, 1e-6, 1e-7, 1e-8, 1e-10):
+def compare(curves: list[Curve], folder: Path) -> None:
+    """Times at equal error and how many times longer than ours, NaN where the error is not reached."""
+    with (folder / "ratios.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["case", "error", "solver", "microseconds", "times ours"])
+        for case, error in itertools.product(CASES, (1e-4, 1e-6, 1e-7, 1e-8, 1e-10)):
             ours = seconds_at(curves, case, "radau", error)
             for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
-                time_taken = seconds_at(curves, case, name, error)
-                ratio = (
-                    "not reached" if np.isnan(time_taken) else f"{1e6 * time_taken:10.1f} us {time_taken / ours:8.1f}x"
-                )
+                taken = seconds_at(curves, case, name, error)
+                rows.writerow([case, f"{error:.0e}", name, f"{1e6 * taken:.1f}", f"{taken / ours:.1f}"])
+                ratio = "not reached" if np.isnan(taken) else f"{1e6 * taken:10.1f} us {taken / ours:8.1f}x"
                 print(f"{case} to {error:.0e}  {name:20s} {ratio}")
 
 
-def machine() -> str:
-    """What this ran on."""
+def environment() -> dict[str, str]:
+    """What this ran on, when and with what."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "")
-    return f"{cpu or platform.processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    packages = ("surfacechem", "numpy", "scipy", "numba", "llvmlite", "symengine", "scikit-sundae", "cantera")
+    return {
+        "date": time.strftime("%Y-%m-%d"),
+        "processor": f"{cpu or platform.processor()}, {os.cpu_count()} cores",
+        "load of the machine before": f"{os.getloadavg()[0]:.1f}",
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        **{name: version(name) for name in packages},
+    }
 
 
 def main() -> None:
     """Run everything."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="no sweeps")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "results")
+    choice = parser.parse_args()
+    folder = choice.folder
     folder.mkdir(parents=True, exist_ok=True)
-    print(machine())
+    (folder / "environment.json").write_text(json.dumps(environment(), indent=2) + "\n")
     curves = [curve for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for curve in p1_curves(rtol)]
     curves += [curve for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
     curves += [curve for rtol in (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11, 1e-12) for curve in event_curves(rtol)]
     measure(curves)
     report(curves, folder)
     plot(curves, folder)
-    compare(curves)
+    compare(curves, folder)
+    if not choice.quick:
+        sweeps()
+
+
+def sweeps() -> None:
+    """Throughput of the batch loop."""
     for rtol in (1e-3, 1e-4, 1e-5, 1e-6):
         rate, error = sweep(rtol)
         print(f"sweep of P1, 2 threads, rtol {rtol:7.0e}: {rate:9.0f} trajectories/s, largest error {error:.1e}")

@@ -68,10 +68,9 @@ def energy_rate(
     """dU/dt by the chain rule; ``rates`` maps the other variables of F to their time derivatives."""
     if not isinstance(T, symengine.Symbol):  # no medium: F does not depend on temperature
         return sum((derivative(F, x) * rate for x, rate in rates.items()), symengine.Integer(0))
-    total = conditioned(-T * second(F, T), about) * T_dot
-    for x, rate in rates.items():
-        total += derivative(internal_energy(F, T), x) * rate
-    return total
+    U = internal_energy(F, T)
+    heating = conditioned(-T * second(F, T), about) * T_dot
+    return heating + sum((derivative(U, x) * rate for x, rate in rates.items()), symengine.Integer(0))
 
 
 def conditioned(expression: Expression, about: Mapping[Any, Expression], degree: int = 4) -> Expression:

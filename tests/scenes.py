@@ -1,6 +1,7 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
+from surfacechem.laws.anisotropic import AnisotropicCoulomb
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import ReversibleBell
 from surfacechem.laws.bulk import Constant, Quadratic
@@ -214,6 +215,24 @@ def sliding() -> Scene:
     return perfect_contact([], frictions=[Coulomb(mu=0.3)], C_1=2000.0, C_2=2000.0, loading=loading)
 
 
+def reacting_film() -> Scene:
+    """An interface without capacity that is heated by bonds: its temperature has a fold."""
+    interface = Interface("T_c", [LinearEnthalpy(H_r=300.0)], (), [Arrhenius(A=1e10, E_a=8e4)], SITES)
+    heat = [path("interface", "lower", 2500.0), path("interface", "upper", 700.0)]
+    initial = {"T_1": 300.0, "T_2": 310.0, "T_c": 305.0, "phi": 0.2}
+    return Scene(bodies(energy=Constant), interface, heat, {}, None, 300.0, initial)
+
+
+def sliding_both_ways() -> Scene:
+    """Anisotropic friction along two directions between bodies that touch, some of its heat lost."""
+    law = AnisotropicCoulomb(mu_1=varying(0.3, Power(exponent=-1.0)), mu_2=0.2)
+    interface = Interface(None, [], [law], partition=0.3, loss=0.1)
+    loading = {"v": Hold(level=0.02), "v_2": Ramp(start=0.01, rate=0.1), "p": Hold(level=1e5)}
+    initial = {"T_1": 290.0, "T_2": 330.0}
+    heat = [path("lower", "upper", 250.0), path("lower", "surroundings", 30.0)]
+    return Scene(bodies(), interface, heat, loading, Hold(level=280.0), 300.0, initial)
+
+
 def adhesive() -> Scene:
     """A cohesive zone that weakens with temperature and with the loss of its bonds, in a long range."""
     strength = varying(4e5, Proportional(of="phi"), Power(exponent=-1.0))
@@ -253,4 +272,6 @@ ALL = [
     loaded_bonds,
     shared_load,
     sliding,
+    reacting_film,
+    sliding_both_ways,
 ]

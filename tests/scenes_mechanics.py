@@ -72,8 +72,9 @@ def inertial_gap() -> Scene:
 
 
 def overdamped_gap() -> Scene:
-    """Dampers and a spring."""
-    return _gap(Mounting(k=1e14, c_b=1e5, c_g=4e4), {"w_n": Harmonic(mean=2e-8, amplitude=1e-8, frequency=0.3)})
+    """Dampers, a spring and a far-field traction."""
+    loading = {"w_n": Harmonic(mean=2e-8, amplitude=1e-8, frequency=0.3), "F_n": Hold(level=1e4)}
+    return _gap(Mounting(k=1e14, c_b=1e5, c_g=4e4), loading)
 
 
 def quasi_static_gap() -> Scene:
@@ -123,6 +124,13 @@ def rigid() -> Scene:
     initial = TOGETHER | {"phi": 0.6}
     loading = {"w_n": Ramp(start=1e-9, rate=1e-9)}
     return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=Mounting(k=1e14))
+
+
+def rigid_under_load() -> Scene:
+    """Nothing opens or holds; the dead load alone would pull open, the far field presses more."""
+    interface = Interface("T", [], [Coulomb(mu=0.3)])
+    loading = {"w_n": Hold(level=-2e-9), "F_n": Hold(level=1e5), "v": Hold(level=0.01)}
+    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER, normal=Mounting(k=1e14))
 
 
 def _bonded_rigid(limits) -> Interface:
@@ -302,6 +310,7 @@ ALL = [
     Moving(algebraic_temperature_gap),
     Moving(stretched_gap),
     Moving(rigid, ({"closed": 1.0}, {"closed": 0.0})),
+    Moving(rigid_under_load, ({"closed": 1.0}, {"closed": 0.0})),
     Moving(bonded_contact, ({"bonded": 1.0}, {"bonded": 0.0})),
     Moving(inertial_slider, SLIDING),
     Moving(damped_slider, SLIDING),

@@ -1,5 +1,8 @@
 """Every shipped case runs to a true status, meets its exact solution, and its equations obey both laws."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import thermodynamics as laws
@@ -92,6 +95,12 @@ def test_a_stage_that_does_not_end_is_reported(simulations):
     assert surfacechem.run("press-hold-pull", changes).warnings == (
         "the stage pull did not end: it goes on until the event 'release'",
     )
+
+
+def test_only_the_families_of_laws_that_a_case_names_are_imported():
+    code = "import surfacechem, sys; surfacechem.load('exothermic'); print(*(m for m in sys.modules if '.laws.' in m))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {name.rpartition(".")[2] for name in found} == {"bonding", "bulk", "kinetics", "loading"}
 
 
 def test_a_repeated_run_has_the_same_bytes(simulations):

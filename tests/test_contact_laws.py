@@ -14,7 +14,7 @@ from test_laws import example
 from thermodynamics import number
 
 from surfacechem.assembly import assemble
-from surfacechem.expressions import derivative
+from surfacechem.expressions import EXPONENT_CAP, derivative
 from surfacechem.integrate import Model, Run
 from surfacechem.laws import laws
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
@@ -25,6 +25,7 @@ from surfacechem.laws.contact import BondStiffness, Penalty
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import (
+    WALL,
     ElectrostaticFlatFlat,
     ElectrostaticSpherePlane,
     LennardJonesDerjaguin,
@@ -355,3 +356,27 @@ def test_a_coefficient_may_be_left_out_of_a_scene():
     definition = schema()["$defs"]["friction.coulomb"]
     assert definition["required"] == ["mu"]
     assert "default" not in definition["properties"]["mu_s"]
+
+
+def test_cohesion_that_is_pressed_hard_goes_on_along_its_tangent():
+    law = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.6, r=0.3)
+    g, cap = symengine.Symbol("g"), mpmath.mpf(EXPONENT_CAP) * mpmath.mpf(1e-8)
+    energy = law.energy(g_n=g, g_t=1e-8)
+    value, slope = (lambda x, e=e: number(e, {g: x}) for e in (energy, derivative(energy, g)))
+    before, beyond = -cap * (1 - mpmath.mpf(10) ** -30), -cap * (1 + mpmath.mpf(10) ** -30)
+    assert value(beyond) == pytest.approx(value(before), rel=1e-13)
+    assert slope(beyond) == pytest.approx(slope(before), rel=1e-13)
+    assert value(-3 * cap) == pytest.approx(value(before) - 2 * cap * slope(before), rel=1e-13)
+
+
+def test_repulsion_of_overlapping_atoms_goes_on_along_its_parabola():
+    law = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
+    g, wall = symengine.Symbol("g"), mpmath.mpf(WALL) * mpmath.mpf(3e-10)
+    value = law.energy(g_n=g)
+    slope = derivative(value, g)
+    curvature = derivative(slope, g)
+    third = derivative(curvature, g)
+    at = {side: {g: wall * (1 + side * mpmath.mpf(10) ** -12)} for side in (-1, 1)}
+    for each in (value, slope, curvature):
+        assert number(each, at[-1]) == pytest.approx(number(each, at[1]), rel=1e-9)
+    assert number(third, at[-1]) == 0 != number(third, at[1])

@@ -2,9 +2,11 @@
 
 import dataclasses
 import inspect
+import json
 import math
 import random
 
+import law_values
 import pytest
 import symengine
 
@@ -20,6 +22,7 @@ NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extra
 OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
 READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
 SAMPLES = 20
+APPROVED = json.loads(law_values.TABLE.read_text())
 
 each_law = pytest.mark.parametrize("law", EVERY, ids=lambda law: f"{law.contract}-{law.name()}")
 
@@ -34,6 +37,15 @@ def example(law: type[Law], seed: int) -> Law:
 def point(law: Law, seed: int) -> dict[str, float]:
     draw = random.Random(seed)
     return {name: draw.uniform(0.1, 0.9) for name in reads(law.statement)}
+
+
+@pytest.mark.parametrize("name", law_values.every())
+def test_every_formula_keeps_its_approved_values(name):
+    """A new law gets its values by `python tests/law_values.py`."""
+    found = law_values.computed(law_values.every()[name])
+    assert found.keys() == APPROVED[name].keys()
+    for formula, values in found.items():
+        assert values == pytest.approx(APPROVED[name][formula], rel=1e-11, abs=0), formula
 
 
 @each_law
@@ -141,6 +153,12 @@ def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest(
     assert find(Friction, "coulomb").name() == "coulomb"
     with pytest.raises(InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: "):
         find(Friction, "colomb")
+
+
+def test_a_table_of_time_holds_its_ends():
+    table = find(Load, "table")(times=(0.0, 1.0, 3.0), values=(1.0, 2.0, 5.0))
+    found = [table.bind(table.piece(t)).value(t) for t in (-1.0, 0.5, 2.0, 3.0, 9.0)]
+    assert found == [1.0, 1.5, 3.5, 5.0, 5.0]
 
 
 def test_a_parameter_that_varies_is_its_value_times_factors():

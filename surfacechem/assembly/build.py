@@ -107,12 +107,12 @@ class Build:
         """Labels of the friction laws, whose power comes from outside."""
         self.dissipation: dict[str, Expression] = {}
         """Power that each interface law turns into heat [W/m^2], by the law's label."""
-        self.into_body: dict[str, Expression] = {}
+        self.into_body: dict[str, list[Expression]] = {}
         """Heat that reaches each body other than through the interface [W/m^2]."""
         self.from_interface: dict[str, dict[str, Expression]] = {}
         """Heat that each body receives from the interface and the other body by stated laws, by channel [W/m^2]."""
         for body in scene.bodies:
-            self.into_body[body.name] = symengine.Integer(0)
+            self.into_body[body.name] = []
             self.from_interface[body.name] = {}
         self.loads: dict[str, Load] = {}
         """Histories that are in use, by variable."""

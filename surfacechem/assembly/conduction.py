@@ -137,7 +137,7 @@ def _conduct(build: Build, slab: Slab, bound: Conduction) -> None:
         a.inflow.append(-flux)
         b.inflow.append(flux)
         produced.append(flux * (a.T - b.T) / (a.T * b.T))
-    build.into_body[name] += slab.nodes[0].inflow[-1]
+    build.into_body[name].append(slab.nodes[0].inflow[-1])
     build.production(f"conduction_{slab.number}", f"heat conduction in {name}", symengine.Add(*produced))
 
 

@@ -196,7 +196,7 @@ def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expressio
     for channel, flux in parts.items():
         for end, heat in zip(ends, (-flux, flux), strict=True):
             if "surroundings" in ends and end in build.into_body:
-                build.into_body[end] += heat
+                build.into_body[end].append(heat)
             else:
                 receive(build, end, heat, channel)
 
@@ -231,6 +231,6 @@ def _external_heat(build: Build, member: str, name: str) -> None:
         build.supply(f"H_{name[2:]}", text, Q, build.variables.get("T_c", "the external heat"))
         _share(build, Q, "external")
     if member in build.into_body:
-        build.into_body[member] += Q
+        build.into_body[member].append(Q)
     else:
         build.into_interface.append(Q)

@@ -77,11 +77,12 @@ def rupture(build: Build) -> None:
     """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
     carriers = list(_carriers(build))
     for name, bonds in carriers:
-        gain: Expression = symengine.Integer(0)
-        for other, bond in build.bonding.items():
-            gain -= derivative(bonds, bond.symbol) * build.rows[other].subs({bond.dot: 0})
-        if gain != 0:
-            left = bonds + RESOLUTION * (build.t + INSTANT) * gain + NOTHING
+        losses = (
+            derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items()
+        )
+        loss = symengine.Add(*losses)
+        if loss != 0:
+            left = bonds - RESOLUTION * (build.t + INSTANT) * loss + NOTHING
             # What is left of hardly any bonds cannot be told from rounding.
             left = where(bonds > FEWEST, left, NOTHING)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"

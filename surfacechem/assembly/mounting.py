@@ -139,14 +139,14 @@ def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
     build.ledger.append(
         Account(Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}"), symbol, "dissipation", label)
     )
-    produced = symengine.Integer(0)
+    produced = []
     for body, share in zip(build.scene.bodies, (far.beta_1, 1 - far.beta_1), strict=True):
         for node, part in build.volume(body.name):
             node.inflow.append(share * part * symbol)
-            produced += share * part * symbol / node.T
+            produced.append(share * part * symbol / node.T)
         contact = build.volume(body.name)[0][1]
-        build.into_body[body.name] += share * contact * symbol
-    build.production(label, text, produced)
+        build.into_body[body.name].append(share * contact * symbol)
+    build.production(label, text, symengine.Add(*produced))
 
 
 def far_field(build: Build, mount: Held) -> FarField:

@@ -86,7 +86,7 @@ def _flux(build: Build, k: int, body: Body) -> Expression | None:
         flux = flux + sum(build.into_interface) - balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
     elif body.name in node.energies:
         rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
-        recovered = rate - build.into_body[body.name]
+        recovered = rate - symengine.Add(*build.into_body[body.name])
         flux = recovered if sharing else flux
         if not node.prescribed:
             _book_heat(build, k, body, recovered)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from surfacechem.document import Tree
@@ -28,12 +28,13 @@ def mapping(tree: Tree | None, known: Iterable[str] | None = None, what: str = "
     return dict(tree.value)
 
 
-def items(tree: Tree | None, example: str = "") -> list[Tree]:
-    """The items of a list, which may be empty."""
+def items(tree: Tree | None, example: str | Callable[[], str] = "") -> list[Tree]:
+    """The items of a list, which may be empty; the example is asked for where there is no list."""
     if tree is None or tree.value is None:
         return []
     if not isinstance(tree.value, list):
-        hint = f", for example `{example}`" if example else ""
+        shape = example if isinstance(example, str) else example()
+        hint = f", for example `{shape}`" if shape else ""
         raise tree.error(f"this must be a list{hint}, not {shown(tree)}.")
     return list(tree.value)
 

@@ -6,6 +6,7 @@ import dataclasses
 import re
 import typing
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, TypeVar
 
 from surfacechem import laws
@@ -25,7 +26,7 @@ DIFFERENCES = ("amplitude",)
 
 def law_list(contract: type[L], tree: Tree | None, units: Units) -> tuple[L, ...]:
     """The laws of a list."""
-    return tuple(law(contract, item, units) for item in items(tree, f"- {_example(contract)}"))
+    return tuple(law(contract, item, units) for item in items(tree, partial(_example, contract)))
 
 
 def law(contract: type[L], item: Tree, units: Units, x: str = "") -> L:
@@ -134,4 +135,4 @@ def _bracketed(meaning: str) -> str:
 def _example(contract: type[Law]) -> str:
     kind = next(iter(laws.laws(contract).values()))
     fields = ", ".join(f"{name}: ..." for name in (*dict(kind.options()), *dict(kind.specs())))
-    return f"{kind.name()}: {{{fields}}}"
+    return f"- {kind.name()}: {{{fields}}}"

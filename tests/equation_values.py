@@ -1,0 +1,67 @@
+"""What the assembled equations of every scene give at a fixed point, for the approved table of these values.
+
+    python tests/equation_values.py
+
+writes the table anew. A difference to the one before is a change of an equation, of what ends or interrupts a run, of
+a jump or of a booking; conservation laws and exact solutions say whether it is right.
+"""
+
+import json
+import random
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import scenes
+import scenes_mechanics
+import thermodynamics as laws
+
+from surfacechem.assembly import assemble
+from surfacechem.system import System
+
+TABLE = Path(__file__).with_suffix(".json")
+SCENES = {scene.__name__: (scene, {}) for scene in scenes.ALL} | {
+    f"{m.__name__} {list(modes.values())}": (m.scene, modes) for m in scenes_mechanics.ALL for modes in m.modes
+}
+
+
+def parts(system: System) -> Iterator[tuple[str, Any]]:
+    """Everything that is an expression, by name."""
+    for kind, items in (
+        ("row", system.rows.items()),
+        ("output", ((item.name, item.expression) for item in system.outputs)),
+        ("account", ((account.quantity.name, account.rate) for account in system.ledger)),
+        ("margin", ((margin.name, margin.expression) for margin in system.margins)),
+        ("residual", ((e.state, e.residual) for e in system.equilibria)),
+        ("size", ((e.state, e.size) for e in system.equilibria)),
+        ("transition", ((transition.name, transition.margin) for transition in system.transitions)),
+        ("start of mode", ((m.name, m.start) for m in system.modes if m.start is not None)),
+        ("given", system.given.items()),
+    ):
+        yield from ((f"{kind} {name}", expression) for name, expression in items)
+    for transition in system.transitions:
+        for symbol, value in {**transition.modes, **transition.jump}.items():
+            yield f"{transition.name}: {symbol}", value
+        if transition.fold:
+            yield f"{transition.name}: tangent", transition.fold.tangent
+    for kind, sinks in system.sinks.items():
+        for sink in sinks:
+            yield f"{kind} sink {sink.node}", sink.share
+
+
+def computed(name: str) -> dict[str, float]:
+    """All values of a scene in its modes, away from equilibrium, while rates are drawn at random."""
+    scene, modes = SCENES[name]
+    system = assemble(scene())
+    draw = random.Random(name)
+    point = laws.start_point(system, 0, modes)
+    for state in system.states:
+        size = abs(float(point[state.symbol])) or state.scale
+        point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
+        point[state.dot] = mpmath.mpf(size * draw.uniform(-1, 1))
+    return {key: float(laws.number(system.expand(value), point)) for key, value in parts(system)}
+
+
+if __name__ == "__main__":
+    TABLE.write_text("{\n" + ",\n".join(f"{json.dumps(n)}: {json.dumps(computed(n))}" for n in SCENES) + "\n}\n")
