@@ -11,9 +11,10 @@ import numpy as np
 
 from surfacechem.assembly import assemble
 from surfacechem.case import Case
+from surfacechem.ends import STALLED
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import TINY, depends
-from surfacechem.integrate import STALLED, Model, Run
+from surfacechem.integrate import Model, Run
 from surfacechem.reactor import coupling
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.evaluation import Evaluation
