@@ -119,7 +119,8 @@ class Hybrid:
                 return point
             index = self._transition(part, point)
             across = self._across_kink(part, point) if index is None else None
-            if across is not None or self._renews(part):
+            renews = self._renews(part)
+            if across is not None or (index is None and renews):
                 point = across or point
                 continue
             if index is None:
