@@ -22,11 +22,11 @@ P, MU, K = 1e5, 0.5, 1e10
 """A slider of stiffness K sticks up to MU P."""
 
 
-def solve(until, potentials=(), frictions=(), limits=(), initial=None, loading=None, closed=1e-9, **scene):
+def solve(until, potentials=(), frictions=(), limits=(), initial=None, loading=None, closed=1e-9, rtol=1e-11, **scene):
     interface = Interface("T", potentials, frictions, sites=SITES if limits else None, limits=limits)
     start = {"T": 300.0} | (initial or {})
     whole = Scene(bodies("T", "T"), interface, loading=loading or {}, T_0=300.0, initial=start, **scene)
-    trajectory = Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21)))
+    trajectory = Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21), rtol=rtol))
     assert trajectory.status == "finished", trajectory.reason
     assert audit(trajectory).energy_error < closed
     assert audit(trajectory).violations == ()
@@ -141,6 +141,7 @@ def test_stages_that_end_at_forces_times_and_events():
         normal=Mounting(k=1e12),
         tangential=Mounting(k=1e12),
         programme=stages,
+        rtol=1e-12,
     )
     # p = 1e5 Pa at w = -1.1e-7 m, sliding at 0.3 p / k = 3e-8 m; released 1.1 s after the pull begins
     found = dict(reversed(events(trajectory)))

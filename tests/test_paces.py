@@ -19,7 +19,7 @@ def solve(until, potentials=(), frictions=(), initial=None, max_steps=100_000, *
     interface = Interface("T", potentials, frictions)
     start = {"T": 300.0} | (initial or {})
     scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=start, **mounts)
-    return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 11), max_steps=max_steps))
+    return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 11), rtol=1e-13, max_steps=max_steps))
 
 
 def test_a_slider_that_swings_too_often_says_its_period():
@@ -31,7 +31,7 @@ def test_a_slider_that_swings_too_often_says_its_period():
     assert "the period of the tangential displacement, 6.28e-19 s, is too short for a run of 20 s" in trajectory.reason
 
 
-@pytest.mark.parametrize("c_g", [1e-3, 1.0])
+@pytest.mark.parametrize("c_g", [1e-3])
 def test_a_damper_too_light_for_the_passage_of_a_fold_says_so(c_g):
     initial, mount = {"g_n": 0.0}, Mounting(k=1e13, c_g=c_g)
     trajectory = solve(20.0, [ZONE], initial=initial, loading={"w_n": Ramp(rate=1e-8)}, normal=mount)
