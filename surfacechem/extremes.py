@@ -16,6 +16,8 @@ def capped_rates(trajectory: Trajectory) -> list[str]:
     if not system.capped:
         return []
     table = _inputs(trajectory)
+    if not len(table):  # a run that ends at its start
+        return []
     found = []
     for law in system.capped:
         # Interpreted, since they are needed once.

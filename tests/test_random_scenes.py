@@ -21,7 +21,7 @@ from surfacechem.terms import BodyEnergy, Factor, Load, reads
 CLOSED = 1e-9
 """Energy that may be missing, relative to what was exchanged."""
 
-STEPS, SECONDS = 20_000, 10.0
+STEPS, SECONDS, PIECES = 20_000, 60.0, 2001
 BUDGETS = (REASONS[Status.MAX_STEPS], REASONS[Status.STOPPED])
 GENERIC = tuple(reason for status, reason in REASONS.items() if reason not in BUDGETS and not status.success)
 
@@ -51,7 +51,7 @@ def check(seed: int) -> str:
         assert trajectory.reason.startswith((*BUDGETS, "transitions follow each other")), trajectory.reason
         return f"{trajectory.status}: {trajectory.reason}"
     assert not trajectory.reason.startswith(GENERIC)
-    energy_is_closed(solution, scene, end)
+    energy_is_closed(solution)
     entropy_is_produced(solution, scene)
     again = model.solve(trajectory.run)
     assert np.array_equal(again.result.outputs, trajectory.result.outputs)
@@ -81,14 +81,28 @@ def missing(solution: Solution) -> float:
     return float(known / books.energy_scale) if books.energy_scale else float(known)
 
 
-def energy_is_closed(solution: Solution, scene: Scene, end: float) -> None:
-    """What is missing is less than a billionth, or it is error of the integration, which the tolerance commands."""
+class Fine(Model):
+    """Runs in many short pieces: what the steps need for the states is not always enough for the work."""
+
+    def _segments(self, end, values):
+        return np.union1d(super()._segments(end, values), np.linspace(0.0, end, PIECES))
+
+
+def energy_is_closed(solution: Solution) -> None:
+    """What is missing is less than a billionth, or error of the integration, which is less in shorter or finer steps.
+
+    The work on prescribed gaps enters no state, so that steps may be too long for it; where that is felt the run says
+    so.
+    """
     gap = missing(solution)
-    if gap > CLOSED:
-        _, tighter = solved(scene, end, rtol=1e-13)
-        better = missing(Solution(tighter))
-        assert better < max(CLOSED, gap / 3) or tighter.status == "failed"
-        assert gap <= 1e-6 or "balance of energy is open" in solution.warnings[0]
+    if gap <= CLOSED:
+        return
+    assert gap <= 1e-6 or any("balance of energy is open" in warning for warning in solution.warnings)
+    finer = Fine(solution.trajectory.model.system)
+    times = solution.trajectory.run.times
+    better = [finer.solve(Run(times, rtol, max_steps=20 * STEPS)) for rtol in (1e-11, 1e-13)]
+    known = [missing(Solution(item)) for item in better if item.status != "failed"]
+    assert not known or min(known) < max(CLOSED, gap / 3)
 
 
 def entropy_is_produced(solution: Solution, scene: Scene) -> None:
