@@ -21,6 +21,9 @@ left to close, explains why a run cannot go on."""
 RUNAWAY = 1e-9
 """Part of the time that has passed within which a state that runs away would change by itself."""
 
+BOUNDLESS = 1e12
+"""Size of a state that runs away, in units of its scale."""
+
 SMALL = 1e-6
 """Size of a state that is none, in units of its scale."""
 
@@ -55,9 +58,13 @@ def _values(program: Program, result: Result, steps: Points, side: Literal["left
 
 def runaway(states: Sequence[State], result: Result) -> str | None:
     """The state that changes so fast that time cannot resolve it, where a run could not go on."""
-    if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE):
+    if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR):
         return None
     scales = np.array([state.scale for state in states])
+    beyond = np.abs(result.y) / scales
+    if np.max(beyond) > BOUNDLESS:
+        j = int(np.argmax(beyond))
+        return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
     j = int(np.argmax(speed))

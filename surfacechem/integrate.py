@@ -314,7 +314,7 @@ class Model:
         if shrunk is not None:
             return "stopped", f"{shrunk} near {where}"
         algebraic = [state for state in self.system.states if state.algebraic]
-        if result.status is Status.NO_CONSISTENT_STATE and algebraic:
+        if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
             names = " and ".join(state.name for state in algebraic)
             reason = f"no {names} satisfies the balances that have no inertia or capacity"
             if all(state.quantity.unit == "K" for state in algebraic):
