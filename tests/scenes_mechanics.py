@@ -154,6 +154,10 @@ def bonded_contact() -> Scene:
 SLIDING = ({"slip": 0.0}, {"slip": 1.0}, {"slip": -1.0})
 
 
+PULL = {"F_t": Hold(level=3e3)}
+"""A far-field traction beside the displacement."""
+
+
 def _slider(mounting: Mounting | None, frictions, potentials=(), **more) -> Scene:
     """Two bodies about an interface with its own temperature, under pressure."""
     heat = [path("interface", "lower", 900.0), path("upper", "interface", 300.0)]
@@ -180,7 +184,7 @@ def damped_slider() -> Scene:
 def quasi_static_slider() -> Scene:
     """A spring alone; bonds, temperature and pressure set the traction."""
     friction = MohrCoulomb(mu=varying(0.4, LinearInTemperature(slope=-1e-3)), c=2e4, mu_s=0.6)
-    return _slider(Mounting(k=1e12), [friction], loading={"p": Ramp(start=1e5, rate=1e4)})
+    return _slider(Mounting(k=1e12), [friction], loading={"p": Ramp(start=1e5, rate=1e4)} | PULL)
 
 
 def film_slider() -> Scene:
@@ -217,13 +221,14 @@ def elastic_inertial_slider() -> Scene:
 
 
 def elastic_damped_slider() -> Scene:
-    """Elastic sticking on a spring and a damper."""
-    return _slider(Mounting(k=1e12, c_b=1e7), [Coulomb(mu=0.4, mu_s=0.6)], [ELASTIC])
+    """Elastic sticking on a spring and dampers, under a traction too."""
+    return _slider(Mounting(k=1e12, c_b=1e7, c_g=1e6), [Coulomb(mu=0.4, mu_s=0.6)], [ELASTIC], loading=PULL)
 
 
 def elastic_quasi_static_slider() -> Scene:
-    """Elastic sticking on a spring."""
-    return _slider(Mounting(k=1e12), [Coulomb(mu=0.4, mu_s=0.6)], [ELASTIC])
+    """Elastic sticking on a spring and under a traction; two frictions bear it together."""
+    frictions = [Coulomb(mu=0.4, mu_s=0.6), MohrCoulomb(mu=0.1, c=2e4, mu_s=0.2)]
+    return _slider(Mounting(k=1e12), frictions, [ELASTIC], loading=PULL)
 
 
 def elastic_rate_dependent_slider() -> Scene:
