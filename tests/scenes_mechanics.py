@@ -127,9 +127,9 @@ def rigid() -> Scene:
 
 
 def rigid_under_load() -> Scene:
-    """Nothing opens or holds; the dead load alone would pull open, the far field presses more."""
+    """Nothing holds: the far field presses, the dead load pulls more."""
     interface = Interface("T", [], [Coulomb(mu=0.3)])
-    loading = {"w_n": Hold(level=-2e-9), "F_n": Hold(level=1e5), "v": Hold(level=0.01)}
+    loading = {"w_n": Hold(level=-2e-9), "F_n": Hold(level=3e5), "v": Hold(level=0.01)}
     return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER, normal=Mounting(k=1e14))
 
 
