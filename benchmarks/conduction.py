@@ -2,8 +2,8 @@
 
     python benchmarks/conduction.py
 
-Two slabs in contact through a resistance, 20 s, at rtol 1e-8; IDA gets the same compiled equations, in an order in which
-they are banded, and differences in place of derivatives. Least CPU time of several runs; compile time apart.
+Two slabs in contact through a resistance, 20 s, at rtol 1e-8; IDA gets the same compiled equations, in an order in
+which they are banded, and differences in place of derivatives. Least CPU time of several runs; compile time apart.
 """
 
 import time

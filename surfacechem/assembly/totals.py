@@ -19,9 +19,9 @@ def totals(build: Build) -> None:
     energies, entropies = [], []
     for member, parts in _energies(build).items():
         suffix = _suffix(build, member)
-        U = symengine.Add(*(balances.internal_energy(F, node.T) if node else F for node, F in parts))
+        U = _sum([balances.internal_energy(F, node.T) if node else F for node, F in parts])
         energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
-        S = symengine.Add(*(balances.entropy(F, node.T) for node, F in parts if node))
+        S = _sum([balances.entropy(F, node.T) for node, F in parts if node])
         if S != 0:
             quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, S))
@@ -35,6 +35,11 @@ def totals(build: Build) -> None:
             build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
     if build.interface.bonds:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
+
+
+def _sum(terms: list[Expression]) -> Expression:
+    """The sum; one term alone as it is, since a sum of one rounds differently."""
+    return terms[0] if len(terms) == 1 else symengine.Add(*terms)
 
 
 def _energies(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.lu import factor, size_of, solve
+from surfacechem.solvers.lu import size_of, solve
 from surfacechem.solvers.native import compiled
 
 
@@ -32,10 +32,8 @@ def _eliminate(bands: Any, first: int, end: int) -> bool:
 
 
 @compiled
-def factor_with_chains(
-    core: Any, border: Any, bands: Any, chains: Any, order: Any, columns: Any, rows: Any, threshold: float
-) -> bool:
-    """Replace the matrix by its factors; False where a pivot vanishes."""
+def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
+    """Eliminate the chains from the core, which is not yet factored; False where a pivot vanishes."""
     n = core.shape[0]
     for c in range(chains.shape[0]):
         first, anchor = chains[c, 0] - n, chains[c, 2]
@@ -45,12 +43,11 @@ def factor_with_chains(
             border[i, c] *= bands[first, 1]
             if anchor >= 0:
                 core[i, anchor] -= border[i, c] * bands[first, 0]
-    return bool(factor(core, order, columns, rows, threshold))
+    return True
 
 
 @compiled
-def solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: Any, x: Any) -> None:
-    """Overwrite the right-hand side by the solution."""
+def _solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: Any, x: Any) -> None:
     n = core.shape[0]
     for c in range(chains.shape[0]):
         first = chains[c, 0]
@@ -66,3 +63,39 @@ def solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: An
         x[first] *= bands[first - n, 1]
         for i in range(first + 1, chains[c, 1]):
             x[i] = (x[i] - bands[i - n, 0] * x[i - 1]) * bands[i - n, 1]
+
+
+@compiled
+def solve_real(w: Any, x: Any) -> None:
+    """Overwrite the right-hand side by the solution with the real matrix."""
+    if w.chains.shape[0] == 0:
+        solve(w.real, w.order[0], x)
+    else:
+        _solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], x)
+
+
+@compiled
+def solve_complex(w: Any, pair: int, x: Any) -> None:
+    """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
+    if w.chains.shape[0] == 0:
+        solve(w.complex[pair], w.order[1 + pair], x)
+    else:
+        border, bands = w.complex_border[pair], w.complex_bands[pair]
+        _solve_with_chains(w.complex[pair], border, bands, w.chains, w.order[1 + pair], x)
+
+
+@compiled
+def _shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
+    """G_y + shift G_ydot."""
+    stiffness, mass = derivatives[0], derivatives[1]
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = shift * mass[i, j] + stiffness[i, j]
+
+
+@compiled
+def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool:
+    """Eliminate the chains of G_y + shift G_ydot from its core."""
+    _shifted(w.border_derivatives, shift, border)
+    _shifted(w.band_derivatives, shift, bands)
+    return bool(fold_chains(core, border, bands, w.chains))

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.chains import factor_with_chains, solve_with_chains
+from surfacechem.solvers.chains import fold_chains, solve_real
+from surfacechem.solvers.lu import factor
 from surfacechem.solvers.native import (
     COLUMNS,
     DELTA,
@@ -58,7 +59,6 @@ def _chain_matrix(w: Any) -> None:
 def _factor(w: Any) -> bool:
     n = w.real.shape[0]
     evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
-    _chain_matrix(w)
     for j in range(n):
         largest = 0.0
         for i in range(n):
@@ -69,12 +69,11 @@ def _factor(w: Any) -> bool:
                 row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]))
             largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
         w.vector[COLUMNS, j] = 1.0 / largest if largest > 0.0 else 1.0
-    parts = w.real_border, w.real_bands, w.chains
-    return bool(
-        factor_with_chains(
-            w.real, parts[0], parts[1], parts[2], w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT
-        )
-    )
+    if w.chains.shape[0] > 0:
+        _chain_matrix(w)
+        if not fold_chains(w.real, w.real_border, w.real_bands, w.chains):
+            return False
+    return bool(factor(w.real, w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT))
 
 
 @compiled
@@ -83,7 +82,7 @@ def _correction(w: Any, delta: Any) -> float:
     norm = 0.0
     for j in range(delta.shape[0]):
         delta[j] = -w.vector[RHS, j]
-    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], delta)
+    solve_real(w, delta)
     for j in range(delta.shape[0]):
         if w.algebraic[j]:
             norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290))

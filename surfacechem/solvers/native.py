@@ -155,12 +155,18 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
 
 
 @compiled
-def evaluate(w: Any, which: int, out: int) -> None:
-    """Call a function of the program on the current inputs; ``out`` is the address of the result."""
-    _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
+def _evaluate_rest(w: Any, which: int, out: int) -> None:
     for part in range(FUNCTIONS, w.code.shape[0]):
         if w.code[part, 2] == which:
             _call(w.code[part, 0], out + 8 * w.code[part, 3], w.inputs.ctypes.data, w.code[part, 1])
+
+
+@compiled
+def evaluate(w: Any, which: int, out: int) -> None:
+    """Call a function of the program on the current inputs; ``out`` is the address of the result."""
+    _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
+    if w.code.shape[0] > FUNCTIONS:
+        _evaluate_rest(w, which, out)
 
 
 @compiled

@@ -7,7 +7,7 @@ about to fail, so smooth runs do not pay for it.
 
 from typing import Any
 
-from surfacechem.solvers.chains import solve_with_chains
+from surfacechem.solvers.chains import solve_real
 from surfacechem.solvers.native import DELTA, MEMBER, NOISE, SCALE, YDOT, Y, clear, compiled
 from surfacechem.solvers.radau_tables import GAMMA
 
@@ -24,11 +24,19 @@ def _row_noise(w: Any, i: int) -> float:
     total = 0.0
     for j in range(w.jacobian.shape[1]):
         total += abs(w.jacobian[0, i, j] * w.vector[Y, j]) + abs(w.jacobian[1, i, j] * w.vector[YDOT, j])
+    if w.chains.shape[0] > 0:
+        total += _border_noise(w, i)
+    return ULPS * total
+
+
+@compiled
+def _border_noise(w: Any, i: int) -> float:
+    total = 0.0
     for c in range(w.chains.shape[0]):
         j = w.chains[c, 0]
         total += abs(w.border_derivatives[0, i, c] * w.vector[Y, j])
         total += abs(w.border_derivatives[1, i, c] * w.vector[YDOT, j])
-    return ULPS * total
+    return total
 
 
 @compiled
@@ -48,29 +56,23 @@ def _chain_noise(w: Any, column: Any) -> None:
 
 
 @compiled
-def _add_image(w: Any, column: Any) -> None:
-    """What this residual does to the solution, added to the noise."""
-    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], column)
-    for j in range(column.shape[0]):
-        w.vector[NOISE, j] += abs(column[j])
-
-
-@compiled
 def find_noise(w: Any) -> None:
     """Largest change of each variable that rounding errors of the residuals can cause, into NOISE."""
     n = w.algebraic.shape[0]
     column = w.vector[DELTA]
     for j in range(n):
         w.vector[NOISE, j] = ULPS * abs(w.vector[Y, j])
-    for i in range(w.jacobian.shape[1]):
+    core = w.jacobian.shape[1]
+    for i in range(core if w.chains.shape[0] == 0 else core + 1):
         clear(column)
-        column[i] = _row_noise(w, i)
-        _add_image(w, column)
-    if w.chains.shape[0] > 0:
-        # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
-        clear(column)
-        _chain_noise(w, column)
-        _add_image(w, column)
+        if i < core:
+            column[i] = _row_noise(w, i)
+        else:
+            # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
+            _chain_noise(w, column)
+        solve_real(w, column)
+        for j in range(n):
+            w.vector[NOISE, j] += abs(column[j])
     for j in range(n):
         w.vector[NOISE, j] = min(w.vector[NOISE, j], LARGEST * w.vector[SCALE, j])
 

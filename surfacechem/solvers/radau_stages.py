@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.chains import factor_with_chains, solve_with_chains
+from surfacechem.solvers.chains import fold_shifted, solve_complex, solve_real
+from surfacechem.solvers.lu import factor
 from surfacechem.solvers.native import (
     BASE,
     CONTRACTION,
@@ -107,7 +108,16 @@ def differentiate_system(w: Any) -> bool:
     w.count[JACOBIANS] += 1
     for part in range(2):
         for i in range(w.jacobian.shape[1]):
-            if not (finite(w.jacobian[part, i]) and finite(w.border_derivatives[part, i])):
+            if not finite(w.jacobian[part, i]):
+                return False
+    return w.chains.shape[0] == 0 or _finite_chains(w)
+
+
+@compiled
+def _finite_chains(w: Any) -> bool:
+    for part in range(2):
+        for i in range(w.jacobian.shape[1]):
+            if not finite(w.border_derivatives[part, i]):
                 return False
         for i in range(w.band_derivatives.shape[1]):
             if not finite(w.band_derivatives[part, i]):
@@ -116,33 +126,28 @@ def differentiate_system(w: Any) -> bool:
 
 
 @compiled
-def _shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
-    """G_y + shift G_ydot."""
-    stiffness, mass = derivatives[0], derivatives[1]
-    for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
-            matrix[i, j] = shift * mass[i, j] + stiffness[i, j]
-
-
-@compiled
-def _factor_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any, order: Any) -> bool:
-    _shifted(w.jacobian, shift, core)
-    _shifted(w.border_derivatives, shift, border)
-    _shifted(w.band_derivatives, shift, bands)
-    return bool(factor_with_chains(core, border, bands, w.chains, order, w.vector[SCALE], w.vector[DELTA], 0.0))
-
-
-@compiled
 def factor_newton(w: Any, h: float) -> bool:
     """Factor the real and the complex Newton matrices for this step size."""
     k = w.count[MEMBER]
+    mass, stiffness = w.jacobian[1], w.jacobian[0]
+    n, chained = mass.shape[0], w.chains.shape[0] > 0
     w.count[FACTORIZATIONS] += 1
-    if not _factor_shifted(w, GAMMA[k] / h, w.real, w.real_border, w.real_bands, w.order[0]):
+    real, pairs = w.real, w.complex
+    for i in range(n):
+        for j in range(n):
+            real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
+    if chained and not fold_shifted(w, GAMMA[k] / h, real, w.real_border, w.real_bands):
+        return False
+    if not factor(real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
         return False
     for pair in range(k + 1):
         shift = PAIR_VALUES[k, pair] / h
-        matrices = w.complex[pair], w.complex_border[pair], w.complex_bands[pair]
-        if not _factor_shifted(w, shift, matrices[0], matrices[1], matrices[2], w.order[1 + pair]):
+        for i in range(n):
+            for j in range(n):
+                pairs[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
+        if chained and not fold_shifted(w, shift, pairs[pair], w.complex_border[pair], w.complex_bands[pair]):
+            return False
+        if not factor(pairs[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
             return False
     return True
 
@@ -216,15 +221,14 @@ def _correct(w: Any) -> float:
         for i in range(s):
             total -= REAL_ROW[k, i] * g[i, m]
         real[m] = total
-    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], real)
+    solve_real(w, real)
     for pair in range(k + 1):
         for m in range(n):
             value = 0.0j
             for i in range(s):
                 value -= PAIR_ROWS[k, pair, i] * g[i, m]
             pairs[pair, m] = value
-        border, bands = w.complex_border[pair], w.complex_bands[pair]
-        solve_with_chains(w.complex[pair], border, bands, w.chains, w.order[1 + pair], pairs[pair])
+        solve_complex(w, pair, pairs[pair])
     norm = 0.0
     for i in range(s):
         for m in range(n):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.chains import solve_with_chains
+from surfacechem.solvers.chains import solve_real
 from surfacechem.solvers.consistency import CONSISTENT, find_consistent
 from surfacechem.solvers.native import (
     ATOL,
@@ -85,7 +85,7 @@ def filter_residual(w: Any) -> bool:
     error = w.vector[ERROR]
     evaluate(w, RESIDUAL, error.ctypes.data)
     w.count[RESIDUALS] += 1
-    solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], error)
+    solve_real(w, error)
     for j in range(error.shape[0]):
         error[j] = -error[j]
     return bool(finite(error))
