@@ -114,6 +114,25 @@ def press() -> Figure:
     return figure
 
 
+def sudden_contact() -> Figure:
+    """Temperatures across two slabs that touch, and that of their contact."""
+    run = surfacechem.run("sudden-contact").dataset
+    figure = new(7.2, 2.8)
+    left, right = figure.subplots(1, 2)
+    for time, shade in ((0.05, "0.7"), (0.5, "0.55"), (2.0, "0.4"), (8.0, "0.2"), (60.0, "0.0")):
+        now = run.sel(time=time, method="nearest")
+        left.plot(-now.x_1 * 1e3, now.profile_1, color=shade, label=f"{time:g} s")
+        left.plot(now.x_2 * 1e3, now.profile_2, color=shade)
+    left.set_xlabel("epoxy        distance [mm]        glass")
+    left.set_ylabel("temperature [K]")
+    left.legend()
+    right.semilogx(run.time[1:], run["T"][1:], color=BLUE)
+    right.semilogx(run.time[1:], run["T_exact"][1:], color="0.4", linestyle="--", linewidth=0.8)
+    right.set_xlabel("time [s]")
+    right.set_ylabel("contact [K]")
+    return figure
+
+
 def closing_gap() -> Figure:
     """Conductance of gas and radiation against the gap."""
     run = surfacechem.run("closing-gas-gap").dataset
@@ -249,6 +268,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "precision.svg": precision,
     "signs.svg": signs,
     "press.svg": press,
+    "sudden-contact.svg": sudden_contact,
     "closing-gap.svg": closing_gap,
     "oil-film.svg": oil_film,
     "dna-adhesive.svg": adhesive,

@@ -47,15 +47,20 @@ def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
 
 
 @compiled
-def _solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: Any, x: Any) -> None:
-    n = core.shape[0]
+def _before(border: Any, bands: Any, chains: Any, x: Any) -> None:
+    """The right-hand side of the core with the chains eliminated."""
+    n = border.shape[0]
     for c in range(chains.shape[0]):
         first = chains[c, 0]
         for i in range(chains[c, 1] - 2, first - 1, -1):
             x[i] -= bands[i - n, 2] * x[i + 1]
         for i in range(n):
             x[i] -= border[i, c] * x[first]
-    solve(core, order, x)
+
+
+@compiled
+def _behind(n: int, bands: Any, chains: Any, x: Any) -> None:
+    """The solution along the chains from that of the core."""
     for c in range(chains.shape[0]):
         first, anchor = chains[c, 0], chains[c, 2]
         if anchor >= 0:
@@ -68,20 +73,23 @@ def _solve_with_chains(core: Any, border: Any, bands: Any, chains: Any, order: A
 @compiled
 def solve_real(w: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the real matrix."""
-    if w.chains.shape[0] == 0:
-        solve(w.real, w.order[0], x)
-    else:
-        _solve_with_chains(w.real, w.real_border, w.real_bands, w.chains, w.order[0], x)
+    chained = w.chains.shape[0] > 0
+    if chained:
+        _before(w.real_border, w.real_bands, w.chains, x)
+    solve(w.real, w.order[0], x)
+    if chained:
+        _behind(w.real.shape[0], w.real_bands, w.chains, x)
 
 
 @compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
-    if w.chains.shape[0] == 0:
-        solve(w.complex[pair], w.order[1 + pair], x)
-    else:
-        border, bands = w.complex_border[pair], w.complex_bands[pair]
-        _solve_with_chains(w.complex[pair], border, bands, w.chains, w.order[1 + pair], x)
+    chained = w.chains.shape[0] > 0
+    if chained:
+        _before(w.complex_border[pair], w.complex_bands[pair], w.chains, x)
+    solve(w.complex[pair], w.order[1 + pair], x)
+    if chained:
+        _behind(w.real.shape[0], w.complex_bands[pair], w.chains, x)
 
 
 @compiled
