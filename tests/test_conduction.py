@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,6 +65,17 @@ def test_second_order_in_space(far, grading):
     orders = np.log2(table[:-1] / table[1:])
     assert np.all(orders[-1] > 1.9)
     assert np.all(table[-1] < 0.03)
+
+
+def test_the_table_of_the_documentation():
+    """Cells, error at 1 s, order, at 10 s, order, at 30 s, order."""
+    page = (Path(__file__).parents[1] / "docs" / "heat-paths.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| \d+ \|.*\|.*e-.*$", page, re.M)]
+    table = np.array([errors(two(int(row[0]), "held"))[[0, 2, 3]] for row in rows])
+    np.testing.assert_allclose([[float(cell) for cell in row[1::2]] for row in rows], table, rtol=5e-3)
+    shown = [[float(cell) for cell in row[2::2]] for row in rows[1:]]
+    np.testing.assert_allclose(shown, np.log2(table[:-1] / table[1:]), atol=6e-3)
+    assert len(rows) == 4
 
 
 def test_second_order_in_perfect_contact():
@@ -195,6 +207,27 @@ def test_the_error_of_the_cells_is_estimated():
     assert estimate.source.endswith("and one with half of the cells")
     for name in ("T_1", "profile_1", "profile_2"):
         assert 0.5 < estimate.variables[name] / exact.variables[name] < 2
+
+
+def test_a_sweep_takes_the_cells_that_its_case_needs():
+    simulation = two("{accuracy: 1e-4}")
+    swept = simulation.sweep({"heat.conductance.h": [400.0, 500.0]})
+    alone = simulation.run()
+    np.testing.assert_allclose(swept.dataset["T_1"][0], alone.dataset["T_1"], rtol=1e-10)
+    assert swept.sweep.model.program.n == alone.trajectory.model.program.n > 2 + 2 * 16
+
+
+@pytest.mark.parametrize("C_c", ["1e-3", "1e-15"])
+def test_an_interface_of_hardly_any_capacity_between_conducting_bodies(C_c):
+    changes = [f"bodies.{body}.conduction={{{LOWER}, cells: 8}}" for body in ("lower", "upper")]
+    changes += [f"interface.potential=[constant-interface-capacity: {{C_c: {C_c}}}]", "run.first=1 s", "reference="]
+    run = surfacechem.run("three-temperatures", changes)
+    none = surfacechem.run(
+        "three-temperatures", [*changes[:2], "interface.potential=[]", "run.first=1 s", "reference="]
+    )
+    assert run.status == "finished"
+    np.testing.assert_allclose(run.dataset.T_c[2:], none.dataset.T_c[2:], rtol=1e-5 if C_c == "1e-3" else 1e-9)
+    assert run.audit.energy_error < 1e-9
 
 
 def test_an_accuracy_out_of_reach_is_said():
