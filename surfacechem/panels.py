@@ -48,6 +48,11 @@ def curves(dataset: xarray.Dataset) -> list[str]:
     return [str(name) for name, values in dataset.data_vars.items() if values.dims == ("time",)]
 
 
+def profiles(dataset: xarray.Dataset) -> list[str]:
+    """Temperatures across bodies, functions of time and place."""
+    return [str(name) for name in dataset.data_vars if re.fullmatch("profile_[12]", str(name))]
+
+
 def _is_mode(dataset: xarray.Dataset, name: str) -> bool:
     return str(dataset[name].attrs.get("long_name", "")).startswith(MODE)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from surfacechem import marks
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.panels import Panel, chosen, curves, merged, unit, usual, varies
+from surfacechem.panels import Panel, chosen, curves, merged, profiles, unit, usual, varies
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,9 @@ STYLE: Any = {
 }
 DECADES = 1e3
 """Times that span more than this go on a logarithmic axis, unless they are evenly spaced."""
+
+PROFILE_TIMES = 6
+"""Times at which profiles are drawn, evenly spread over the outputs."""
 
 LEAST = 1e-18
 """Residuals below this are drawn as this."""
@@ -78,6 +81,8 @@ def figure(
     ``variables`` are shown instead of the usual choice; over the variable ``against`` instead of time.
     """
     dataset = opened(data)
+    if variables and set(variables) & set(profiles(dataset)):
+        return _across(dataset, variables)
     panels = chosen(dataset, variables) if variables else usual(dataset)
     if against is not None:
         panels = _others(dataset, panels, against)
@@ -95,6 +100,30 @@ def figure(
             _draw_balances(axes[-1], dataset)
         _variable_axis(axes[-1], dataset, against) if against else _time_axis(axes, dataset)
         headings(plot, axes[0], dataset)
+    return plot
+
+
+def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
+    """Temperatures across bodies at several times, the contact in the middle."""
+    for name in names:
+        if name not in profiles(dataset):
+            raise InputError(f"{name} goes over time, a profile over places; show them in figures of their own.")
+    shown = np.unique(np.linspace(0, dataset.sizes["time"] - 1, PROFILE_TIMES).round().astype(int))
+    with matplotlib.rc_context(STYLE):
+        plot = Plot(figsize=(6.4, 3.4), layout="constrained")
+        FigureCanvasAgg(plot)
+        ax = plot.subplots()
+        for j, i in enumerate(shown.tolist()):
+            colour = matplotlib.colormaps["viridis"](j / max(len(shown) - 1, 1) * 0.9)
+            for name in names:
+                side = -1e3 if name == "profile_1" else 1e3
+                label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
+                values = dataset[name].values[i]
+                ax.plot(side * dataset[f"x_{name[-1]}"].values, values, color=colour, label=label)
+        ax.set_xlabel("distance from the contact [mm], body 1 to the left")
+        ax.set_ylabel("temperature [K]")
+        ax.legend()
+        headings(plot, ax, dataset)
     return plot
 
 

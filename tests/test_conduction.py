@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import surfacechem
+from surfacechem import plots
 from surfacechem.achieved import against_tighter
 from surfacechem.case import load_text
 from surfacechem.errors import InputError
@@ -254,6 +255,15 @@ def test_profiles_have_their_places_in_the_file(tmp_path):
         assert file.profile_2[-1, -1] == 330
         assert np.array_equal(file.profile_1[:, 0], file.T_1)
         assert not any(name.startswith("T_1_x") for name in file)
+
+
+def test_profiles_are_drawn_over_places():
+    dataset = two(10).run().dataset
+    (axes,) = plots.figure(dataset, ["profile_1", "profile_2"]).axes
+    assert len(axes.get_lines()) == 2 * dataset.sizes["time"]
+    assert "distance from the contact" in axes.get_xlabel()
+    with pytest.raises(InputError, match="T_1 goes over time"):
+        plots.figure(dataset, ["profile_1", "T_1"])
 
 
 def test_an_initial_temperature_of_a_body_is_that_of_all_its_cells():
