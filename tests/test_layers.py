@@ -42,6 +42,7 @@ FLOORS = {
     "studies": [
         "references.*",
         "achieved",
+        "choice",
         "spectrum",
         "sweeps",
         "sweep_dataset",
