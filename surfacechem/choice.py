@@ -18,11 +18,8 @@ from surfacechem.solvers import ASKING
 LAST = 3e-14
 """Tolerance of the second run where the first has the tightest one."""
 
-LOCATED = 1e-13
-"""Part of a step within which an event is located."""
-
-ENDS = "t_end"
-"""Name under which the time at which a run was stopped is compared."""
+EVENTS, ENDS = "t_event", "t_end"
+"""Names under which times of events, and the time at which a run was stopped, are compared."""
 
 
 def asked(run: Run) -> float:
@@ -50,7 +47,7 @@ def solve(model: Model, run: Run, changes: Mapping[str, float] | None = None) ->
 
 
 def compared(first: Trajectory, second: Trajectory) -> Accuracy:
-    """Largest differences of the states of two runs, and of their ends where physics stopped them."""
+    """Largest differences of two runs: of states, of times of events, of their ends where physics stopped them."""
     rtol = f"{second.run.rtol:.0e}"
     if second.status == "failed":
         return Accuracy(math.nan, f"not known: a second run at rtol {rtol} failed: {second.reason}")
@@ -60,24 +57,26 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     ours, theirs = states(first), states(second)
     shared = min(len(first.result.times), len(second.result.times))
     errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
+    same = [jump.transition.name for jump in first.jumps] == [jump.transition.name for jump in second.jumps]
+    if same and first.jumps:
+        pairs = zip(first.jumps, second.jumps, strict=True)
+        errors[EVENTS] = max((abs(a.t - b.t) / b.t for a, b in pairs if b.t > 0), default=0.0)
+    elif not same and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
+        return Accuracy(math.inf, f"{source}, which has {len(second.jumps)} events, not {len(first.jumps)}")
     if first.status == "stopped":
         errors[ENDS] = abs(first.result.t - second.result.t) / second.result.t
     return Accuracy(max(errors.values()), source, errors)
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:
-    """Largest relative change of a state by what time is known to: its last bit, and where events are located within
-    the longest step.
+    """Largest relative change of a state by the last bit of an output time: no run is nearer than that.
 
-    No run is nearer than that where a state runs towards a singular end, or moves fast after an event.
+    It is large where a state runs towards a singular end.
     """
     result = trajectory.result
     y = np.abs(result.outputs)
     size = np.maximum(y, FLOOR * np.max(y, axis=0, initial=0.0))
-    known = np.finfo(float).eps * result.times
-    if trajectory.jumps and result.steps is not None:
-        known += LOCATED * np.max(np.diff(result.steps.t), initial=0.0)
-    change = np.abs(trajectory.rates) * known[:, None]
+    change = np.finfo(float).eps * np.abs(trajectory.rates) * result.times[:, None]
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 
 

@@ -181,7 +181,7 @@ def of_motion(name: str, accuracy: float) -> Achieved:
     sources: list[str] = []
 
     def solve(model, times, changes=None):
-        trajectory, estimate = choice.solve(model, settings(times, accuracy), model.values(changes))
+        trajectory, estimate = choice.solve(model, settings(times, accuracy), changes)
         sources.append(estimate.source)
         return mechanics.Solved(trajectory)
 
