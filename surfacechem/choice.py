@@ -18,8 +18,8 @@ from surfacechem.solvers import ASKING
 LAST = 3e-14
 """Tolerance of the second run where the first has the tightest one."""
 
-EVENTS, ENDS = "t_event", "t_end"
-"""Names under which times of events, and the time at which a run was stopped, are compared."""
+ENDS = "end time"
+"""What stands for the time at which a run was stopped among the compared variables."""
 
 
 def asked(run: Run) -> float:
@@ -57,14 +57,14 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     ours, theirs = states(first), states(second)
     shared = min(len(first.result.times), len(second.result.times))
     errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
-    same = [jump.transition.name for jump in first.jumps] == [jump.transition.name for jump in second.jumps]
-    if same and first.jumps:
-        pairs = zip(first.jumps, second.jumps, strict=True)
-        errors[EVENTS] = max((abs(a.t - b.t) / b.t for a, b in pairs if b.t > 0), default=0.0)
-    elif not same and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
-        return Accuracy(math.inf, f"{source}, which has {len(second.jumps)} events, not {len(first.jumps)}")
+    found, expected = event_times(first), event_times(second)
+    others = difference(found, expected)
+    if found and not others:
+        errors[EVENTS] = event_error(found, expected, first.run.times[-1])
+    elif others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
+        return Accuracy(math.inf, f"{source}, which had {others}")
     if first.status == "stopped":
-        errors[ENDS] = abs(first.result.t - second.result.t) / second.result.t
+        errors[ENDS] = abs(first.result.t - second.result.t) / (second.result.t or 1.0)
     return Accuracy(max(errors.values()), source, errors)
 
 

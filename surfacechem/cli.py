@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from surfacechem import cli_precision
+from surfacechem import cli_precision, cli_stability
 from surfacechem.commands import (
     DIFFERENT,
     EXIT_CODES,
@@ -44,6 +44,7 @@ app = typer.Typer(
 )
 
 app.command(epilog=cli_precision.CODES)(cli_precision.precision)
+app.command(epilog=cli_stability.CODES)(cli_stability.stability)
 
 
 def _version(wanted: bool) -> None:

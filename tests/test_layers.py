@@ -78,6 +78,7 @@ FLOORS = {
         "comparing",
         "cli",
         "cli_precision",
+        "cli_stability",
         "__init__",
         "__main__",
     ],

@@ -11,10 +11,10 @@ import numpy as np
 
 from surfacechem import case as cases
 from surfacechem.accuracy import FLOOR, relative_error
+from surfacechem.achieved import computed
 from surfacechem.case import Case
 from surfacechem.errors import InputError
 from surfacechem.integrate import OWN, Model, Run, Trajectory
-from surfacechem.simulation import computed
 from surfacechem.stability.regime import Exact, Problem, Refused, Regime, Stops
 
 SOLVED, REFUSED, FAILED, WRONG = "solved", "refused", "failed", "wrong"

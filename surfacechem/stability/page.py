@@ -22,9 +22,9 @@ MARKS = {REFUSED: "R", FAILED: "×", WRONG: "!"}
 COLOURS = {FAILED: "0.75", WRONG: "#d62728"}
 
 MEANING = (
-    f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for the"
-    "right reason, with the digits of the time of its end. ×: failed, and said so. !: an answer that is wrong, to less "
-    f"than {LEAST:g} digits."
+    f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
+    "the right reason, with the digits of the time of its end. ×: failed, and said so. !: an answer that is wrong, to "
+    f"less than {LEAST:g} digits."
 )
 
 
