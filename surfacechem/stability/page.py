@@ -21,6 +21,9 @@ from surfacechem.studyreport import Page, Section, Table
 MARKS = {REFUSED: "R", FAILED: "×", WRONG: "!"}
 COLOURS = {FAILED: "0.75", WRONG: "#d62728"}
 
+DARK = 8.0
+"""Digits above which the colour of a cell is dark."""
+
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
     "the right reason, with the digits of the time of its end. ×: failed, and said so. !: an answer that is wrong, to "
@@ -128,8 +131,8 @@ def _panel(ax: Axes, matrix: Matrix, solver: int, width: int, scale: Normalize) 
                 ax.add_patch(_box(k, i, COLOURS[cell.outcome]))
             else:
                 digits[i, k] = cell.digits
-            mark = MARKS.get(cell.outcome, "")
-            ax.text(k, i, mark, ha="center", va="center", fontsize=7, color="black")
+            mark, dark = MARKS.get(cell.outcome, ""), cell.outcome not in COLOURS and cell.digits > DARK
+            ax.text(k, i, mark, ha="center", va="center", fontsize=7, color="white" if dark else "black")
     image = ax.imshow(digits, norm=scale, cmap="YlGnBu", aspect="auto")
     ax.grid(visible=False)
     for side in ax.spines.values():
