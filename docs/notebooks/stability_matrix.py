@@ -29,8 +29,8 @@ print(data)
 # %% [markdown]
 # ## How many digits are kept?
 #
-# Digits are -log10 of the largest relative error against the exact solution. The interface of the regime `capacity` has less and
-# less heat capacity, so that its temperature settles faster and faster.
+# Digits are -log10 of the largest relative error against the exact solution. The interface of the regime `capacity` has
+# less and less heat capacity, so that its temperature settles faster and faster.
 
 # %%
 chosen = data.sel(regime="capacity")
@@ -53,23 +53,23 @@ for solver in data["solver"].values:
     cells = data.sel(solver=solver)
     outcomes, counts = np.unique(cells["outcome"].values[cells["value"].notnull().values], return_counts=True)
     print(solver, dict(zip(outcomes.tolist(), counts.tolist(), strict=True)))
-failed = data.sel(solver="cvode").where(data["outcome"].sel(solver="cvode") == "failed", drop=True)
-for regime in failed["regime"].values:
-    print(regime, failed["value"].sel(regime=regime).values, failed["reason"].sel(regime=regime).values[-1])
+cvode = data.sel(solver="cvode")
+for regime, decade in np.argwhere((cvode["outcome"] == "failed").values):
+    cell = cvode.isel(regime=regime, decade=decade)
+    print(f"{cell.regime.item()} at {cell.value.item():.1e}: {cell.reason.item()[:80]}")
 
 # %% [markdown]
 # ## Was a run ended for the right reason?
 #
-# Bonds that share a load rupture at a known time, under the largest load before anything is computed. `refused` means that
-# the run was ended for this reason; its digits are those of the time.
+# Bonds that share a load rupture at a known time, under the largest load before anything is computed. `refused` means
+# that the run was ended for this reason; its digits are those of the time.
 
 # %%
 ended = data.sel(regime="rupture", solver="radau")
-for value, outcome, digits, reason in zip(
-    ended["value"], ended["outcome"], ended["digits"], ended["reason"], strict=True
-):
-    if np.isfinite(value):
-        print(f"{float(value):8g}  {outcome.item()}  {float(digits):5.1f} digits  {reason.item()[:50]}")
+for k in range(ended.sizes["decade"]):
+    cell = ended.isel(decade=k)
+    if np.isfinite(cell["value"]):
+        print(f"{cell.value.item():8g}  {cell.outcome.item()}  {cell.digits.item():5.1f}  {cell.reason.item()[:50]}")
 assert set(ended["outcome"].values) <= {"refused", ""}
 
 # %% [markdown]
