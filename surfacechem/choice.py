@@ -33,11 +33,15 @@ def solve(model: Model, run: Run, changes: Mapping[str, float] | None = None) ->
     The first has a hundredth of the accuracy as its tolerance. Most runs are confirmed by their second, so the cost is
     that of two runs, the second at a hundredth of the tolerance.
     """
-    wanted = asked(run)
-    first = model.solve(run, changes)
+    return verified(model.solve(run, changes))
+
+
+def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
+    """The run, or a tighter one, that has the accuracy that was asked for as far as a next one tells."""
+    wanted = asked(first.run)
     while True:
         last = first.run.rtol <= TIGHTEST
-        second = model.resolve(first, LAST if last else second_tolerance(first.run.rtol))
+        second = first.model.resolve(first, LAST if last else second_tolerance(first.run.rtol))
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
             return first, found
