@@ -8,15 +8,20 @@ import importlib
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
+from io import BytesIO
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
 import surfacechem
 from surfacechem import case as cases
-from surfacechem import data, listing, references
+from surfacechem import data, listing, plots, references
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.quantities import VARIABLES
+from surfacechem.stability import page as matrix
+from surfacechem.stability import stability
+from surfacechem.stability.regimes import regimes
 from surfacechem.terms import Law, Spec, reads
 
 PLACES = {
@@ -57,6 +62,9 @@ def on_files(files: Files, config: Any) -> Files:
     pages |= {f"laws/{family}.md": family_page(family) for family in families()}
     for path, content in pages.items():
         files.append(File.generated(config, path, content=content))
+    buffer = BytesIO()
+    plots.save(stability_study().figure, buffer, "svg")
+    files.append(File.generated(config, "images/stability.svg", content=buffer.getvalue()))
     return files
 
 
@@ -306,6 +314,27 @@ def made_solvers() -> str:
     return ", ".join(f"`{name}`" for name in solvers.names)
 
 
+@cache
+def stability_study() -> Any:
+    """The matrix that the page on stability and its figure show: quick enough for every build."""
+    return stability(solvers=["radau", "lsoda"], rtol=1e-8, quick=True, rounds=0)
+
+
+def made_stability() -> str:
+    """What each solver keeps of each regime."""
+    summary = matrix.summary(stability_study().matrix)
+    return table(("regime", "from .. to", *summary.heading[2:]), [tuple(row) for row in summary.rows])
+
+
+def made_regimes() -> str:
+    """Every regime: what it is, its parameter, its values."""
+    rows = []
+    for name, regime in regimes().items():
+        values = ", ".join(map(regime.label, regime.values))
+        rows.append((f"`{name}`", markdown(" ".join((inspect.getdoc(regime) or "").split())), regime.symbol, values))
+    return table(("regime", "what it is", "parameter", "values"), rows)
+
+
 MAKERS: dict[str, Callable[..., str]] = {
     "references": made_references,
     "cases": made_cases,
@@ -315,4 +344,6 @@ MAKERS: dict[str, Callable[..., str]] = {
     "variable_table": made_variable_table,
     "cli": made_cli,
     "solvers": made_solvers,
+    "stability": made_stability,
+    "regimes": made_regimes,
 }

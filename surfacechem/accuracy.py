@@ -13,8 +13,24 @@ TIGHTER = 1e-2
 TIGHTEST = 1e-13
 """Tolerances below this are rounding."""
 
+MARGIN = 1e-2
+"""The tolerance of a step is this part of the accuracy asked for. Over the exact solutions the error of a run is below
+a hundred times its tolerance, but near singular ends."""
+
+LOOSEST = 1e-3
+"""No accuracy asks for a tolerance above this."""
+
 FLOOR = 1e-9
 """Exact values of a state below this part of its largest count as this when errors are made relative."""
+
+
+def first_tolerance(accuracy: float) -> float:
+    """Relative tolerance of a step for an accuracy that is asked for.
+
+    >>> first_tolerance(1e-8), first_tolerance(1e-20)
+    (1e-10, 1e-13)
+    """
+    return min(max(accuracy * MARGIN, TIGHTEST), LOOSEST)
 
 
 def second_tolerance(rtol: float) -> float:

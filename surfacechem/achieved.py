@@ -50,19 +50,21 @@ def accuracy(
     exact: tuple[str, Mapping[str, float]] | None,
     way: str,
     cells: Callable[[], Mapping[str, float]] = no_cells,
+    estimate: Accuracy | None = None,
 ) -> Accuracy:
     """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters.
 
-    ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see.
+    ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
+    ``estimate`` is that of a second run, where there was one.
     """
     if way == "balances":
         return from_balances(trajectory, "balances only: what they miss is not seen")
     if exact is None or way == "estimate":
-        return against_tighter(trajectory, cells())
+        return with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
     try:
-        return against_exact(trajectory, scene, *exact)
+        return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
     except InputError as error:
-        estimate = against_tighter(trajectory, cells())
+        estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
         unused = f"the exact solution {exact[0]} is not of this scene: {error.message}"
         return replace(estimate, source=f"{estimate.source}; {unused}")
 
@@ -97,6 +99,17 @@ def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = 
         errors[EVENTS] = event_error(found, expected, trajectory.run.times[-1])
     source = f"estimate: a second run at rtol {other:.0e}" + (", and one with half of the cells" if cells else "")
     return Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+
+
+def with_cells(estimate: Accuracy, cells: Mapping[str, float]) -> Accuracy:
+    """An estimate with the errors of the cells across bodies added."""
+    if not cells:
+        return estimate
+    errors = dict(estimate.variables)
+    for name, error in cells.items():
+        errors[name] = errors.get(name, 0.0) + error
+    worst = max(estimate.error, *errors.values())
+    return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, and one with half of the cells")
 
 
 def from_balances(trajectory: Trajectory, source: str) -> Accuracy:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from surfacechem import cli_precision
+from surfacechem import cli_precision, cli_stability
 from surfacechem.commands import (
     DIFFERENT,
     EXIT_CODES,
@@ -19,6 +19,7 @@ from surfacechem.commands import (
     Quiet,
     SolverName,
     Tolerance,
+    Wanted,
     chosen,
     picture_kind,
     solved,
@@ -43,6 +44,7 @@ app = typer.Typer(
 )
 
 app.command(epilog=cli_precision.CODES)(cli_precision.precision)
+app.command(epilog=cli_stability.CODES)(cli_stability.stability)
 
 
 def _version(wanted: bool) -> None:
@@ -71,6 +73,7 @@ def run(
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
+    accuracy: Wanted = None,
     error: Annotated[
         str,
         typer.Option(
@@ -85,7 +88,7 @@ def run(
     from surfacechem.simulation import load
 
     simulation = load(case, changes or ())
-    settings = chosen(simulation, solver, rtol)
+    settings = chosen(simulation, solver, rtol, accuracy)
     target = output or Path(f"{simulation.case.name}.nc")
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
@@ -145,14 +148,22 @@ def sweep(
 
 
 @app.command(epilog=EXIT_CODES)
-def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rtol: Tolerance = None) -> None:
+def check(
+    case: CaseName,
+    changes: Changes = None,
+    solver: SolverName = None,
+    rtol: Tolerance = None,
+    accuracy: Wanted = None,
+) -> None:
     """Say a case back in words, without running it."""
     from surfacechem.check import groups, lumping_warnings, warnings
+    from surfacechem.choice import reasons
     from surfacechem.report import check_summary
     from surfacechem.simulation import load
+    from surfacechem.solvers import AUTO
 
     simulation = load(case, changes or ())
-    settings = chosen(simulation, solver, rtol)
+    settings = chosen(simulation, solver, rtol, accuracy)
     system, scene, model = simulation.system, simulation.case.scene, simulation.model
     values = model.values()
     try:
@@ -161,7 +172,9 @@ def check(case: CaseName, changes: Changes = None, solver: SolverName = None, rt
         raise simulation.case.located(error) from None
     numbers = groups(model, scene, values, settings.times[-1])
     found = [*warnings(system), *lumping_warnings(model, values, settings.times[-1])]
-    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found))
+    why = reasons(model, settings) if settings.solver == AUTO else ()
+    settings = model.chosen(settings)
+    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
 
 
 @app.command()

@@ -61,19 +61,29 @@ Changes = Annotated[
 ]
 SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
 Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
+Wanted = Annotated[float | None, typer.Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
 
 
-def chosen(simulation: Simulation, solver: str | None, rtol: float | None) -> Run:
-    """The case's settings with those of the command line."""
-    from surfacechem.solvers import names
+def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
+    """The case's settings with those of the command line; a tolerance leaves no choice of one."""
+    from surfacechem.accuracy import first_tolerance
+    from surfacechem.integrate import OWN
+    from surfacechem.solvers import AUTO, names
 
-    if solver is not None and solver not in names:
-        raise InputError(f"no solver '{solver}'.{suggestion(solver, names)}", Place(path="--solver"))
-    if rtol is not None and not 0 < rtol <= 0.1:
-        raise InputError(f"{rtol:g} is outside its range: > 0 and <= 0.1.", Place(path="--rtol"))
-    given = {name: value for name, value in (("solver", solver), ("rtol", rtol)) if value is not None}
-    return replace(simulation.case.run, **given)  # type: ignore[arg-type]
+    if solver is not None and solver not in (AUTO, *names):
+        raise InputError(f"no solver '{solver}'.{suggestion(solver, (AUTO, *names))}", Place(path="--solver"))
+    for option, value, most in (("--rtol", rtol, 0.1), ("--accuracy", accuracy, 1.0)):
+        if value is not None and not 0 < value <= most:
+            raise InputError(f"{value:g} is outside its range: > 0 and <= {most:g}.", Place(path=option))
+    if rtol is not None and (accuracy is not None or solver == AUTO):
+        raise InputError("the tolerance has two roles: give an accuracy or a tolerance.", Place(path="--rtol"))
+    run = simulation.case.run
+    if accuracy is not None:
+        return replace(run, solver=solver or AUTO, rtol=first_tolerance(accuracy), accuracy=accuracy)
+    if rtol is not None:
+        return replace(run, solver=solver or (OWN if run.solver == AUTO else run.solver), rtol=rtol, accuracy=None)
+    return replace(run, solver=solver or run.solver)
 
 
 def solved(run: Callable[[], S], quiet: bool) -> S:

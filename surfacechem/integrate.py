@@ -20,7 +20,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.pacing import too_fast
-from surfacechem.solvers import ASKING, solver
+from surfacechem.solvers import ASKING, AUTO, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 
 DEFAULT_RTOL = 1e-11
 """Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
+
+OWN = "radau"
+"""The method of this package."""
 
 ABSOLUTE = 1e-6
 """Default absolute tolerance of a state, relative to rtol times its scale."""
@@ -55,9 +58,11 @@ class Run:
     times: Sequence[float]
     rtol: float = DEFAULT_RTOL
     atol: float | None = None
-    solver: str = "radau"
+    solver: str = OWN
     max_steps: int = 100_000
     max_seconds: float | None = None
+    accuracy: float | None = None
+    """Relative accuracy that was asked for, if no tolerances were given."""
 
     def __post_init__(self) -> None:
         """Output times start at zero, where the initial values hold, and increase."""
@@ -259,7 +264,14 @@ class Model:
         atol = None if run.atol is None else run.atol * rtol / run.rtol
         return self._solve(replace(run, rtol=rtol, atol=atol), trajectory.values)
 
+    def chosen(self, run: Run) -> Run:
+        """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""
+        if run.solver != AUTO:
+            return run
+        return replace(run, solver=ASKING[0] if self.program.filler is not None else OWN)
+
     def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        run = self.chosen(run)
         method = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
             raise InputError(

@@ -135,7 +135,8 @@ def _accuracy(solution: Solution) -> str:
     where = f" in {worst}" if worst else ""
     if math.isnan(accuracy.error):
         return accuracy.source
-    return f"{accuracy.error:.2g}{where} ({accuracy.source})"
+    asked = "" if accuracy.asked is None else f"; {accuracy.asked:.0e} was asked"
+    return f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
 
 
 def _balances(books: Audit) -> str:
@@ -151,13 +152,20 @@ def _balances(books: Audit) -> str:
 
 
 def check_summary(
-    title: str, system: System, scene: Scene, run: Run, groups: Sequence[Group], warnings: Sequence[str]
+    title: str,
+    system: System,
+    scene: Scene,
+    run: Run,
+    groups: Sequence[Group],
+    warnings: Sequence[str],
+    choices: Sequence[Sequence[str]] = (),
 ) -> str:
     """A scene said back in words, with its numbers and what is odd about it."""
     sections = [
         title or "untitled",
         labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"),
         labelled("run", _plan(system, run)),
+        _section("Choices", choices),
         _section("States", _state_rows(system)),
         _section("Roles", [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]),
         _section("Modes", _mode_rows(system)),

@@ -214,7 +214,7 @@ def _run() -> Schema:
         "max-steps": whole,
         "spacing": {"enum": list(SPACINGS)},
         "times": times,
-        "solver": {"enum": sorted(solvers.names)},
+        "solver": {"enum": [solvers.AUTO, *sorted(solvers.names)]},
     }
     properties = {key: {**special.get(key, _ref("quantity")), "description": _TEXTS[key]} for key in RUN_KEYS}
     return {**_object(properties), "anyOf": [{"required": ["until"]}, {"required": ["times"]}]}

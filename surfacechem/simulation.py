@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from surfacechem import case as cases
-from surfacechem import spatial
+from surfacechem import choice, spatial
 from surfacechem.achieved import accuracy, check_way
 from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.integrate import Model, Run, Trajectory
-from surfacechem.solution import Solution
+from surfacechem.solution import Accuracy, Solution
+from surfacechem.solvers import AUTO
 from surfacechem.system import System
 from surfacechem.units import parse
 
@@ -81,6 +82,9 @@ class Simulation:
         settings = run or self.case.run
         values = self._values(changes or {})
         chosen, trajectory, errors = self._resolved(settings, values)
+        estimate: Accuracy | None = None
+        if settings.solver == AUTO:
+            trajectory, estimate = choice.verified(trajectory)
         case = chosen.case
         exact = (case.reference.name, case.reference.options) if case.reference else None
         return Solution(
@@ -89,7 +93,9 @@ class Simulation:
             source=case.source,
             case=case.text,
             mechanism=case.mechanism_text or "",
-            accuracy=accuracy(trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory))
+            accuracy=accuracy(
+                trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory), estimate
+            )
             if len(trajectory.result.times)
             else None,
             changes=values,

@@ -59,6 +59,8 @@ class Accuracy:
     variables: Mapping[str, float] = field(default_factory=dict)
     exact: Mapping[str, Any] = field(default_factory=dict)
     """Exact values at the output times, by variable, where an exact solution was named."""
+    asked: float | None = None
+    """What was asked for, where the tolerance was chosen from it."""
 
 
 @dataclass(frozen=True)
@@ -289,7 +291,7 @@ class Solution:
             "time_reached": float(result.t),
             "run_seconds": float(self.trajectory.seconds),
             "compile_seconds": float(self.trajectory.model.compile_seconds),
-            **({"error": float(self.accuracy.error), "error_source": self.accuracy.source} if self.accuracy else {}),
+            **self._error(),
             "energy_error": books.energy_error,
             "entropy_error": books.entropy_error,
             "site_error": books.site_error,
@@ -297,6 +299,13 @@ class Solution:
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": versions(),
         }
+
+    def _error(self) -> dict[str, str | float]:
+        found = self.accuracy
+        if found is None:
+            return {}
+        asked = {} if found.asked is None else {"error_asked": float(found.asked)}
+        return {"error": float(found.error), "error_source": found.source, **asked}
 
     def _departures(self) -> dict[str, str]:
         """In which way the run was not that of its case, for running it again."""

@@ -251,6 +251,7 @@ def solve(
     model: Model, plan: Plan, run: Run, changes: Mapping[str, float] | None = None, threads: int | None = None
 ) -> Sweep:
     """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    run = model.chosen(run)
     if run.solver != Radau.name:
         raise InputError(f"a sweep runs with the solver {Radau.name}, not {run.solver}.")
     if model.system.transitions or model.system.fit:

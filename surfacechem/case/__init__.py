@@ -154,7 +154,7 @@ def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
             raise tree.error(f"the case needs `{key}`, for example `{example}`.")
     places = dict(tree.places())
     run = read_run(top["run"])
-    reader = SceneReader(Source(top, source.base, source.mechanism_text, run.solver in solvers.ASKING))
+    reader = SceneReader(Source(top, source.base, source.mechanism_text, run.solver in (solvers.AUTO, *solvers.ASKING)))
     titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
     return Case(
         name=name,

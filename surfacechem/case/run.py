@@ -9,17 +9,17 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from surfacechem import integrate, references, solvers
+from surfacechem.accuracy import first_tolerance
 from surfacechem.case.fields import check, choice, items, mapping, number, whole
 from surfacechem.document import Tree
 from surfacechem.errors import Place
+from surfacechem.solvers import AUTO
 from surfacechem.terms import Spec
 
 KEYS = ("until", "outputs", "spacing", "first", "times", "accuracy", "rtol", "atol", "solver", "max-steps")
 RUN_KEYS = (*KEYS, "max-seconds")
 SPACINGS = ("linear", "logarithmic")
 MOST_OUTPUTS = 1_000_000
-MARGIN = 1e-2
-"""The local tolerance is this part of the accuracy wanted, since errors add up over the steps."""
 
 TIME = Spec("s", "time", above=0)
 
@@ -27,9 +27,6 @@ TIME = Spec("s", "time", above=0)
 @dataclass(frozen=True)
 class Run(integrate.Run):
     """How a case is run: output times [s], tolerances, solver, budgets."""
-
-    accuracy: float | None = None
-    """Relative accuracy that the case asked for, if it did not give tolerances."""
 
     @property
     def t_end(self) -> float:
@@ -56,7 +53,7 @@ def read_run(tree: Tree) -> Run:
         times=_times(tree, fields),
         rtol=defaults.rtol if rtol is None else rtol,
         atol=number(fields["atol"], "1", "atol", Spec("1", "", above=0, at_most=1)) if "atol" in fields else None,
-        solver=choice(fields["solver"], "solver", solvers.names) if "solver" in fields else defaults.solver,
+        solver=_solver(fields, AUTO if accuracy is not None else defaults.solver),
         max_steps=whole(fields["max-steps"], "max-steps", 1) if "max-steps" in fields else defaults.max_steps,
         max_seconds=number(seconds, "s", "max-seconds", TIME) if seconds is not None else None,
         accuracy=accuracy,
@@ -72,7 +69,16 @@ def _tolerance(fields: Mapping[str, Tree]) -> tuple[float | None, float | None]:
     if "accuracy" not in fields:
         return None, None
     accuracy = number(fields["accuracy"], "1", "accuracy", Spec("1", "", above=0, at_most=1))
-    return min(max(accuracy * MARGIN, 1e-13), 1e-3), accuracy
+    return first_tolerance(accuracy), accuracy
+
+
+def _solver(fields: Mapping[str, Tree], default: str) -> str:
+    if "solver" not in fields:
+        return default
+    name = choice(fields["solver"], "solver", (AUTO, *solvers.names))
+    if name == AUTO and "rtol" in fields:
+        raise fields["rtol"].error("the tolerance has two roles: with `solver: auto` it follows from `accuracy`.")
+    return name
 
 
 def _times(tree: Tree, fields: Mapping[str, Tree]) -> tuple[float, ...]:

@@ -23,6 +23,9 @@ _FACTORIES = {
 
 names = tuple(_FACTORIES)
 
+AUTO = "auto"
+"""The method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
+
 ASKING = ("cantera",)
 """Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
 

@@ -1,0 +1,33 @@
+"""Achieved against requested accuracy over all exact solutions: the worst of every decade, and what it cost.
+
+python benchmarks/accuracy.py
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from asked import ACCURACIES, EXACT
+
+WORST = 3
+
+
+def main() -> None:
+    """A line for the worst of each accuracy; the ratio is to what was asked, or to what rounding of times leaves."""
+    print(f"{len(EXACT)} exact solutions\n{'asked':>8} {'ratio':>8} {'error':>9} {'rounding':>9}  run")
+    for accuracy in ACCURACIES:
+        found = {name: achieved(accuracy) for name, achieved in EXACT.items()}
+        worst = sorted(found, key=lambda name: found[name].ratio(accuracy), reverse=True)[:WORST]
+        for name in worst:
+            run = found[name]
+            print(
+                f"{accuracy:8.0e} {run.ratio(accuracy):8.2g} {run.error:9.1e} {run.rounding:9.1e}  {name}: {run.source}"
+            )
+        within = sum(run.ratio(accuracy) <= 1 for run in found.values())
+        tighter = sum(run.rtol < accuracy / 1000 and run.rtol > 1e-13 for run in found.values())
+        print(f"{'':8} {within} of {len(found)} within once, {tighter} run again at a tighter tolerance")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""The stability matrix: its expectations hold for our solver, and what does not hold is seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+from surfacechem.cli import app
+from surfacechem.errors import InputError
+from surfacechem.stability import search
+from surfacechem.stability.matrix import FAILED, REFUSED, SOLVED, WRONG, attempt, digits_of, few
+from surfacechem.stability.page import cell_text
+from surfacechem.stability.regime import Exact, Refused, Stops
+from surfacechem.stability.regimes import regimes
+from surfacechem.stability.study import stability
+
+BROKEN = {
+    # A film of 1e-14 of its thickness: the last bit of the time is a tenth of the gap.
+    ("film", 1e-14): FAILED,
+    # Errors of rtol grow by (T_0 / T)^2, and with the exponential of E_a / (R_g T).
+    ("cold", 1e-6): WRONG,
+    ("runaway", 200.0): WRONG,
+}
+"""Where each regime ends; what is listed here and holds is a failure of the test."""
+
+LEAST = {"cold": 2.5, "runaway": 7.0, "film": 6.5, "debonding": 8.5, "fold": 8.5, "endothermic": 8.5}
+"""Digits that the regime itself leaves at rtol 1e-10; elsewhere nine and a half."""
+
+CELLS = [(name, value) for name, regime in regimes().items() for value in few(regime.values)]
+ALL = [(name, value) for name, regime in regimes().items() for value in regime.values]
+
+
+def assert_kept(name: str, value: float) -> None:
+    (cell,) = attempt(regimes()[name].problem(value), ["radau"])
+    expected = regimes()[name].problem(value).expected
+    right = SOLVED if isinstance(expected, Exact) else REFUSED
+    assert cell.outcome == BROKEN.get((name, value), right), cell
+    if cell.outcome == right:
+        assert cell.digits > LEAST.get(name, 9.5), cell
+
+
+@pytest.mark.parametrize(("name", "value"), CELLS)
+def test_what_is_expected_of_a_regime_holds(name, value):
+    assert_kept(name, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "value"), ALL)
+def test_what_is_expected_of_a_regime_holds_everywhere(name, value):
+    assert_kept(name, value)
+
+
+@pytest.mark.parametrize("name", [name for name, regime in regimes().items() if regime.space])
+def test_random_corners_are_solved(name):
+    corner = search.worst_corner(regimes()[name], rounds=1)
+    assert corner.unsolved == 0, corner
+    assert corner.cell.digits > 8.0, corner
+
+
+def test_a_search_finds_the_same_corner_again():
+    first, second = (search.worst_corner(regimes()["bell"], rounds=1, seed=1) for _ in range(2))
+    assert first.point == second.point
+    assert search.worst_corner(regimes()["bell"], rounds=0, seed=2).point != first.point
+
+
+def expecting(name: str, value: float, expected):
+    return attempt(replace(regimes()[name].problem(value), expected=expected), ["radau"])[0]
+
+
+def test_wrong_expectations_are_caught():
+    assert expecting("seconds", 1.0, Exact(lambda t: {"T": np.full_like(t, 250.0)})).outcome == WRONG
+    assert expecting("stop", 1.0, Exact(lambda t: {"v": 0 * t}, events=2)).reason == "1 events, not 2"
+    assert expecting("film", 0.0, Stops("g_n reached zero", 20.0)).outcome == WRONG
+    assert expecting("film", 0.0, Stops("the temperature T reached zero", 10.0)).outcome == WRONG
+    assert expecting("film", 0.0, Exact(lambda t: {"T": 300.0 + 0 * t})).outcome == FAILED
+    assert expecting("seconds", 1.0, Refused("capacity")).outcome == WRONG
+    assert expecting("endothermic", 0.0, Refused("no such reason")).outcome == FAILED
+    assert expecting("endothermic", 0.0, Exact(lambda t: {"T": 0 * t})).outcome == FAILED
+
+
+def test_a_value_that_is_missed_by_a_part_in_a_thousand_keeps_three_digits():
+    problem = regimes()["seconds"].problem(1.0)
+    values = problem.expected.values
+    cell = expecting("seconds", 1.0, Exact(lambda t: {"T": values(t)["T"] * 1.001}))
+    assert (cell.outcome, cell_text(cell)) == (SOLVED, "3.0")
+
+
+def test_budgets_and_libraries_fail_without_an_exception():
+    cells = attempt(regimes()["bell"].problem(1e4), ["radau", "cvode"])
+    assert [cell.outcome for cell in cells] == [SOLVED, FAILED]
+    assert cells[1].kept == 0.0
+
+
+def test_digits():
+    assert digits_of(float("nan")) == 0.0
+    assert digits_of(1e-20) == 16.0
+
+
+@pytest.fixture(scope="module")
+def study():
+    return stability("seconds", "ignition", solvers=("radau", "ida"), quick=True, rounds=0)
+
+
+def test_the_dataset_holds_every_cell(study, tmp_path):
+    files = study.write(tmp_path / "study")
+    assert [file.suffix for file in files] == [".nc", ".svg", ".png", ".html"]
+    with xarray.open_dataset(files[0]) as data:
+        assert data["digits"].dims == ("regime", "decade", "solver")
+        assert data["regime"].values.tolist() == ["seconds", "ignition"]
+        assert data["outcome"].sel(regime="ignition", solver="radau").values.tolist()[-1] == REFUSED
+        assert data["value"].sel(regime="seconds").values[0] == 1e-15
+        assert float(data["digits"].sel(regime="seconds", solver="radau").min()) > 9.5
+        assert data.attrs["history"] == "surfacechem stability seconds ignition --solvers radau,ida --quick --search 0"
+    assert study.dataset["digits"].shape == (2, 4, 2)
+
+
+def test_the_report_says_what_every_solver_keeps(study):
+    text, html = study.page.text(), study.page.html()
+    assert "Least digits kept over all values, at rtol 1e-10" in text
+    assert "tau [s]: 1e-15 .. 1e+15" in text
+    assert "Every cell" not in text
+    assert "no temperature T_c balances the heat" in html
+    assert "<svg" in html
+
+
+def test_names_get_the_nearest_guess():
+    for arguments, message in (
+        (("endotermic",), "no regime 'endotermic'. Did you mean 'endothermic'?"),
+        (("seconds", "--solvers", "radua"), "no solver 'radua'. Did you mean 'radau'?"),
+        (("seconds", "--rtol", "2"), "--rtol: 2 is outside its range"),
+    ):
+        done = CliRunner().invoke(app, ["stability", *arguments])
+        assert done.exit_code == 2
+        assert message in done.output
+
+
+def test_the_command_writes_its_report(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["stability", "seconds", "--solvers", "radau", "--search", "0", "--quick"])
+    assert done.exit_code == 0, done.output
+    assert "written to stability.nc, stability.svg, stability.png, stability.html" in done.output
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".html", ".nc", ".png", ".svg"]
+
+
+def test_a_regime_without_a_space_cannot_be_searched():
+    with pytest.raises(NotImplementedError, match="film has no space to search"):
+        regimes()["film"].corner({})
+
+
+def test_no_regime_of_that_name():
+    with pytest.raises(InputError, match="no regime 'x'"):
+        stability("x")
