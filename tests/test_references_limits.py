@@ -356,3 +356,33 @@ def modal(A, start, values, left, right, t):
         decaying = (mpmath.exp(rate * t) - mpmath.exp(A[4, 4] * t)) / (rate - A[4, 4])
         T += right[:, j] * (initial * mpmath.exp(rate * t) + drive * (start[3] * steady + start[4] * decaying))
     return (mpmath.re(value) for value in T)
+
+
+def modes_in_60_digits(p: dict[str, float], t: float) -> list[float]:
+    """Temperatures of three capacities with sources, from the eigenvalues of the system."""
+    C_1, C_2, C_c, h_1, h_2, gamma = (mpmath.mpf(p[name]) for name in ("C_1", "C_2", "C_c", "h_1", "h_2", "gamma"))
+    rates = [[-h_1 / C_1, 0, h_1 / C_1], [0, -h_2 / C_2, h_2 / C_2], [h_1 / C_c, h_2 / C_c, -(h_1 + h_2) / C_c]]
+    values, vectors = mpmath.eig(mpmath.matrix(rates))
+    start = mpmath.lu_solve(vectors, mpmath.matrix([p["T_1"], p["T_2"], p["T_c"]]))
+    source = mpmath.lu_solve(vectors, mpmath.matrix([0, 0, 1 / C_c]))
+    result = mpmath.matrix(3, 1)
+    for i, value in enumerate(values):
+        e = value if abs(value) > 1e-35 else mpmath.mpf(0)
+        steady = mpmath.expm1(e * t) / e if e else mpmath.mpf(t)
+        decaying = (mpmath.exp(e * t) - mpmath.exp(-gamma * t)) / (e + gamma)
+        amplitude = mpmath.exp(e * t) * start[i] + source[i] * (p["D_0"] * steady + p["D_1"] * decaying)
+        result += vectors[:, i] * amplitude
+    return [float(mpmath.re(value)) for value in result]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_three_temperatures_of_capacities_over_24_decades(seed):
+    random = np.random.default_rng(seed)
+    powers = {name: 10 ** random.uniform(-12, 12) for name in ("C_1", "C_2", "C_c")}
+    powers |= {name: 10 ** random.uniform(-3, 6) for name in ("h_1", "h_2")}
+    given = powers | {"T_1": 290.0, "T_2": 350.0, "T_c": 400.0, "D_0": 900.0, "D_1": 4e3}
+    given["gamma"], t = 10 ** random.uniform(-3, 3), 10 ** random.uniform(-8, 4)
+    with mpmath.workdps(60):
+        exact = modes_in_60_digits(given, t)
+    found = get("three-temperatures")(**given).solution(t)
+    assert [found[name] for name in ("T_1", "T_2", "T_c")] == pytest.approx(exact, rel=1e-11)

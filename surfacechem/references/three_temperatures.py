@@ -39,15 +39,31 @@ class ThreeTemperatures(HeatedMedium):
     T_c: float = parameter("K", "initial temperature of the medium", above=0)
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        q_1, q_2, heat_1, heat_2 = np.zeros((4, t.size))
-        for rate, mode, initial in self.modes():
-            amplitude, integral = self._mode_in_time(t, rate, mode, initial)
-            q_1, q_2 = q_1 + self._root_1 * mode[0] * amplitude, q_2 + self._root_2 * mode[1] * amplitude
-            heat_1, heat_2 = heat_1 + self._root_1 * mode[0] * integral, heat_2 + self._root_2 * mode[1] * integral
-        T_1, T_2 = self.T_1 + heat_1 / self.C_1, self.T_2 + heat_2 / self.C_2
-        to_1, to_2 = q_1 / self.h_1, q_2 / self.h_2
-        T_c = np.where(np.abs(to_1) < np.abs(to_2), T_1 + to_1, T_2 + to_2)
+        (q_1, heat_1), (q_2, heat_2), sizes = self._fluxes(t)
+        to_1, to_2, (by_1, by_2, off_1, off_2) = q_1 / self.h_1, q_2 / self.h_2, sizes
+        given = self.D_0 * t + self.D_1 * t * first_difference(np.zeros_like(t), -self.gamma * t)
+        stored = (given - heat_1 - heat_2) / self.C_c
+        by_c = self.T_c + (np.abs(given) + by_1 * self.C_1 + by_2 * self.C_2) / self.C_c
+        bodies = self.T_1 + heat_1 / self.C_1, self.T_2 + heat_2 / self.C_2
+        # Each temperature by the way on which the least is lost: its own heat, or that of another and the flux between.
+        ways = (self.T_1 + by_1 + off_1, self.T_2 + by_2 + off_2, by_c)
+        T_c = np.choose(np.argmin(ways, axis=0), (bodies[0] + to_1, bodies[1] + to_2, self.T_c + stored))
+        least = np.min(ways, axis=0)
+        T_1 = np.where(self.T_1 + by_1 <= least + off_1, bodies[0], T_c - to_1)
+        T_2 = np.where(self.T_2 + by_2 <= least + off_2, bodies[1], T_c - to_2)
         return {"T_1": T_1, "T_2": T_2, "T_c": T_c, "q_1": q_1, "q_2": q_2}
+
+    def _fluxes(self, t: Array) -> tuple[tuple[Array, Array], tuple[Array, Array], tuple[Array, Array, Array, Array]]:
+        """Flux and heat into each body, and the sizes of the terms that they are sums of, as temperatures [K]."""
+        q, heat, by, off = np.zeros((4, 2, t.size))
+        for rate, mode, initial in self.modes():
+            for k, (root, C, h) in enumerate(((self._root_1, self.C_1, self.h_1), (self._root_2, self.C_2, self.h_2))):
+                amplitude, integral, size, area = self._mode_in_time(t, rate, mode, initial)
+                q[k] += root * mode[k] * amplitude
+                heat[k] += root * mode[k] * integral
+                by[k] += root * abs(mode[k]) * area / C
+                off[k] += root * abs(mode[k]) * size / h
+        return (q[0], heat[0]), (q[1], heat[1]), (by[0], by[1], off[0], off[1])
 
     @property
     def _root_1(self) -> float:
@@ -76,14 +92,17 @@ class ThreeTemperatures(HeatedMedium):
         axes = (cosine, cosine * tangent)
         return fast, slow, axes if half_gap >= 0.0 else axes[::-1]
 
-    def _mode_in_time(self, t: Array, rate: float, mode: tuple[float, float], initial: float) -> tuple[Array, Array]:
-        """Amplitude of a mode and its integral over time: free decay plus the answers to the two sources."""
+    def _mode_in_time(
+        self, t: Array, rate: float, mode: tuple[float, float], initial: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """Amplitude of a mode and its integral over time, of free decay and sources, and the sizes of their terms."""
         zero, decay, source_decay = np.zeros_like(t), -rate * t, -self.gamma * t
         total = self.C_1 + self.C_2 + self.C_c
         drive = rate * (mode[0] * self.C_1 / total / self._root_1 + mode[1] * self.C_2 / total / self._root_2)
-        amplitude = initial * np.exp(decay)
-        integral = initial * t * first_difference(zero, decay)
+        amplitudes = [initial * np.exp(decay)]
+        integrals = [initial * t * first_difference(zero, decay)]
         for strength, exponent in ((self.D_0, zero), (self.D_1, source_decay)):
-            amplitude = amplitude + strength * drive * t * first_difference(exponent, decay)
-            integral = integral + strength * drive * t**2 * second_difference(exponent, decay)
-        return amplitude, integral
+            amplitudes.append(strength * drive * t * first_difference(exponent, decay))
+            integrals.append(strength * drive * t**2 * second_difference(exponent, decay))
+        sizes = (np.sum(np.abs(terms), axis=0) for terms in (amplitudes, integrals))
+        return np.sum(amplitudes, axis=0), np.sum(integrals, axis=0), *sizes

@@ -66,8 +66,8 @@ class Stiffness(Regime):
     symbol = "fastest rate / slowest rate"
     values = (1e2, 1e5, 1e10, 1e15, 1e20, 1e25)
     space: ClassVar = {
-        "C_1": (-3.0, 6.0),
-        "C_2": (-3.0, 6.0),
+        "C_1": (-9.0, 9.0),
+        "C_2": (-9.0, 9.0),
         "C_c": (-18.0, 6.0),
         "h_1": (-9.0, 15.0),
         "h_2": (-9.0, 15.0),
