@@ -245,7 +245,7 @@ def mechanism(
     typer.echo(sheet(curves, temperatures, forces))
     if output:
         from surfacechem import plots, rateplots
-        from surfacechem.solution import replacing
+        from surfacechem.netcdf import replacing
 
         with replacing(output) as temporary:
             plots.save(rateplots.figure(curves, temperatures, forces), temporary, kind)
@@ -273,7 +273,7 @@ def plot(
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     from surfacechem import plots
-    from surfacechem.solution import replacing
+    from surfacechem.netcdf import replacing
 
     refuse_unwritable(target)
     solution = None if is_file else _solved_case(source, changes)

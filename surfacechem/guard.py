@@ -17,7 +17,7 @@ class _TriedError(Exception):
 
 def refuse_unwritable(target: Path) -> None:
     """InputError where a file could not be written, so that nothing is computed in vain; leaves no trace."""
-    from surfacechem.solution import replacing
+    from surfacechem.netcdf import replacing
 
     with suppress(_TriedError), replacing(target):
         raise _TriedError

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import re
-import stat
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,18 +15,16 @@ import numpy as np
 
 from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
-from surfacechem.errors import InputError, Place
 from surfacechem.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
+from surfacechem.netcdf import CONVENTIONS, Column, replacing, versions, write_netcdf
 from surfacechem.profiles import profile_columns
 from surfacechem.solvers import solver
 from surfacechem.solvers.contract import Status
 
 if TYPE_CHECKING:
     import xarray
-
-CONVENTIONS = "CF-1.11"
 
 LOST = 1e-4
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
@@ -61,41 +54,6 @@ class Accuracy:
     """Exact values at the output times, by variable, where an exact solution was named."""
     asked: float | None = None
     """What was asked for, where the tolerance was chosen from it."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """One variable of the dataset."""
-
-    name: str
-    dimensions: tuple[str, ...]
-    values: Any
-    unit: str
-    long_name: str
-    tag: str = ""
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """CF attributes."""
-        result = {"units": cf_unit(self.unit), "long_name": self.long_name}
-        return result | ({"equation": self.tag} if self.tag else {})
-
-
-def cf_unit(unit: str) -> str:
-    """A unit of this package in the notation of the CF conventions.
-
-    >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1"), cf_unit("(m/s)/s")
-    ('W m-2 K-1', 'm-2', '1', 'm s-1 s-1')
-    """
-    if unit.startswith("("):
-        inner, _, rest = unit[1:].partition(")")
-        return " ".join(part for part in (cf_unit(inner), cf_unit(f"1{rest}")) if part != "1") or "1"
-    top, _, bottom = unit.partition("/")
-    factors = [re.sub(r"\^", "", factor) for factor in top.split() if factor != "1"]
-    for factor in bottom.strip("()").split():
-        base, _, power = factor.partition("^")
-        factors.append(f"{base}-{power or 1}")
-    return " ".join(factors) or "1"
 
 
 @dataclass(frozen=True, repr=False)
@@ -339,62 +297,3 @@ class Solution:
 
 def _largest(values: Any) -> float:
     return float(np.max(np.abs(values), initial=0.0))
-
-
-@cache
-def versions() -> str:
-    """Versions of what a result depends on."""
-    names = ("surfacechem", "numpy", "numba", "symengine")
-    return ", ".join(f"{name} {version(name)}" for name in names)
-
-
-@contextmanager
-def replacing(target: Path) -> Iterator[Path]:
-    """A temporary file beside the target that takes its place when all went well; InputError if it cannot be made.
-
-    A link is followed; what is no regular file, or protected, is left alone.
-    """
-    target = target.resolve()
-    if target.is_dir():
-        raise InputError("is a directory; give a file name to write to.", Place(str(target)))
-    if target.exists() and not target.is_file():
-        raise InputError("is no regular file; give a file name to write to.", Place(str(target)))
-    if target.exists() and not target.stat().st_mode & stat.S_IWUSR:
-        raise InputError("cannot be written: it is read-only.", Place(str(target)))
-    if not target.parent.is_dir():
-        raise InputError(f"cannot be written: there is no folder {target.parent}.", Place(str(target)))
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}.", Place(str(target))) from error
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """Write columns and attributes to a new file."""
-    import netCDF4
-
-    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-        for dimension, size in _dimensions(columns).items():
-            file.createDimension(dimension, size)
-        for column in columns:
-            kind = str if np.asarray(column.values).dtype == object else np.float64
-            variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
-            variable.setncatts(column.attributes)
-            variable[...] = column.values
-        file.setncatts(attributes)
-
-
-def _dimensions(columns: Sequence[Column]) -> dict[str, int]:
-    sizes: dict[str, int] = {}
-    for column in columns:
-        for axis, dimension in enumerate(column.dimensions):
-            sizes[dimension] = np.shape(column.values)[axis]
-    return sizes

@@ -32,8 +32,8 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from surfacechem.netcdf import Column, replacing, write_netcdf
 from surfacechem.report import columns
-from surfacechem.solution import Column, replacing, write_netcdf
 
 if TYPE_CHECKING:
     import xarray

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.netcdf import CONVENTIONS, Column, replacing, versions, write_netcdf
 from surfacechem.quantities import Quantity
-from surfacechem.solution import CONVENTIONS, DATASET_NAMES, Column, replacing, versions, write_netcdf
+from surfacechem.solution import DATASET_NAMES
 from surfacechem.sweeps import Axis, Plan, Sweep
 from surfacechem.system import System
 

@@ -9,7 +9,7 @@ import xarray
 import surfacechem
 from surfacechem.case import names
 from surfacechem.errors import InputError
-from surfacechem.solution import cf_unit
+from surfacechem.netcdf import cf_unit
 
 SKIPPED = ["check_spatiotemporal_dims_have_coordinate_vars"]
 """Wants a calendar date of every coordinate called time; a run has elapsed seconds."""

@@ -38,7 +38,7 @@ FLOORS = {
         "ends",
         "integrate",
     ],
-    "results": ["accuracy", "profiles", "solution", "audit", "extremes", "event_table", "detailedbalance"],
+    "results": ["accuracy", "netcdf", "profiles", "solution", "audit", "extremes", "event_table", "detailedbalance"],
     "studies": [
         "references.*",
         "achieved",

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 
+from surfacechem.netcdf import Column
 from surfacechem.plots import STYLE
-from surfacechem.solution import Column
 from surfacechem.stability.matrix import FAILED, LEAST, MOST, OUTCOMES, REFUSED, STEPS, WRONG, Cell, Matrix, Row
 from surfacechem.stability.search import Corner
 from surfacechem.studyreport import Page, Section, Table

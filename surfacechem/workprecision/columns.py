@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solution import Column
+from surfacechem.netcdf import Column
 from surfacechem.solvers import solver as method
 from surfacechem.workprecision.errors import KINDS, MEANING
 from surfacechem.workprecision.measure import Point

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from surfacechem.solution import CONVENTIONS, Column
+from surfacechem.netcdf import CONVENTIONS, Column
 from surfacechem.studyreport import Page, as_dataset, machine, write
 from surfacechem.workprecision.columns import columns
 from surfacechem.workprecision.plan import Measured, Plan
