@@ -59,7 +59,9 @@ def cycles(curves: Curves) -> list[Cycle]:
 
 def verdict(cycle: Cycle, curves: Curves, temperatures: Array, forces: Array) -> str:
     """Whether a cycle can come to rest, in words."""
-    one_way = [step for step, _ in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible]
+    one_way = {step: times for step, times in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible}
+    if one_way and min(one_way.values()) < 0 < max(one_way.values()):
+        return "goes round neither way, since it has one-way reactions in both directions"
     if one_way:
         return f"nothing stops it, since there is no way back from {', '.join(one_way)}: give each a reverse"
     values = cycle.departure(curves, temperatures, forces)

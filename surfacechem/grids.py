@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 
@@ -17,7 +18,8 @@ def points(cells: int, grading: float = 1.0) -> tuple[float, ...]:
     """
     if grading == 1.0:
         return tuple(i / cells for i in range(cells + 1))
-    return (*((grading ** (i / cells) - 1) / (grading - 1) for i in range(cells)), 1.0)
+    s = math.log(grading)
+    return (*(math.expm1(s * i / cells) / math.expm1(s) for i in range(cells)), 1.0)
 
 
 def shares(at: tuple[float, ...]) -> tuple[float, ...]:

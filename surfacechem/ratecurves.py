@@ -129,7 +129,7 @@ class Curves:
         return spring.rest_length + FORCE / spring.stiffness if spring else 0.0
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
-        function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [expression])
+        function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [expression], cse=True)
         points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
         return np.asarray(function(points), dtype=np.float64)[..., 0]
 
@@ -148,6 +148,6 @@ def _alone(law: Potential) -> Potential:
 
 def _thermo(species: Species, temperature: float) -> Thermo:
     g = symengine.sympify(species.gibbs(TEMPERATURE))
-    function = symengine.Lambdify([TEMPERATURE], [g, derivative(g, TEMPERATURE)])
+    function = symengine.Lambdify([TEMPERATURE], [g, derivative(g, TEMPERATURE)], cse=True)
     value, slope = (GAS_CONSTANT * float(x) for x in function([temperature]))
     return Thermo(value - temperature * slope, -slope, value)

@@ -32,6 +32,9 @@ LOST = 1e-4
 ROUNDING = 1e-12
 """Values beyond a range by less than this part of their largest have not left it."""
 
+LARGE, WITHIN = 1e-2, 10
+"""Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
+
 LOST_HEAT = 1e-9
 """Heat that rounding of a flux may carry in a run, relative to the total energy."""
 
@@ -114,9 +117,19 @@ class Solution:
             *self._extrapolations(),
             *capped_rates(self.trajectory),
             *self._lost_fluxes(),
+            *self._inaccurate(),
             *system.warnings,
             *self.notes,
         )
+
+    def _inaccurate(self) -> list[str]:
+        """An error well beyond what was asked for, or so large that the result is none."""
+        found = self.accuracy
+        if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
+            return []
+        wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
+        worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
+        return [f"the error of {worst} is {found.error:.1e}{wanted}"]
 
     def _lost_fluxes(self) -> list[str]:
         """Fluxes through conductances so large that the temperature difference is rounding."""

@@ -110,6 +110,8 @@ class Law(ABC):
     """Variables that must not fall below zero."""
     kinks: ClassVar[tuple[str, ...]] = ()
     """Variables at whose zeros the formula bends, so that a step has to end there."""
+    peaks: ClassVar[Mapping[str, str]] = {}
+    """Variables, by the parameter at which the formula has a narrow peak that a step must not pass over."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""

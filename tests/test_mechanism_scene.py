@@ -214,6 +214,7 @@ def test_what_cantera_warns_of_is_a_warning_of_the_run(tmp_path):
     data = "[[2.5, 0, 0, 0, 0, -100, 1], [2.6, 0, 0, 0, 0, -100, 1]]"
     broken = f"  thermo: {{model: NASA7, temperature-ranges: [200, 310, 1000], data: {data}}}"
     (tmp_path / "broken.yaml").write_text(text.replace(constant, broken, 1))
+    ct.suppress_thermo_warnings(False)
     mechanism = load_mechanism(tmp_path / "broken.yaml")
     assert len(mechanism.remarks) == 3
     assert all("broken.yaml: Cantera: NasaPoly2::validate: For species" in remark for remark in mechanism.remarks)

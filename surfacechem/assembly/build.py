@@ -39,6 +39,9 @@ MANY = range(2, 1000)
 NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 """Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
 
+BOTH = "interface", "each body"
+"""Ends of the paths that bring heat into both bodies alike."""
+
 NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
 
@@ -296,6 +299,9 @@ class Build:
         for name in law.kinks:
             value = own[name] if name in own else self.variables.get(name, law)
             self.margins.append(Margin(name, value, f"{name} changes its sign, where {law.name()} bends", False))
+        for name, parameter in law.peaks.items():
+            value, reason = self.variables.get(name, law) - getattr(law, parameter), f"{law.name()} is at its peak"
+            self.margins.append(Margin(f"{name} = {parameter}", value, reason, terminal=False, told=False))
         for name, ends in law.limits.items():
             value, (low, high) = self.variables.get(name, law), ends
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import symengine
 
 from surfacechem import balances, grids
-from surfacechem.assembly.build import Build
+from surfacechem.assembly.build import BOTH, Build
 from surfacechem.balances import Node
 from surfacechem.conductors import Conductor, Profile
 from surfacechem.errors import InputError
@@ -79,7 +79,7 @@ def conductors(build: Build) -> Iterator[Conductor]:
             continue
         node, ends = build.node_of[body.name], build.conductances
         F = node.energies[body.name] / build.volume(body.name)[0][1]
-        paths = [h for pair, several in ends.items() if body.name in pair for h in several]
+        paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
         alone = sum(other is node for other in build.node_of.values()) == 1
         yield Conductor(
             number,

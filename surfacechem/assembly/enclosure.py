@@ -130,7 +130,7 @@ def _power(node: Any, parts: list[Interval]) -> Interval:
     if even and low < 0:
         low, high = (0.0 if high > 0 else min(-low, -high)), max(-low, high, -high)
     elif low < 0 and (n != int(n) or n < 0):
-        return WHOLE if high > 0 or n != int(n) else (_raised(high, n), _raised(low, n))
+        return WHOLE if high >= 0 or n != int(n) else (_raised(high, n), _raised(low, n))
     ends = sorted((_raised(low, n), _raised(high, n)))
     return ends[0], ends[1]
 

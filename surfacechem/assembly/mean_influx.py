@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import symengine
 
-from surfacechem.assembly.build import Build
+from surfacechem.assembly.build import BOTH, Build
 from surfacechem.assembly.exchange import check_closure, conductances, end_node, named_flux, receive
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.quantities import Quantity
-
-BOTH = "interface", "each body"
 
 
 def mean_influx(build: Build) -> None:

@@ -22,7 +22,7 @@ FIRST_CELLS = 16
 MOST_CELLS = 4096
 
 ACCURACY = Spec("1", "accuracy", above=0, at_most=0.1)
-GRADING = Spec("1", "grading", above=0)
+GRADING = Spec("1", "grading", at_least=1e-6, at_most=1e6)
 CONDUCTANCE = Spec("W/(m^2 K)", "conductance at the far side", at_least=0)
 
 

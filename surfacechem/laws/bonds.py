@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from surfacechem.expressions import Expression, exp, expm1, log, log_fraction, where
 from surfacechem.laws.forces import (
@@ -188,6 +189,8 @@ class GapAttachment(RateLaw):
     >>> GapAttachment(k_on=10.0, stiffness=1e-3, rest_length=2e-8).rate(phi=0.5, n_c=1.0, g_n=2e-8, T_c=300.0)
     5.0
     """
+
+    peaks: ClassVar = {"g_n": "rest_length"}
 
     k_on: float = parameter("1/s", "rate of formation at the rest length", at_least=0)
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
