@@ -4,6 +4,7 @@ The folder's name holds a digest of the kernel's sources, the versions of Numba 
 code is never reused where it does not fit. A cache that cannot be written or read costs compile time, never a result.
 """
 
+import gc
 import hashlib
 import os
 import platform
@@ -64,17 +65,22 @@ def _writable(folder: Path) -> None:
 def _settings(folder: Path | None) -> Iterator[None]:
     """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
 
-    Loops here run over a handful of states: vectorising them slows them down.
+    Loops here run over a handful of states: vectorising them slows them down. What Numba makes on the way lives until
+    the end: a tenth of the time would go into looking for what is no longer used.
     """
     import numba
 
+    collecting = gc.isenabled()
     chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0}
     usual = {name: getattr(numba.config, name) for name in chosen}
     try:
         for name, value in chosen.items():
             setattr(numba.config, name, value)
+        gc.disable()
         yield
     finally:
+        if collecting:
+            gc.enable()
         for name, value in usual.items():
             setattr(numba.config, name, value)
 

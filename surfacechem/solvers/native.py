@@ -33,22 +33,23 @@ def compiled(function: Any, counted: bool = False) -> Any:
     return _njit(error_model="numpy", _nrt=counted, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
-RESIDUAL, JACOBIAN, LEDGER, MARGINS = range(4)
+RESIDUAL, JACOBIAN, LEDGER, MARGINS = np.arange(4)
 FUNCTIONS = 4
 """Rows of the table of addresses (code, user data, function, place in its result); further rows are later parts of
-functions that are compiled in pieces."""
+functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
+constant."""
 
-ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = range(13)
+ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = np.arange(13)
 """Rows of the vectors of length n."""
-Q, Q_TRIAL, Q_CORRECTION, Q_PROBE = range(4)
+Q, Q_TRIAL, Q_CORRECTION, Q_PROBE = np.arange(4)
 """Rows of the vectors of length n_ledger."""
-M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = range(9)
+M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = np.arange(9)
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero."""
-BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = range(10)
+BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = np.arange(10)
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
 t."""
-STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS, MEMBER, LAST_MEMBER, TRIES, CALM, FRESH = range(11)
+STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS, MEMBER, LAST_MEMBER, TRIES, CALM, FRESH = np.arange(11)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
 iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state."""
 
