@@ -41,7 +41,6 @@ from surfacechem.solvers.radau_advance import (
     keep_matrices,
     restart,
     store_polynomial,
-    too_small,
 )
 from surfacechem.solvers.radau_outputs import write_outputs
 from surfacechem.solvers.radau_step import first_size, loosening
@@ -55,6 +54,8 @@ FIRST_COUNTER, COUNTERS = 4, 6
 
 PATIENCE = 40
 """Steps that the ledger may refuse beside every second: what it misses may be noise, which must not end a run."""
+SHORTEST = 1e-10
+"""Part of the time so far below which the ledger shortens no step: what ends the run there is told by the states."""
 
 
 @compiled
@@ -129,13 +130,14 @@ def _move(w: Any, size: float, reached: float, times: Any, outputs: Any, steps: 
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     """Longest next step that serves the ledger; shorter than this one where this one does not."""
-    norm = ledger_norm(w, h, remaining) if w.ledger.shape[1] > 0 else 0.0
+    brief = h < SHORTEST * (w.clock[BASE] + w.clock[TAU])
+    norm = 0.0 if brief or w.ledger.shape[1] == 0 else ledger_norm(w, h, remaining)
     if norm == 0.0:
         return np.inf
     limit = h * ledger_factor(w, norm)
     if norm <= 1.0:
         return max(limit, h)
-    if too_small(w, limit) or w.count[REFUSED] > PATIENCE + w.count[STEPS] // 2:
+    if w.count[REFUSED] > PATIENCE + w.count[STEPS] // 2:
         return np.inf
     w.count[REJECTED] += 1
     w.count[REFUSED] += 1
