@@ -99,6 +99,8 @@ class Program:
     """Per state: no equation contains its derivative."""
     filler: Filler | None = None
     chains: tuple[Chain, ...] = ()
+    groups: tuple[int, ...] = ()
+    """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, with the parameters that come from outside."""
@@ -120,6 +122,11 @@ class Program:
     def chain_table(self) -> NDArray[np.int64]:
         """A row (first, end, anchor) for each chain; anchor -1 where it hangs on nothing."""
         return np.array([(c.first, c.end, c.anchor) for c in self.chains], dtype=np.int64).reshape(-1, 3)
+
+    @cached_property
+    def ledger_groups(self) -> NDArray[np.int64]:
+        """Group of each quadrature, -1 where it is in none."""
+        return np.array(self.groups or (-1,) * self.n_ledger, dtype=np.int64)
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """dG/dy and dG/dydot as matrices [..., equation, variable]."""
@@ -183,6 +190,7 @@ def compile_program(
     margins: Sequence[Any] = (),
     filler: Filler | None = None,
     chains: Sequence[Chain] = (),
+    groups: Sequence[int] = (),
 ) -> Program:
     """Compile a system with the Jacobians differentiated from its residual.
 
@@ -216,6 +224,7 @@ def compile_program(
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
+        groups=tuple(groups),
     )
 
 

@@ -18,6 +18,9 @@ STALLED = 1e-3
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
 left to close, explains why a run cannot go on."""
 
+RESOLVED = 1e-14
+"""Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
+
 RUNAWAY = 1e-9
 """Part of the time that has passed within which a state that runs away would change by itself."""
 
@@ -40,10 +43,11 @@ def closest_margin(program: Program, margins: Sequence[Margin], result: Result) 
     if result.steps is None or len(result.steps.t) < 2:
         return None
     seen, t = _values(program, result, result.steps)[:, :count], result.steps.t
+    before = max(int(np.searchsorted(t, t[-1] * (1 - RESOLVED))) - 1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         shrink = seen[-1] / np.max(np.abs(seen), axis=0)
-        left = seen[-1] / (seen[-2] - seen[-1]) * (t[-1] - t[-2])
-    closing = terminal & (seen[-1] < seen[-2]) & (left < STALLED * t[-1])
+        left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
+    closing = terminal & (seen[-1] < seen[before]) & (left < STALLED * t[-1])
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
     return margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
 

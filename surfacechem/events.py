@@ -92,6 +92,7 @@ class Hybrid:
         problem = self.problem
         self.largest = np.zeros(len(problem.margins))
         self.booked = np.zeros(problem.program.n_ledger)
+        self.exchanged = np.zeros(problem.program.n_ledger)
         if problem.max_seconds is not None:
             self.deadline = time.monotonic() + problem.max_seconds
         y, modes = problem.y0, problem.parameters[0, self.jumper.mode_columns]
@@ -151,6 +152,7 @@ class Hybrid:
             parameters=local[None],
             max_steps=problem.max_steps - self.steps,
             max_seconds=seconds,
+            exchanged=self.exchanged,
         )
         return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
@@ -163,6 +165,7 @@ class Hybrid:
         part = Part(result, start, reached, status, times[: len(result.times)], self.booked)
         self.parts.append(part)
         self.booked = self.booked + result.ledger
+        self.exchanged = np.maximum(self.exchanged, np.abs(self.booked))
         self.steps += result.counters.steps
         self.written += len(result.times)
         if len(result.margins):

@@ -31,6 +31,9 @@ from surfacechem.validity import check_start
 
 Array = NDArray[np.float64]
 
+GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
+"""Accounts whose quadratures are measured together."""
+
 DEFAULT_RTOL = 1e-11
 """Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
 
@@ -157,6 +160,7 @@ class Model:
             system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
             filler=self._filler(inputs),
             chains=[Chain(*chain) for chain in system.chains],
+            groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
         )
         self.jumper = Jumper(system) if system.transitions else None
         outputs = [system.expand(item.expression) for item in system.outputs]

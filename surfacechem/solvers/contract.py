@@ -90,6 +90,8 @@ class Problem:
     max_steps: int = 100_000
     max_seconds: float | None = None
     record_steps: bool = False
+    exchanged: Array | None = None
+    """What each quadrature amounted to at most before, where the problem continues another."""
 
     def __post_init__(self) -> None:
         n, segments = self.program.n, len(self.segments) - 1

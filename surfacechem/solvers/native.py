@@ -41,7 +41,7 @@ constant."""
 
 ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = np.arange(13)
 """Rows of the vectors of length n."""
-Q, Q_TRIAL, Q_CORRECTION, Q_PROBE = np.arange(4)
+Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.arange(8)
 """Rows of the vectors of length n_ledger."""
 M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = np.arange(9)
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
@@ -49,9 +49,11 @@ largest size so far; slope; value elsewhere; ends of the interval in which it re
 BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = np.arange(10)
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
 t."""
-STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS, MEMBER, LAST_MEMBER, TRIES, CALM, FRESH = np.arange(11)
+STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
+MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
-iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state."""
+iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state; steps that the
+ledger has refused."""
 
 
 class Work(NamedTuple):
@@ -60,6 +62,7 @@ class Work(NamedTuple):
     code: Any
     algebraic: Any
     chains: Any
+    groups: Any
     inputs: Any
     clock: Any
     count: Any
@@ -235,21 +238,22 @@ def _take(_context: Any, cursor: Any, shape: Any, kind: Any) -> Any:
 
 @partial(compiled, counted=True)
 def lay_out(
-    code: Any, algebraic: Any, chains: Any, cursor: Any, n_parameters: int, n_ledger: int, n_margins: int
+    code: Any, algebraic: Any, chains: Any, groups: Any, cursor: Any, n_parameters: int, n_margins: int
 ) -> Work:
     """Workspace of a trajectory on the zeros from the cursor's address on; leaves their end there. No memory is
     touched. The three arrays of derivatives follow each other, as the compiled function writes them.
     """
-    n, links = algebraic.shape[0], chains.shape[0]
+    n, links, n_ledger = algebraic.shape[0], chains.shape[0], groups.shape[0]
     core = chains[0, 0] if links > 0 else n
     cells = n - core
     return Work(
         code,
         algebraic,
         chains,
+        groups,
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
         _take(cursor, (10,), np.float64),
-        _take(cursor, (11,), np.int64),
+        _take(cursor, (12,), np.int64),
         _take(cursor, (13, n), np.float64),
         _take(cursor, (7, n), np.float64),
         _take(cursor, (7, n), np.float64),
@@ -266,7 +270,7 @@ def lay_out(
         _take(cursor, (3, cells, 3), np.complex128),
         _take(cursor, (4, core), np.int64),
         _take(cursor, (n, 9), np.float64),
-        _take(cursor, (4, n_ledger), np.float64),
+        _take(cursor, (8, n_ledger), np.float64),
         _take(cursor, (7, n_ledger), np.float64),
         _take(cursor, (8, n_ledger), np.float64),
         _take(cursor, (n, 9), np.float64),

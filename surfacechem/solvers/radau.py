@@ -33,7 +33,7 @@ _STATUSES = tuple(Status)
 LOOSEST = 3e-5
 """Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
 
-TIMES = 11
+TIMES = 12
 """Where segments and output times stand among the arguments of the compiled entry point."""
 
 
@@ -58,6 +58,7 @@ class _Tables:
         max_steps: int,
         step_rows: int,
         event_rows: int,
+        exchanged: Array | None = None,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
         self.stop = np.zeros(1, np.int64)
@@ -71,7 +72,8 @@ class _Tables:
             program.addresses,
             program.algebraic_mask,
             program.chain_table,
-            q,
+            program.ledger_groups,
+            np.zeros(q) if exchanged is None else exchanged,
             max_steps,
             self.stop,
             min(rtol, LOOSEST),
@@ -102,6 +104,11 @@ def _no_rows(runs: int) -> Array:
     return np.empty((runs, 0, 0))
 
 
+@cache
+def _no_accounts() -> NDArray[np.int64]:
+    return np.empty(0, np.int64)
+
+
 def _contiguous(values: ArrayLike) -> Array:
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.c_contiguous:
         return values
@@ -121,6 +128,7 @@ def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
         problem.max_steps,
         step_rows,
         event_rows,
+        problem.exchanged,
     )
 
 
@@ -301,8 +309,8 @@ def search_arguments(program: Program, ends: Array, table: Array, counts: NDArra
     """
     none, nothing = np.zeros(0), _no_rows(len(ends))
     return (
-        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, 0, 0, counts[0], 1.0,
-        np.ones(program.n), _kinds(()),
+        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, _no_accounts(), none, 0,
+        counts[0], 1.0, np.ones(program.n), _kinds(()),
         ends, table, none, none, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 

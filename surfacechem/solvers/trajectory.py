@@ -14,7 +14,11 @@ from surfacechem.solvers.native import (
     LOOSE,
     M_LARGEST,
     M_NOW,
+    Q_LARGEST,
+    REFUSED,
+    REJECTED,
     RTOL,
+    STEPS,
     TAU,
     TRIAL,
     TRIAL_DOT,
@@ -28,6 +32,7 @@ from surfacechem.solvers.native import (
     lay_out,
     reference,
 )
+from surfacechem.solvers.quadrature import ledger_factor, ledger_norm
 from surfacechem.solvers.radau_advance import (
     GOOD,
     accept,
@@ -46,6 +51,11 @@ EVENT = int(Status.EVENT)
 END, OUTPUTS, EVENTS, RECORDS = range(4)
 """Entries of the per-run table of counts: status, outputs written, events, recorded steps; then the counters."""
 FIRST_COUNTER, COUNTERS = 4, 6
+
+PATIENCE = 40
+"""Steps that the ledger may refuse beside every second: what it misses may be noise, which must not end a run."""
+SHORTEST = 1e-10
+"""Part of the time so far below which the ledger shortens no step: what ends the run there is told by the states."""
 
 
 @compiled
@@ -118,6 +128,24 @@ def _move(w: Any, size: float, reached: float, times: Any, outputs: Any, steps: 
 
 
 @compiled
+def _ledger_limit(w: Any, h: float, remaining: float) -> float:
+    """Longest next step that serves the ledger; shorter than this one where this one does not."""
+    brief = h < SHORTEST * (w.clock[BASE] + w.clock[TAU])
+    norm = 0.0 if brief or w.ledger.shape[1] == 0 else ledger_norm(w, h, remaining)
+    if norm == 0.0:
+        return np.inf
+    limit = h * ledger_factor(w, norm)
+    if norm <= 1.0:
+        return max(limit, h)
+    if w.count[REFUSED] > PATIENCE + w.count[STEPS] // 2:
+        return np.inf
+    w.count[REJECTED] += 1
+    w.count[REFUSED] += 1
+    w.clock[H_FACTORED] = 0.0
+    return limit
+
+
+@compiled
 def _run_segment(
     w: Any,
     end: float,
@@ -143,6 +171,10 @@ def _run_segment(
         if outcome != GOOD:
             return outcome
         finish_step(w, h)
+        limit = _ledger_limit(w, h, remaining)
+        if limit < h:
+            h = limit
+            continue
         size = h
         if kinds.shape[0] > 0:
             size = find_event(w, h, kinds)
@@ -158,7 +190,7 @@ def _run_segment(
         if whole:
             w.clock[TAU] = end - w.clock[BASE]
         size_last, norm_last = h, max(norm, 1e-2)
-        h = keep_matrices(w, h, proposed)
+        h = keep_matrices(w, h, min(proposed, limit))
         if kinds.shape[0] > 0 and any_true(w.fired):
             if _write_events(w, events, kinds, counts):
                 return EVENT
@@ -169,6 +201,7 @@ def _run_segment(
 @compiled
 def _run(
     w: Any,
+    exchanged: Any,
     y0: Any,
     parameters: Any,
     segments: Any,
@@ -186,6 +219,7 @@ def _run(
     clear(w.fired)
     clear(w.count)
     clear(w.ledger[Q])
+    copy(exchanged, w.ledger[Q_LARGEST])
     clear(w.margin[M_LARGEST])
     copy(y0, w.vector[Y])
     clear(w.vector[YDOT])
@@ -225,7 +259,8 @@ def run_batch(
     code: Any,
     algebraic: Any,
     chains: Any,
-    n_ledger: int,
+    groups: Any,
+    exchanged: Any,
     max_steps: int,
     stop: Any,
     rtol: float,
@@ -245,10 +280,10 @@ def run_batch(
     threads. Without segments the rows of ``ends`` are made consistent; parameters may then be one row for all.
     """
     place = np.zeros(1, np.int64)
-    lay_out(code, algebraic, chains, place, parameters.shape[2], n_ledger, kinds.shape[0])
+    lay_out(code, algebraic, chains, groups, place, parameters.shape[2], kinds.shape[0])
     memory = np.zeros(place[0] // 8, np.int64)
     place[0] = memory.ctypes.data
-    w = reference(lay_out(code, algebraic, chains, place, parameters.shape[2], n_ledger, kinds.shape[0]))
+    w = reference(lay_out(code, algebraic, chains, groups, place, parameters.shape[2], kinds.shape[0]))
     w.clock[RTOL] = rtol
     w.clock[LOOSE] = loosening(rtol)
     copy(atol, w.vector[ATOL])
@@ -258,6 +293,7 @@ def run_batch(
             continue
         _run(
             w,
+            exchanged,
             y0[i],
             parameters[i],
             segments,
