@@ -28,7 +28,7 @@ def event_columns(trajectory: Trajectory) -> list[EventColumn]:
     plain = [
         (float(t), margins[i].name, margins[i].reason, None)
         for t, i in zip(events.t, events.index, strict=True)
-        if i < len(margins) and margins[i].told
+        if i < len(margins) and not margins[i].peak
     ]
     jumped = [(jump.t, jump.transition.name, jump.transition.reason, jump) for jump in trajectory.jumps]
     rows = sorted([*plain, *jumped], key=lambda row: row[0])

@@ -25,6 +25,7 @@ from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solve
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
+from surfacechem.system import Margin as Watched
 from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
@@ -141,6 +142,13 @@ class Trajectory:
         return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
 
 
+def _watched(margin: Watched) -> Margin:
+    """What the stepper does at a margin of the system."""
+    if margin.peak:
+        return Margin.peak()
+    return Margin.stop() if margin.terminal else Margin.restart()
+
+
 class Model:
     """A system with its machine code, made when it is built."""
 
@@ -218,8 +226,7 @@ class Model:
             parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
-            margins=tuple(Margin.stop() if margin.terminal else Margin.restart() for margin in self.margins)
-            + (Margin.stop(),) * len(system.transitions),
+            margins=tuple(map(_watched, self.margins)) + (Margin.stop(),) * len(system.transitions),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,

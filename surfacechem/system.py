@@ -114,8 +114,8 @@ class Margin:
     terminal: bool = True
     remedy: str = ""
     """What to change where it is closed from the start."""
-    told: bool = True
-    """Whether its zero is an event of the scene, or a place where a step has to end and no more."""
+    peak: bool = False
+    """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
 
 
 @dataclass(frozen=True)

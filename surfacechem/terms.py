@@ -110,8 +110,6 @@ class Law(ABC):
     """Variables that must not fall below zero."""
     kinks: ClassVar[tuple[str, ...]] = ()
     """Variables at whose zeros the formula bends, so that a step has to end there."""
-    peaks: ClassVar[Mapping[str, str]] = {}
-    """Variables, by the parameter at which the formula has a narrow peak that a step must not pass over."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""
@@ -142,6 +140,11 @@ class Law(ABC):
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """Ranges of variables outside which the law has no value; a run that reaches an end of them stops."""
+        return {}
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """Values of variables at which the formula has a narrow peak, which a step must not pass over."""
         return {}
 
     @property

@@ -291,15 +291,17 @@ def test_force_spectroscopy_needs_no_gap():
     assert trajectory.result.outputs[-1, 0] == pytest.approx(-0.1 * THERMAL / (X * 100e-12) * grown, rel=1e-10)
 
 
-def test_a_narrow_peak_of_attachment_is_not_passed_over():
-    """A surface that arrives through a layer of tethers a thousand times thinner than its way."""
-    stiffness, speed, k_on, T = 1e-6, 1e-4, 3.7, 300.0
+@pytest.mark.parametrize("rtol", [3e-5, 1e-6, 1e-8, 1e-11])
+@pytest.mark.parametrize("stiffness", [1e-6, 1e-3])
+def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness):
+    """A surface that arrives through a layer of tethers thousands of times thinner than its way."""
+    speed, k_on, T = 1e-4, 3.7, 300.0
     law = GapAttachment(k_on=k_on, stiffness=stiffness)
     pair = Body("lower", Hold(level=T)), Body("upper", Hold(level=T))
     interface = Interface(Hold(level=T), [LinearEnthalpy(H_r=20.0)], (), [law], Sites(1e18, 1e18))
     loading = {"g_n": Ramp(start=3e-4, rate=-speed)}
     scene = Scene(pair, interface, [], loading, T_0=T, initial={"phi": 0.0})
-    trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0)))
+    trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0), rtol=rtol))
     half = k_on / speed * math.sqrt(math.pi * BOLTZMANN * T / (2 * stiffness))
     exact = [0.0, -math.expm1(-half), -math.expm1(-2 * half)]
-    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=1e-9)
+    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=max(1e-9, rtol))

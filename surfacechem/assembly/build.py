@@ -299,9 +299,9 @@ class Build:
         for name in law.kinks:
             value = own[name] if name in own else self.variables.get(name, law)
             self.margins.append(Margin(name, value, f"{name} changes its sign, where {law.name()} bends", False))
-        for name, parameter in law.peaks.items():
-            value, reason = self.variables.get(name, law) - getattr(law, parameter), f"{law.name()} is at its peak"
-            self.margins.append(Margin(f"{name} = {parameter}", value, reason, terminal=False, told=False))
+        for name, top in law.peaks.items():
+            value, reason = self.variables.get(name, law) - top, f"{law.name()} is at its peak"
+            self.margins.append(Margin(f"{name} at the peak of {law.name()}", value, reason, terminal=False, peak=True))
         for name, ends in law.limits.items():
             value, (low, high) = self.variables.get(name, law), ends
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from surfacechem.expressions import Expression, exp, expm1, log, log_fraction, where
 from surfacechem.laws.forces import (
@@ -190,11 +189,14 @@ class GapAttachment(RateLaw):
     5.0
     """
 
-    peaks: ClassVar = {"g_n": "rest_length"}
-
     k_on: float = parameter("1/s", "rate of formation at the rest length", at_least=0)
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
     rest_length: float = parameter("m", "gap at which the tether is not stretched", default=0.0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap that does not stretch the tether."""
+        return {"g_n": self.rest_length}
 
     def rate(self, phi: Expression, n_c: Expression, g_n: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

@@ -72,6 +72,11 @@ class DemboFormationFactor(RateFactor):
     stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
 
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """A spring that forms unstretched."""
+        return {"f": 0.0}
+
     def log_factor(self, f: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor."""
         return -self.transition_stiffness * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
@@ -151,6 +156,11 @@ class GapFactor(RateFactor):
 
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
     rest_length: float = parameter("m", "gap at which the tether is not stretched", default=0.0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap that does not stretch the tether."""
+        return {"g_n": self.rest_length}
 
     def log_factor(self, g_n: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor."""

@@ -45,6 +45,11 @@ class LoadedReaction(InterfaceArrhenius, RateFactor):
         """Those of the factor, for the force on the bond of this reaction."""
         return {self.load if name == "f" else name: limits for name, limits in super().ranges.items()}
 
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """Those of the factor, for the force on the bond of this reaction."""
+        return {self.load if name == "f" else name: top for name, top in super().peaks.items()}
+
     def own_reads(self) -> tuple[str, ...]:
         """Coverages, and the force or the gap."""
         arguments = (self.load if name == "f" else name for name in reads(self.log_factor) if name != "T_c")

@@ -60,6 +60,8 @@ class Margin:
 
     terminal: bool
     direction: int = -1
+    smooth: bool = False
+    """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
 
     @classmethod
     def stop(cls) -> "Margin":
@@ -70,6 +72,11 @@ class Margin:
     def restart(cls, direction: int = 0) -> "Margin":
         """A kink: a step ends there and the run goes on."""
         return cls(terminal=False, direction=direction)
+
+    @classmethod
+    def peak(cls) -> "Margin":
+        """A narrow peak: a step ends there that is short enough to have seen it."""
+        return cls(terminal=False, direction=0, smooth=True)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ step is repeated onto it with the full order of the method.
 
 from typing import Any
 
+import numpy as np
+
 from surfacechem.solvers.dense import interpolate_rate, keep_polynomial
 from surfacechem.solvers.native import (
     BASE,
@@ -268,18 +270,18 @@ def _slope(w: Any, h: float, m: int, x: float) -> float:
 
 
 @compiled
-def _step_onto(w: Any, size: float) -> bool:
-    """Repeat the step with another size, with the full order of the method."""
+def _step_onto(w: Any, size: float) -> float:
+    """Repeat the step with another size, with the full order of the method; returns the norm of its error."""
     w.clock[H_FACTORED] = 0.0
     if not factor_newton(w, size):
-        return False
+        return np.inf
     predict(w, size)
     if solve_stages(w, size) != CONVERGED:
-        return False
+        return np.inf
     store_polynomial(w, size, 0.0)
-    estimate_error(w, size)
+    norm = estimate_error(w, size)
     finish_step(w, size)
-    return True
+    return norm
 
 
 @compiled
@@ -289,16 +291,16 @@ def _margins_at_end(w: Any, size: float) -> None:
 
 
 @compiled
-def _refine(w: Any, h: float, m: int, x: float, slope: float) -> float:
+def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
-    step fails. A margin that touches zero has no slope to refine with.
+    step fails or its error is not below the worst. A margin that touches zero has no slope to refine with.
     """
     side = w.margin[M_SIDE, m]
     size = x * h
     store_polynomial(w, h, 0.0)
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     for attempt in range(12):
-        if not _step_onto(w, size):
+        if not _step_onto(w, size) < worst:
             return 0.0
         _margins_at_end(w, size)
         value = w.margin[M_NOW, m]
@@ -349,7 +351,8 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     if end <= 0.0:
         return h if end == 0.0 else AT_START
     first, earliest = _first(w, h, kinds)
-    size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first])
+    worst = 1.0 if kinds[first, 2] == 1 else np.inf
+    size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:
         return 0.0
     _mark_coincident(w, h, size, kinds)

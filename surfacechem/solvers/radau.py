@@ -39,7 +39,8 @@ TIMES = 12
 
 @lru_cache(maxsize=256)
 def _kinds(margins: tuple[Margin, ...]) -> NDArray[np.int64]:
-    return np.array([(margin.terminal, margin.direction) for margin in margins], np.int64).reshape(-1, 2)
+    rows = [(margin.terminal, margin.direction, margin.smooth) for margin in margins]
+    return np.array(rows, np.int64).reshape(-1, 3)
 
 
 class _Tables:
