@@ -156,6 +156,8 @@ class Model:
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         self.system = system
+        self._others: dict[frozenset[int], Model] = {system.holding.sides: self} if system.holding else {}
+        """Models of the same scene by the bounds at which its bonding state is held."""
         self.margins = system.moving_margins()
         """The margins that can close on the way; the rest is checked at the start only."""
         self.program: Program = compile_program(
@@ -267,13 +269,30 @@ class Model:
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
-        return self._solve(run, self.values(changes))
+        values = self.values(changes)
+        model = self.suited([values])
+        return model.solve_values(run, values if model is self else model.adopted(values))
+
+    def suited(self, points: Sequence[Mapping[str, float]]) -> Model:
+        """The model of the same scene with the bounds of the bonding state that values need; as a rule this one."""
+        holding = self.system.holding
+        if holding is None:
+            return self
+        sides = holding.needed_by(points)
+        if sides not in self._others:
+            self._others[sides] = Model(holding.again(sides))
+            self._others[sides]._others = self._others
+        return self._others[sides]
+
+    def adopted(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of a model with other bounds as those of this one."""
+        return {path: values.get(path, own) for path, own in self.values().items()}
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
         """The same run at another tolerance, its absolute tolerance in proportion."""
         run = trajectory.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
-        return self._solve(replace(run, rtol=rtol, atol=atol), trajectory.values)
+        return self.solve_values(replace(run, rtol=rtol, atol=atol), trajectory.values)
 
     def chosen(self, run: Run) -> Run:
         """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""
@@ -281,7 +300,8 @@ class Model:
             return run
         return replace(run, solver=ASKING[0] if self.program.filler is not None else OWN)
 
-    def _solve(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+    def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        """Run with every value given, whatever bounds they need."""
         run = self.chosen(run)
         method = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:

@@ -1,4 +1,8 @@
-"""Sweeps: one compiled model over a grid of parameter values, in one call of the compiled loop over runs."""
+"""Sweeps: one compiled model over a grid of parameter values.
+
+All runs are made in one call of the compiled loop where nothing but the stepper is needed; where a scene jumps, or its
+medium is fitted as it goes, they are made one by one.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import spectrum
-from surfacechem.audit import EPSILON, SLACK
+from surfacechem.audit import EPSILON, SLACK, Audit, audit
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.onebyone import batch
 from surfacechem.solvers.contract import Counters, Problem, Result, Status
 from surfacechem.solvers.radau import Batch, Radau, consistent, solve_many
 from surfacechem.spectrum import Statistics
@@ -77,6 +82,9 @@ def prepared(system: System, plan: Plan) -> System:
     """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
     if plan.until is None:
         return system
+    if (holding := system.holding) is not None:
+        again = replace(holding, again=lambda sides: prepared(holding.again(sides), plan))
+        system = replace(system, holding=again)
     spectrum.history(system, plan.until[0])
     if spectrum.breaks_bonds(system):
         return spectrum.with_rupture(system, plan.until[0])
@@ -99,6 +107,8 @@ class Sweep:
     seconds: float
     """Run time of the whole batch."""
     exact: Mapping[str, Array] = field(default_factory=dict)
+    trajectories: Sequence[Trajectory] = ()
+    """The runs, where they were made one by one."""
 
     def __len__(self) -> int:
         """Number of runs."""
@@ -106,6 +116,8 @@ class Sweep:
 
     def __getitem__(self, i: int) -> Trajectory:
         """One run."""
+        if self.trajectories:
+            return self.trajectories[i]
         problem, batch, n = self.problems[i], self.batch, int(self.batch.counts[i])
         result = Result(
             problem=problem,
@@ -150,6 +162,8 @@ class Sweep:
     def _inputs(self) -> Array:
         """Arguments of compiled functions at every output, zero where a run did not arrive."""
         program, (runs, outputs, n) = self.model.program, self.batch.outputs.shape
+        if self.trajectories:
+            return self._inputs_one_by_one(np.zeros((runs, outputs, program.n_inputs)))
         table = np.zeros((runs, outputs, program.n_inputs))
         for i, problem in enumerate(self.problems):
             piece = np.searchsorted(problem.segments[1:-1], problem.times, side="left")
@@ -162,6 +176,21 @@ class Sweep:
         rows[:, 1 + n : 1 + 2 * n] = found.ydot
         table[self.reached] = rows
         return table
+
+    def _inputs_one_by_one(self, table: Array) -> Array:
+        for i, trajectory in enumerate(self.trajectories):
+            result = trajectory.result
+            rows = self.model.inputs(result, result.times, result.outputs, trajectory.rates)
+            table[i, : len(rows)] = self.model.program.filled(rows)
+        return table
+
+    def _audited(self, error: str) -> Array:
+        """An error of the audit of each run, where they were made one by one."""
+        return np.array([getattr(book, error) for book in self._audits])
+
+    @cached_property
+    def _audits(self) -> list[Audit]:
+        return [audit(trajectory) for trajectory in self.trajectories]
 
     @cached_property
     def named(self) -> dict[str, Array]:
@@ -184,18 +213,24 @@ class Sweep:
     @cached_property
     def energy_error(self) -> Array:
         """Largest energy residual of each run relative to the energy it exchanged."""
+        if self.trajectories:
+            return self._audited("energy_error")
         supplied, turned = self._booked("energy supply"), self._booked("dissipation")
         return self._residual("E_total", "U_", [supplied], [supplied, turned])
 
     @cached_property
     def entropy_error(self) -> Array:
         """Largest entropy residual of each run relative to the entropy it exchanged or produced."""
+        if self.trajectories:
+            return self._audited("entropy_error")
         booked = [self._booked("entropy supply"), self._booked("entropy production")]
         return self._residual("S_total", "S_", booked, booked)
 
     @cached_property
     def site_error(self) -> Array:
         """Largest residual of the site balances of each run."""
+        if self.trajectories:
+            return self._audited("site_error")
         accounts = [(j, a.law) for j, a in enumerate(self.model.system.ledger) if a.kind == "bonds"]
         worst = np.zeros(len(self))
         for j, name in accounts:
@@ -207,6 +242,8 @@ class Sweep:
     @cached_property
     def destroys_entropy(self) -> NDArray[np.bool_]:
         """Which runs have a law that destroys entropy beyond their tolerance."""
+        if self.trajectories:
+            return np.array([bool(book.violations) for book in self._audits])
         rates = self._productions()
         largest = [np.nanmax(np.abs(rate), axis=1) for rate in rates]
         rounding = EPSILON * np.max(largest, axis=0, initial=0.0)
@@ -252,19 +289,17 @@ def solve(
 ) -> Sweep:
     """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     run = model.chosen(run)
-    if run.solver != Radau.name:
-        raise InputError(f"a sweep runs with the solver {Radau.name}, not {run.solver}.")
-    if model.system.transitions or model.system.fit:
-        raise InputError(
-            "a sweep needs a scene without jumps, contact modes and fitted media; run its values one by one."
-        )
     values = [model.values({**(changes or {}), **point}) for point in plan.points]
+    if (suited := model.suited(values)) is not model:
+        model, values = suited, [suited.adopted(point) for point in values]
     runs = _scaled(model.system, plan, run, values) if plan.until else [run] * len(values)
+    if model.system.transitions or model.system.fit or run.solver != Radau.name:
+        return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
     problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
     first = problems[0]
     Radau().prepare()
     start = time.perf_counter()
-    batch = solve_many(
+    solved = solve_many(
         model.program,
         np.array([problem.y0 for problem in problems]),
         np.array([problem.parameters for problem in problems]),
@@ -277,7 +312,15 @@ def solve(
         threads=threads or os.cpu_count() or 1,
         event_rows=USUAL_EVENTS if first.margins else 0,
     )
-    return Sweep(model, plan, run, values, problems, batch, time.perf_counter() - start)
+    return Sweep(model, plan, run, values, problems, solved, time.perf_counter() - start)
+
+
+def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]]) -> Sweep:
+    trajectories = [model.solve_values(*pair) for pair in pairs]
+    seconds = sum(trajectory.seconds for trajectory in trajectories)
+    results = [trajectory.result for trajectory in trajectories]
+    values, problems = [trajectory.values for trajectory in trajectories], [result.problem for result in results]
+    return Sweep(model, plan, run, values, problems, batch(results), seconds, trajectories=trajectories)
 
 
 def _scaled(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:

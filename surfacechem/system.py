@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from surfacechem.conductors import Conductor, Profile
 from surfacechem.expressions import Expression
+from surfacechem.holding import Holding
 from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
 from surfacechem.scene import Engine
@@ -292,6 +293,8 @@ class System:
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None
+    holding: Holding | None = None
+    """How the bonding state is held at its bounds, where a law could carry it there."""
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:

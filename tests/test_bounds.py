@@ -4,18 +4,26 @@ import math
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies
+from scenes import SITES, bodies, varying
 
+import surfacechem
+from surfacechem import integrate
 from surfacechem.assembly import assemble
 from surfacechem.assembly.enclosure import enclosure
 from surfacechem.audit import audit
 from surfacechem.integrate import Model, Run
-from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.contact import BondedContact, BondStiffness
+from surfacechem.laws.factors import LinearInTemperature, Proportional
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, KamalSourour, LinearAffinity, MassAction
 from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Table
+from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Mounting, Scene
+
+T_MAX, G_0 = 1e6, 1e-7
+"""Strength and length of a cohesive zone."""
 
 E, K, TOP = 1e12, 0.5, 2e-6
 """Bonds of stiffness E and energy K, torn by a gap that rises to TOP in a second and falls to nothing in another."""
@@ -149,6 +157,85 @@ def test_laws_that_stay_within_the_bounds_have_no_modes(potential, law):
     assert system.modes == ()
 
 
+def cohesion_of_bonds() -> Scene:
+    """Cohesion in proportion to the bonds pays for more of them than there are sites; gap and temperature are held."""
+    strength = varying(T_MAX, Proportional(of="phi"), LinearInTemperature(of="T_c", slope=-1e-3))
+    zone = ExponentialCohesiveZone(t_max=strength, g_0=G_0, E_n=1e13)
+    reactions = [LinearAffinity(c_r=RATE * SITES.density / K)]
+    interface = Interface(Hold(level=300.0), [zone, BondEnergy(K_0=K)], reactions=reactions, sites=SITES)
+    loading = {"g_n": Table(times=[0.0, 1.0], values=[G_0, G_0])}
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+    return Scene(pair, interface, loading=loading, T_0=300.0, initial={"phi": 0.25})
+
+
+def test_a_bound_that_only_a_branch_of_the_rate_passes():
+    trajectory = solve(cohesion_of_bonds(), until=1.0)
+    (complete,) = trajectory.jumps
+    driven = 2 * T_MAX * G_0 / K  # e t_max g_0 (1 + g/g_0) exp(-g/g_0) over K at g = g_0
+    assert complete.t == pytest.approx(math.log((driven + 0.75) / driven) / RATE, rel=1e-11)
+    assert trajectory.status == "finished"
+    assert trajectory.result.y[0] == 1.0
+
+
+@pytest.mark.parametrize("law", [LinearAffinity(c_r=1e19), ExponentialAffinity(C_r=1e34)])
+def test_mixing_entropy_yields_to_stretched_springs(law):
+    """An equilibrium of exp(-1000) bonds is none: they are gone, and form again as the gap closes."""
+    interface = Interface("T", [LatticeGas(epsilon=6e-20), BondSprings(k_b=1e-3)], reactions=[law], sites=SITES)
+    loading = {"g_n": Table(times=[0.0, 1.0, 2.0], values=[0.0, 1e-7, 0.0])}
+    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial={"phi": 0.5, "T": 300.0})
+    trajectory = solve(scene)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
+    assert trajectory.status == "finished"
+    assert trajectory.everywhere["phi"].min() > -1e-14
+    gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)
+    assert trajectory.jumps[1].t == pytest.approx(2 - gap / 1e-7, rel=1e-4)
+    assert trajectory.result.y[0] > 1e-6
+    assert audit(trajectory).energy_error < 1e-9
+
+
+PHI_EQ = "interface.potential.bond-energy.phi_eq"
+
+
+def completed(phi_eq: float, phi: float = 0.05) -> float:
+    """Time at which phi' = 1.1 (phi_eq - phi) reaches one."""
+    return math.log((phi_eq - phi) / (phi_eq - 1)) / 1.1
+
+
+def test_changed_parameters_bring_the_bounds_that_they_need():
+    simulation = surfacechem.load("two-way-linear")
+    assert simulation.system.modes == ()
+    beyond = simulation.run({PHI_EQ: 1.5})
+    (complete,) = beyond.trajectory.jumps
+    assert complete.t == pytest.approx(completed(1.5), rel=1e-11)
+    same = surfacechem.run("two-way-linear", {PHI_EQ: 1.5})
+    assert same.dataset["phi"].values.tobytes() == beyond.dataset["phi"].values.tobytes()
+    back = surfacechem.load("two-way-linear", {PHI_EQ: 1.5}).run({PHI_EQ: 0.7})
+    assert "held" not in back.dataset
+
+
+def test_bounds_are_decided_without_compiling_while_they_stay_as_they_are(monkeypatch):
+    simulation = surfacechem.load("two-way-linear")
+    simulation.run({PHI_EQ: 1.5})
+    monkeypatch.setattr(integrate, "compile_program", lambda *_, **__: pytest.fail("compiled"))
+    simulation.run({PHI_EQ: 0.6})
+    simulation.run({PHI_EQ: 1.2})
+    simulation.sweep({PHI_EQ: [0.5, 0.6, 1.2]})
+    assert not simulation.sweep({PHI_EQ: [0.5, 0.6]}).sweep.trajectories
+
+
+def test_a_sweep_across_the_need_of_a_bound():
+    values = [0.5, 1.2, 1.5]
+    swept = surfacechem.load("two-way-linear").sweep({PHI_EQ: values})
+    data = swept.dataset
+    assert list(data["status"].values) == ["finished"] * 3
+    for i, phi_eq in enumerate(values):
+        free = phi_eq - (phi_eq - 0.05) * np.exp(-1.1 * data["time"].values)
+        np.testing.assert_allclose(data["phi"].values[i], np.minimum(free, 1.0), rtol=1e-9)
+    assert [len(swept.sweep[i].jumps) for i in range(3)] == [0, 1, 1]
+    assert data.attrs["error"] < 1e-9
+    assert data.attrs["energy_error"] < 1e-9
+
+
 def test_intervals_enclose_values():
     import symengine
 
@@ -164,6 +251,9 @@ def test_intervals_enclose_values():
         symengine.Piecewise((x, x < 0), (-x, True)),
         symengine.Piecewise((y, y > 5), (2 * y, True)),
         symengine.pi * y,
+        symengine.Piecewise((x + 2, x < 1), (y - x, True)),
+        symengine.Piecewise((y - x, x < y), (3 * x - 3 * y + 1, x < 2 * y), (x * y, True)),
+        symengine.Piecewise((symengine.exp(-x - y), x + y > 0), (2 * x + 2 * y, True)),
     ]
     for expression in expressions:
         low, high = enclosure(expression, known)

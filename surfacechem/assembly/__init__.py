@@ -26,6 +26,7 @@ from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.holding import Holding
 from surfacechem.scene import Scene
 from surfacechem.system import START, Outside, Role, System
 from surfacechem.terms import Spec
@@ -64,9 +65,13 @@ STAGES = (
 )
 
 
-def assemble(scene: Scene) -> System:
-    """The system of a scene; InputError where a variable that is read has no role, or two."""
-    build = Build(scene)
+def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
+    """The system of a scene; InputError where a variable that is read has no role, or two.
+
+    ``sides`` are the bounds at which the bonding state is held, -1 for zero and 1 for the upper one; without them those
+    that the values of the scene need.
+    """
+    build = Build(scene, sides)
     for stage in STAGES:
         stage(build)
     build.varying_margins()
@@ -108,7 +113,16 @@ def assemble(scene: Scene) -> System:
             *(f"loading: {name} is prescribed but nothing reads it." for name in unread),
         ),
         outside=_outside(build),
+        holding=_holding(build),
     )
+
+
+def _holding(build: Build) -> Holding | None:
+    decision = build.decision
+    if decision is None:
+        return None
+    sides = decision.usual if build.sides is None else build.sides
+    return Holding(sides, decision.paths, decision.needed, lambda others: assemble(build.scene, others))
 
 
 def _is_there(build: Build, role: Role) -> bool:

@@ -8,20 +8,39 @@ Source: unilateral bounds of the bonding fraction, Sauer, Duong & Mandadapu (202
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import symengine
 
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.enclosure import WHOLE, enclosure
+from surfacechem.assembly.holding import Decision
 from surfacechem.assembly.logarithms import LOGARITHM
 from surfacechem.expressions import Expression, where
 from surfacechem.system import Transition
 
-COLDEST = 1e-9
-"""Lowest temperature at which rates are looked at [K]."""
+INSIDE = 1e-15
+"""Distance from a bound, in parts of the range, at which the law there is asked which way it points.
+
+An equilibrium that lies nearer, as that of bonds with mixing entropy under a large load does, is one at the bound.
+"""
+
+SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 
 HELD_AT = {-1.0: "held at zero", 0.0: "between its bounds", 1.0: "held at its upper bound"}
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound of the bonding state, and the rate at which a law would carry it beyond."""
+
+    side: int
+    value: Expression
+    gap: Expression
+    """Distance from the bound."""
+    beyond: Expression
+    """Rate of bonding next to the bound, positive outwards [1/(m^2 s)]."""
+    words: tuple[str, str, str, str]
+    """Name and reason of the transition to the bound and of the one away from it."""
 
 
 def free_to_react(build: Build, rate: Expression) -> Expression:
@@ -29,47 +48,55 @@ def free_to_react(build: Build, rate: Expression) -> Expression:
     top = next((p.value for p in build.parameters.items if p.path == "phi_max"), None)
     if top is None or LOGARITHM in build.scene.initial:
         return symengine.Integer(1)
-    low, high = _at(build, rate, 0.0)[0] < 0, _at(build, rate, top)[1] > 0
-    if not (low or high):
+    build.decision = Decision(build, rate, top)
+    sides = build.decision.usual if build.sides is None else build.sides
+    if not sides:
         return symengine.Integer(1)
-    held = build.mode("held", 0.0, {value: text for value, text in HELD_AT.items() if value in (-low, 0.0, high)})
-    phi, limit = symengine.symbols("phi phi_max")
-    for side, bound, gap, words in (
-        (-1, symengine.Integer(0), phi, ("unbonded", "no bond is left")),
-        (1, limit, limit - phi, ("complete", "bonding is complete")),
-    ):
-        if side in (-low, high):
-            _hold(build, held, side, words, margin=gap, bound=bound)
-            _let_go(build, held, side, rate)
+    words = {value: text for value, text in HELD_AT.items() if value == 0 or value in sides}
+    held = build.mode("held", 0.0, words)
+    for bound in (_lower(build, rate), _upper(build, rate)):
+        if bound.side in sides:
+            _hold(build, held, bound)
+            _let_go(build, held, bound)
     return 1 - held**2
 
 
-def _hold(
-    build: Build, held: Expression, side: int, words: tuple[str, str], *, margin: Expression, bound: Expression
-) -> None:
-    reached = where(held**2 > 0, 1, margin)
-    phi = symengine.Symbol("phi")
-    build.transitions.append(Transition(words[0], reached, words[1], {held: symengine.Integer(side)}, {phi: bound}))
+def _lower(build: Build, rate: Expression) -> Bound:
+    phi, limit = symengine.symbols("phi phi_max")
+    words = ("unbonded", "no bond is left", "rebond", "bonds form again")
+    return Bound(-1, symengine.Integer(0), phi, -_rate_at(build, rate, INSIDE * limit), words)
 
 
-def _let_go(build: Build, held: Expression, side: int, rate: Expression) -> None:
-    density = build.bonding["phi"].density
-    turned = where(side * held > 0, side * build.stretch * rate / density, 1)
-    name, reason = ("rebond", "bonds form again") if side < 0 else ("loosen", "bonds begin to break")
-    build.transitions.append(Transition(name, turned, reason, {held: symengine.Integer(0)}))
+def _upper(build: Build, rate: Expression) -> Bound:
+    phi, limit = symengine.symbols("phi phi_max")
+    words = ("complete", "bonding is complete", "loosen", "bonds begin to break")
+    return Bound(1, limit, limit - phi, _rate_at(build, rate, (1 - INSIDE) * limit), words)
 
 
-def _at(build: Build, rate: Expression, phi: float) -> tuple[float, float]:
-    """Interval of the rate at a value of the bonding state, whatever the other variables are."""
-    known = {p.symbol: (p.value, p.value) for p in build.parameters.items if p.load is None}
-    known |= {mode.symbol: (min(mode.words), max(mode.words)) for mode in build.modes}
-    known |= {node.T: (COLDEST, WHOLE[1]) for node in build.nodes.values()}
-    known |= dict.fromkeys(symengine.symbols("t J_c"), (0.0, WHOLE[1]))
-    at = {symengine.Symbol("phi"): symengine.Integer(int(phi)) if phi == int(phi) else symengine.RealDouble(phi)}
+def _rate_at(build: Build, rate: Expression, phi: Expression) -> Expression:
+    """The rate as it would be at a value of the bonding state; as it is where it has none there."""
+    at = {symengine.Symbol("phi"): phi}
     for item in build.named:
-        if item.name != "J_c":
-            at[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(at)
-    return enclosure(symengine.sympify(rate).subs(at), known)
+        there = symengine.sympify(item.expression).subs(at)
+        if there != item.expression:
+            at[symengine.Symbol(item.name)] = there
+    there = symengine.sympify(rate).subs(at)
+    return rate if there.atoms(*SINGULAR) else there
+
+
+def _hold(build: Build, held: Expression, bound: Bound) -> None:
+    # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
+    margin = where(held**2 > 0, 1, where(bound.beyond > 0, bound.gap, 1))
+    name, reason, *_ = bound.words
+    jump = {symengine.Symbol("phi"): bound.value}
+    build.transitions.append(Transition(name, margin, reason, {held: symengine.Integer(bound.side)}, jump))
+
+
+def _let_go(build: Build, held: Expression, bound: Bound) -> None:
+    density = build.bonding["phi"].density
+    turned = where(bound.side * held > 0, build.stretch * bound.beyond / density, 1)
+    *_, name, reason = bound.words
+    build.transitions.append(Transition(name, turned, reason, {held: symengine.Integer(0)}))
 
 
 def released(build: Build) -> None:

@@ -79,8 +79,12 @@ class Motion:
 class Build:
     """What the stages of the assembly share; each stage leaves its results for the next."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, sides: frozenset[int] | None = None) -> None:
         self.scene = scene
+        self.sides = sides
+        """Bounds at which the bonding state is held: -1 is zero, 1 the upper one; those that it needs where None."""
+        self.decision: Any = None
+        """What tells which bounds are needed, where the bonding state evolves."""
         self.interface = scene.interface
         custom = [body.temperature for body in scene.bodies if isinstance(body.temperature, str)]
         capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]

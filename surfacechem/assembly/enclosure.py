@@ -1,17 +1,22 @@
-"""Intervals that an expression cannot leave, from those of its symbols."""
+"""Intervals that an expression cannot leave, from those of its symbols.
+
+Where a condition holds the interval of what it compares is narrowed, and with it that of every multiple and of all
+that differs from it by a number. Source: Moore, Kearfott & Cloud (2009), Introduction to Interval Analysis, SIAM.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 import symengine
 
-from surfacechem.expressions import FRACTION_FLOOR, Expression
+from surfacechem.expressions import Expression
 
 Interval = tuple[float, float]
-Known = Mapping[Expression, Interval]
+Known = Mapping[Hashable, Interval]
+"""Intervals of symbols, and of the cores of sums and products (:func:`affine`)."""
 
 WHOLE: Interval = (-math.inf, math.inf)
 
@@ -22,8 +27,10 @@ MONOTONE: dict[str, Callable[[float], float]] = {
     "atan": math.atan,
 }
 
-VANISHED = math.log(FRACTION_FLOOR)
-"""Logarithm that stands for one of nothing."""
+VANISHED = symengine.Symbol("log_of_nothing")
+"""The logarithm of nothing, which outweighs everything finite."""
+
+NOTHING: Interval = (-math.inf, -math.inf)
 
 
 def enclosure(expression: Expression, known: Known) -> Interval:
@@ -35,26 +42,63 @@ def enclosure(expression: Expression, known: Known) -> Interval:
     (0.0, inf)
     """
     node = symengine.sympify(expression)
-    if node in known:
-        return known[node]
+    if node == VANISHED:
+        return NOTHING
     if node.is_Symbol:
-        return WHOLE
+        return known.get(node, WHOLE)
     if not node.args:
-        value = float(node)
-        return (-math.inf, -math.inf) if value == VANISHED else (value, value)
+        return (float(node), float(node)) if node.is_real else WHOLE
     if isinstance(node, symengine.Piecewise):
         return _pieces(node, known)
-    shifted = _shifted(node, known) if node.is_Add else None
-    if shifted is not None:
-        return shifted
+    if node.is_Add or node.is_Mul:
+        core, factor, rest = affine(node)
+        if core in known:
+            return _shift(_product([(factor, factor), known[core]]), rest)
     parts = [enclosure(part, known) for part in node.args]
     if node.is_Add:
-        return _sum(parts)
+        return NOTHING if _is_logarithm_of_a_part(node) else _sum(parts)
     if node.is_Mul:
         return _product(parts)
     if node.is_Pow:
         return _power(node, parts)
     return _function(type(node).__name__, parts)
+
+
+def affine(expression: Expression) -> tuple[Hashable, float, float]:
+    """Core, factor and rest of an expression that is factor * core + rest; sums in proportion share their core.
+
+    >>> import symengine
+    >>> x, y = symengine.symbols("x y")
+    >>> affine(x - 2 * y)[0] == affine(2 * y - x + 7)[0] == affine((x - 2 * y) / 3)[0]
+    True
+    """
+    node = symengine.expand(expression, deep=False)
+    terms, rest = {}, 0.0
+    for part in node.args if node.is_Add else (node,):
+        numbers = [item for item in part.args if item.is_Number] if part.is_Mul else []
+        if part.is_Number:
+            rest += float(part)
+        else:
+            own = symengine.Mul(*(item for item in part.args if not item.is_Number)) if numbers else part
+            terms[own] = math.prod(float(number) for number in numbers)
+    if not terms:
+        return 0, 0.0, rest
+    leading = min(terms, key=hash)
+    factor = terms[leading]
+    if len(terms) == 1:
+        return leading, factor, rest
+    return frozenset((term, value / factor) for term, value in terms.items()), factor, rest
+
+
+def narrowed(known: Known, expression: Expression, low: float, high: float) -> Known:
+    """What is known where an expression also lies between two values."""
+    core, factor, rest = affine(expression)
+    if factor == 0 or not math.isfinite(factor):
+        return known
+    ends = sorted(((low - rest) / factor, (high - rest) / factor))
+    before = known.get(core, WHOLE)
+    least, most = max(ends[0], before[0]), min(ends[1], before[1])
+    return {**known, core: (least, most)} if least <= most else known
 
 
 def _pieces(node: Any, known: Known) -> Interval:
@@ -75,33 +119,27 @@ def _condition(condition: Any, known: Known) -> tuple[bool | None, Known, Known]
         return bool(condition == symengine.true), known, known
     if not isinstance(condition, symengine.Lt | symengine.Le):
         return None, known, known
-    left, right = condition.args
-    (a, b), (c, d) = enclosure(left, known), enclosure(right, known)
+    difference = condition.args[0] - condition.args[1]
+    low, high = enclosure(difference, known)
     strict = isinstance(condition, symengine.Lt)
-    if b < c or (b == c and not strict):
+    if high < 0 or (high == 0 and not strict):
         return True, known, known
-    if a > d or (a == d and strict):
+    if low > 0 or (low == 0 and strict):
         return False, known, known
-    return (
-        None,
-        {**known, left: (a, min(b, d)), right: (max(a, c), d)},
-        {**known, left: (max(a, c), b), right: (c, min(b, d))},
-    )
+    return None, narrowed(known, difference, low, 0.0), narrowed(known, difference, 0.0, high)
 
 
-def _shifted(node: Any, known: Known) -> Interval | None:
-    """Interval of a sum that differs by a number from one that is known."""
-    for other, (low, high) in known.items():
-        difference = node - other if other.is_Add else other
-        if difference.is_Number:
-            return low + float(difference), high + float(difference)
-    return None
+def _is_logarithm_of_a_part(node: Any) -> bool:
+    """Whether a sum is the logarithm of something in proportion to what has vanished, whatever that multiplies."""
+    return any(part == VANISHED for part in node.args)
+
+
+def _shift(interval: Interval, by: float) -> Interval:
+    return interval[0] + by, interval[1] + by
 
 
 def _sum(parts: list[Interval]) -> Interval:
-    for vanished in ((-math.inf, -math.inf), (math.inf, math.inf)):
-        if vanished in parts and (-vanished[0], -vanished[1]) not in parts:
-            return vanished  # the logarithm of nothing outweighs everything finite
+    """The sum of what is below everything finite and of what may be anything may be anything."""
     low, high = (sum(part[side] for part in parts) for side in (0, 1))
     return (-math.inf if math.isnan(low) else low), (math.inf if math.isnan(high) else high)
 
