@@ -144,7 +144,7 @@ def test_the_figure_is_drawn_from_the_file(study, tmp_path):
 
 def test_the_report_says_what_was_left_out_and_nothing_else(study):
     text = study.page.text()
-    assert "9 of 17 values of the regimes, for the sake of time" in text
+    assert "8 of 16 values of the regimes, for the sake of time" in text
     assert "the solvers lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
     assert "the search for worst corners, which was not asked for" in text
     assert "steps of a run" not in text
