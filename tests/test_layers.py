@@ -23,6 +23,7 @@ FLOORS = {
         "validity",
         "assembly.*",
         "compile",
+        "preparing",
         "kernelcache",
     ],
     "time": [

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
+from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 
@@ -102,7 +103,7 @@ TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, le
 """From values at the nodes to the coefficients of the integral of their polynomial."""
 
 
-class Quadrature:
+class StepLedger:
     """The ledger along a step, from its rates at the nodes.
 
     Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
@@ -160,6 +161,9 @@ class SteppingSolver(Solver):
     keeps_algebraic = False
     """Whether x holds the algebraic variables too."""
 
+    def prepare(self) -> None:
+        stepper.compile_stepper()  # consistent states are found by it
+
     @abstractmethod
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         """Start the library's method at a consistent state."""
@@ -200,15 +204,15 @@ class SteppingSolver(Solver):
         view.guess = x
         return view.complete(t, x[~view.problem.program.algebraic_mask])
 
-    def _quadrature(self, view: View, progress: Progress, method: Method, reached: float) -> Quadrature:
+    def _ledger(self, view: View, progress: Progress, method: Method, reached: float) -> StepLedger:
         """The ledger along the part of the last step that counts."""
         start, size = progress.t, reached - progress.t
         first = view.ledger_rates(start, progress.y, progress.ydot)
         if not len(first):
-            return Quadrature(start, size, progress.ledger, np.zeros((len(NODES), 0)))
+            return StepLedger(start, size, progress.ledger, np.zeros((len(NODES), 0)))
         inside = [start + size * float(node) for node in NODES[1:]]
         rates = [view.ledger_rates(t, *self._state(view, method, t)) for t in inside]
-        return Quadrature(start, size, progress.ledger, np.array([first, *rates]))
+        return StepLedger(start, size, progress.ledger, np.array([first, *rates]))
 
     def _segment(self, view: View, progress: Progress, end: float) -> Status:
         fired: set[int] = set()
@@ -248,10 +252,10 @@ class SteppingSolver(Solver):
             fired: set[int] = set()
             if view.problem.margins:
                 reached, fired = self._find_event(view, progress, method, reached)
-            quadrature = self._quadrature(view, progress, method, reached)
-            self._write_outputs(view, progress, method, quadrature)
+            along = self._ledger(view, progress, method, reached)
+            self._write_outputs(view, progress, method, along)
             y, ydot = self._state(view, method, reached)
-            ledger = quadrature.at(reached)
+            ledger = along.at(reached)
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
                 raise StepError("a state is not finite")
             progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
@@ -294,12 +298,12 @@ class SteppingSolver(Solver):
             low = t
         return reached, set()
 
-    def _write_outputs(self, view: View, progress: Progress, method: Method, quadrature: Quadrature) -> None:
-        times, reached = view.problem.times, quadrature.start + quadrature.size
+    def _write_outputs(self, view: View, progress: Progress, method: Method, along: StepLedger) -> None:
+        times, reached = view.problem.times, along.start + along.size
         while len(progress.outputs) < len(times) and times[len(progress.outputs)] <= reached:
             t = float(times[len(progress.outputs)])
             y, _ = self._state(view, method, t)
-            ledger = quadrature.at(t)
+            ledger = along.at(t)
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ledger))):
                 raise StepError("an output is not finite")
             progress.outputs.append(np.concatenate((y, ledger)))
