@@ -55,7 +55,9 @@ def test_a_state_at_rest_may_do_work(name: str) -> None:
     program = compile_program(t, [y], [dy], [], [dy], [2 * t * y, 5 * t**4])
     result = solver(name).solve(problem(program, [3.0], [0.0, 2.0], 1e-6, times=[0.0, 0.1, 0.7, 2.0]))
     times = result.times
-    np.testing.assert_allclose(result.ledger_outputs, np.stack([3 * times**2, times**5], axis=1), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        result.ledger_outputs, np.stack([3 * times**2, times**5], axis=1), rtol=1e-12, atol=1e-13
+    )
     np.testing.assert_array_equal(result.ledger, result.ledger_outputs[-1])
 
 
