@@ -89,16 +89,28 @@ def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = 
     if len(second.result.times) < shared or shared < 2:
         why = f"a second run at rtol {other:.0e} ended earlier: {second.reason}"
         return from_balances(trajectory, f"balances only, since {why}")
-    ours, theirs = states(trajectory), states(second)
-    errors = {name: relative_error(ours[name], theirs[name][:shared], FLOOR) for name in ours}
+    errors, note = apart(trajectory, second)
+    source = second_run(other) + (", and one with half of the cells" if cells else "")
     for name, error in (cells or {}).items():
         errors[name] = errors.get(name, 0.0) + error
-    found, expected = event_times(trajectory), event_times(second)
+    return Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+
+
+def second_run(rtol: float) -> str:
+    """What an estimate is from, in words."""
+    return f"estimate: a second run at rtol {rtol:.0e}"
+
+
+def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:
+    """Largest differences of two runs in each state and in the times of events, and in which events they differ."""
+    shared = min(len(first.result.times), len(second.result.times))
+    ours, theirs = states(first), states(second)
+    errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
+    found, expected = event_times(first), event_times(second)
     note = difference(found, expected)
     if found and not note:
-        errors[EVENTS] = event_error(found, expected, trajectory.run.times[-1])
-    source = f"estimate: a second run at rtol {other:.0e}" + (", and one with half of the cells" if cells else "")
-    return Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+        errors[EVENTS] = event_error(found, expected, first.run.times[-1])
+    return errors, note
 
 
 def with_cells(estimate: Accuracy, cells: Mapping[str, float]) -> Accuracy:

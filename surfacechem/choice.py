@@ -8,18 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from surfacechem.accuracy import FLOOR, MARGIN, TIGHTEST, relative_error, second_tolerance
-from surfacechem.achieved import EVENTS, difference, event_error, states
-from surfacechem.event_table import event_times
+from surfacechem.accuracy import FLOOR, MARGIN, TIGHTEST, second_tolerance
+from surfacechem.achieved import apart, second_run
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solution import Accuracy
 from surfacechem.solvers import ASKING
 
 LAST = 3e-14
 """Tolerance of the second run where the first has the tightest one."""
-
-ENDS = "end time"
-"""What stands for the time at which a run was stopped among the compared variables."""
 
 
 def asked(run: Run) -> float:
@@ -51,24 +47,16 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
 
 
 def compared(first: Trajectory, second: Trajectory) -> Accuracy:
-    """Largest differences of two runs: of states, of times of events, of their ends where physics stopped them."""
-    rtol = f"{second.run.rtol:.0e}"
+    """Largest differences of two runs: of states and of times of events, the end among them where physics set it."""
+    rtol = second.run.rtol
     if second.status == "failed":
-        return Accuracy(math.nan, f"not known: a second run at rtol {rtol} failed: {second.reason}")
-    source = f"estimate: a second run at rtol {rtol}"
+        return Accuracy(math.nan, f"not known: a second run at rtol {rtol:.0e} failed: {second.reason}")
+    source = second_run(rtol)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
-    ours, theirs = states(first), states(second)
-    shared = min(len(first.result.times), len(second.result.times))
-    errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
-    found, expected = event_times(first), event_times(second)
-    others = difference(found, expected)
-    if found and not others:
-        errors[EVENTS] = event_error(found, expected, first.run.times[-1])
-    elif others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
+    errors, others = apart(first, second)
+    if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
-    if first.status == "stopped":
-        errors[ENDS] = abs(first.result.t - second.result.t) / (second.result.t or 1.0)
     return Accuracy(max(errors.values()), source, errors)
 
 

@@ -289,15 +289,25 @@ def plot(
 
 
 def _figure(dataset: Dataset, variables: list[str] | None, against: str | None) -> Figure:
-    """The figure that suits a dataset: of a run, of a sweep, or of a study of precision."""
-    if dataset.attrs.get("study") == "precision":
-        from surfacechem.workprecision.figure import figure
-
-        return figure(dataset)
+    """The figure that suits a dataset: of a run, of a sweep, or of a study."""
+    if "study" in dataset.attrs:
+        if variables or against:
+            raise InputError("the figure of a study has no choice of variables.")
+        return _study_figure(dataset)
     from surfacechem import plots, sweep_plots
 
     swept = "sweep" in dataset.attrs
     return sweep_plots.figure(dataset, variables) if swept else plots.figure(dataset, variables, against)
+
+
+def _study_figure(dataset: Dataset) -> Figure:
+    if dataset.attrs["study"] == "stability":
+        from surfacechem.stability.figure import figure as heat_map
+
+        return heat_map(dataset)
+    from surfacechem.workprecision.figure import figure
+
+    return figure(dataset)
 
 
 def _solved_case(name: str, changes: list[str] | None) -> Solution:

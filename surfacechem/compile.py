@@ -16,6 +16,7 @@ import symengine
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.expressions import derivative
+from surfacechem.preparing import PREPARING
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,7 @@ def compile_function(inputs: Sequence[Any], expressions: Sequence[Any], pieces: 
     return _compiled(inputs, expressions)
 
 
+@PREPARING
 def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int) -> Function:
     code = symengine.Lambdify(list(inputs), list(expressions), backend="llvm", cse=True, **options)
     function, user = code.as_ctypes()

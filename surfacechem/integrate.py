@@ -20,6 +20,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.pacing import too_fast
+from surfacechem.preparing import PREPARING
 from surfacechem.solvers import ASKING, AUTO, solver
 from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
@@ -176,6 +177,7 @@ class Model:
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
+        """Time to compile the equations, and the code of jumps once one has happened."""
 
     def _filler(self, inputs: list[Any]) -> Filler | None:
         outside = self.system.outside
@@ -313,12 +315,14 @@ class Model:
         values = fit.started(values) if fit else values
         problem = self.problem(run, values)
         method.prepare()
-        start = time.perf_counter()
+        start, prepared = time.perf_counter(), PREPARING.seconds
         result, jumps, ended = self._integrate(method, problem)
         while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
             values = wider
             result, jumps, ended = self._integrate(method, self.problem(run, values))
-        seconds = time.perf_counter() - start
+        prepared = PREPARING.seconds - prepared
+        self.compile_seconds += prepared
+        seconds = time.perf_counter() - start - prepared
         status, reason = ended or self.verdict(result, values)
         return Trajectory(self, run, result, values, status, reason, seconds, jumps)
 

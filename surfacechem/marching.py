@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.preparing import PREPARING
+
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
 
@@ -34,7 +36,8 @@ def march(driving: Curve, start: float, direction: float, noise: Curve) -> float
 
 def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
     """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
-    from scipy.optimize import brentq
+    with PREPARING:
+        from scipy.optimize import brentq
 
     size = FIRST * max(abs(start), SMALLEST_GAP)
     gaps: Array = np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))

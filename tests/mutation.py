@@ -39,7 +39,7 @@ OF_BALANCES = [
     ["events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
 ]
 OF_LAWS = [
-    ["laws"],
+    ["laws", "tabulated"],
     ["bonds", "friction_memory", "heat_paths", "limits"],
     ["tables_bonds", "tables_mechanics", "contact_laws", "media"],
 ]

@@ -46,3 +46,27 @@ def test_factorizations_are_counted_where_the_library_tells(name: str) -> None:
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy + 1e4 * (y - se.cos(t))])
     assert solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-6)).counters.factorizations > 1
+
+
+@pytest.mark.parametrize("name", names)
+def test_a_state_at_rest_may_do_work(name: str) -> None:
+    """Nothing asks for short steps; what is booked on the way is exact all the same."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy], [2 * t * y, 5 * t**4])
+    result = solver(name).solve(problem(program, [3.0], [0.0, 2.0], 1e-6, times=[0.0, 0.1, 0.7, 2.0]))
+    times = result.times
+    np.testing.assert_allclose(
+        result.ledger_outputs, np.stack([3 * times**2, times**5], axis=1), rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_array_equal(result.ledger, result.ledger_outputs[-1])
+
+
+@pytest.mark.parametrize("name", names)
+def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y], [y, -2 * y * dy])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-8, times=[0.0, 1.0, 5.0]))
+    exact = np.exp(-result.times)
+    found = result.ledger_outputs
+    np.testing.assert_allclose(found[:, 0], 1 - result.outputs[:, 0], atol=1e-8)
+    np.testing.assert_allclose(found, np.stack([1 - exact, 1 - exact**2], axis=1), atol=1e-6)

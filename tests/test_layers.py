@@ -24,6 +24,7 @@ FLOORS = {
         "validity",
         "assembly.*",
         "compile",
+        "preparing",
         "kernelcache",
     ],
     "time": [

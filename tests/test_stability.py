@@ -9,8 +9,12 @@ from typer.testing import CliRunner
 
 from surfacechem.cli import app
 from surfacechem.errors import InputError
+from surfacechem.report import run_summary
+from surfacechem.simulation import Simulation
+from surfacechem.solvers import names
 from surfacechem.stability import search
-from surfacechem.stability.matrix import FAILED, REFUSED, SOLVED, WRONG, attempt, digits_of, few
+from surfacechem.stability.matrix import FAILED, REFUSED, SOLVED, WRONG, attempt, digits_of, few, read
+from surfacechem.stability.matrix import LEAST as LEAST_DIGITS
 from surfacechem.stability.page import cell_text
 from surfacechem.stability.regime import Exact, Refused, Stops
 from surfacechem.stability.regimes import regimes
@@ -112,7 +116,8 @@ def test_the_dataset_holds_every_cell(study, tmp_path):
         assert data["outcome"].sel(regime="ignition", solver="radau").values.tolist()[-1] == REFUSED
         assert data["value"].sel(regime="seconds").values[0] == 1e-15
         assert float(data["digits"].sel(regime="seconds", solver="radau").min()) > 9.5
-        assert data.attrs["history"] == "surfacechem stability seconds ignition --solvers radau,ida --quick --search 0"
+        assert data.attrs["command"] == "surfacechem stability seconds ignition --solvers radau,ida --quick --search 0"
+        assert data.attrs["versions"].startswith("surfacechem ")
     assert study.dataset["digits"].shape == (2, 4, 2)
 
 
@@ -125,11 +130,56 @@ def test_the_report_says_what_every_solver_keeps(study):
     assert "<svg" in html
 
 
+def test_the_figure_is_drawn_from_the_file(study, tmp_path):
+    study.write(tmp_path / "study")
+    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "-o", str(tmp_path / "again.svg")])
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "again.svg").read_text()
+    for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits kept"):
+        assert f"<!-- {word} -->" in text
+    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "--variables", "digits"])
+    assert done.exit_code == 2
+    assert "the figure of a study has no choice of variables" in done.output
+
+
+def test_the_report_says_what_was_left_out_and_nothing_else(study):
+    text = study.page.text()
+    assert "8 of 16 values of the regimes, for the sake of time" in text
+    assert "the solvers lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
+    assert "the search for worst corners, which was not asked for" in text
+    assert "steps of a run" not in text
+    everything = stability("seconds", solvers=names, rounds=1)
+    assert everything.page.omissions == []
+    assert "<p>Nothing.</p>" in everything.page.html()
+
+
+def test_runs_that_take_too_many_steps_are_counted(monkeypatch):
+    monkeypatch.setattr("surfacechem.stability.matrix.STEPS", 20)
+    monkeypatch.setattr("surfacechem.stability.page.STEPS", 20)
+    found = stability("capacity", solvers=["radau"], quick=True, rounds=0)
+    assert "what lies beyond 20 steps of a run: 4 took as many, and count as failed" in found.page.omissions
+
+
+WRONG_CELLS = [place for place, outcome in BROKEN.items() if outcome == WRONG]
+
+
+@pytest.mark.parametrize(("name", "value"), WRONG_CELLS)
+def test_where_the_matrix_says_wrong_so_does_the_summary_of_the_run(name, value):
+    case = read(regimes()[name].problem(value))
+    solution = Simulation(replace(case, run=replace(case.run, rtol=1e-10))).run()
+    assert solution.accuracy.source.startswith("estimate")
+    assert solution.accuracy.error > 10.0**-LEAST_DIGITS
+    assert any("error" in warning for warning in solution.warnings), solution.warnings
+    assert "warning" in run_summary(solution, None)
+
+
 def test_names_get_the_nearest_guess():
     for arguments, message in (
         (("endotermic",), "no regime 'endotermic'. Did you mean 'endothermic'?"),
         (("seconds", "--solvers", "radua"), "no solver 'radua'. Did you mean 'radau'?"),
         (("seconds", "--rtol", "2"), "--rtol: 2 is outside its range"),
+        (("seconds", "--search", "-1"), "--search: -1 is outside its range: >= 0"),
+        (("seconds", "--solvers", ","), "--solvers: at least one is needed."),
     ):
         done = CliRunner().invoke(app, ["stability", *arguments])
         assert done.exit_code == 2

@@ -136,15 +136,14 @@ class _SystemReactor(HeldReactor):
 
     def rates(self, t: float) -> Array:
         self.view.residuals += 1
-        n = len(self.evaluation.free)
-        if not self.evaluation.put(t, self.scaled[:n] * self.unit[:n]):
+        if not self.evaluation.put(t, self.scaled * self.unit):
             raise BackOffError("no consistent state")
-        return np.asarray(self.evaluation.rates() / self.unit)
+        return np.asarray(self.evaluation.ydot[self.evaluation.free] / self.unit)
 
 
 class _Stretch(Method):
-    def __init__(self, view: View, t: float, y: Array, ledger: Array) -> None:
-        self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y, ledger))
+    def __init__(self, view: View, t: float, y: Array) -> None:
+        self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y))
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
         self.net.initial_time = t
@@ -191,5 +190,5 @@ class CanteraSolver(SteppingSolver):
     name = "cantera"
     counts_rejected = True
 
-    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
-        return _Stretch(view, t, y, ledger)
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
+        return _Stretch(view, t, y)

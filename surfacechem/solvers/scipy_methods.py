@@ -15,7 +15,7 @@ SMALLEST_RTOL = 100 * np.finfo(float).eps
 
 
 class _Stretch(Method):
-    def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array, ledger: Array) -> None:
+    def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
         system = Reduced(view)
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
@@ -23,7 +23,7 @@ class _Stretch(Method):
             "jac": system.jacobian,
         }
         try:
-            self.solver = kind(system.rates, t, system.start(y, ledger), end, **options)
+            self.solver = kind(system.rates, t, system.start(y), end, **options)
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
         self.dense: Any = None
@@ -55,8 +55,8 @@ class SciPySolver(SteppingSolver):
         self.name = name
         self.kind = kind
 
-    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
-        return _Stretch(self.kind, view, t, end, y, ledger)
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
+        return _Stretch(self.kind, view, t, end, y)
 
 
 def lsoda() -> SciPySolver:

@@ -4,9 +4,12 @@ Importing this module imports neither Numba nor the kernel.
 """
 
 import threading
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
 
@@ -71,7 +74,14 @@ def _run_batch() -> Any:
         cube,
         cube,
     )
-    return compile_kernel(run_batch, signature, _folder(), PARTS)
+    kernel = compile_kernel(run_batch, signature, _folder(), PARTS)
+    _call_once(kernel, signature.args)
+    return kernel
+
+
+def _call_once(kernel: Any, kinds: Sequence[Any]) -> None:
+    """A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes."""
+    kernel(*(np.zeros((0,) * kind.ndim, str(kind.dtype)) if hasattr(kind, "ndim") else 0 for kind in kinds))
 
 
 def run_batch() -> Any:

@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
+from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 
 POINTS = 16
-LEDGER_ATOL = 1e100
-"""Takes the ledger out of the library's error norm."""
 
 
 LONGEST_FIRST = 1e3
@@ -32,7 +31,7 @@ class NoStateError(Exception):
 
 @dataclass
 class View:
-    """The problem as a library sees it in one segment: x = [differential or all variables | ledger]."""
+    """The problem as a library sees it in one segment: x = differential or all variables."""
 
     problem: Problem
     parameters: Array
@@ -79,7 +78,7 @@ class Method(ABC):
 
     @abstractmethod
     def at(self, t: float) -> Array:
-        """X inside the last step."""
+        """The variables inside the last step."""
 
     @property
     def factorizations(self) -> int:
@@ -95,6 +94,30 @@ class Method(ABC):
     def rejected(self) -> int:
         """Steps rejected so far, for a solver that counts them."""
         return 0
+
+
+NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.64261575824032258, 0.88252766196473235, 1.0])
+"""Gauss-Lobatto points of a step: the polynomials of the libraries have order five at most."""
+
+TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
+"""From values at the nodes to the coefficients of the integral of their polynomial."""
+
+
+class StepLedger:
+    """The ledger along a step, from its rates at the nodes.
+
+    Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
+    state at rest, which needs no steps, may do work all the same.
+    """
+
+    def __init__(self, start: float, size: float, ledger: Array, rates: Array) -> None:
+        self.start, self.size, self.ledger = start, size, ledger
+        self.coefficients = TO_POWERS @ rates * size
+
+    def at(self, t: float) -> Array:
+        """The ledger at a time within the step."""
+        part = (t - self.start) / self.size
+        return np.asarray(self.ledger + part ** np.arange(1.0, len(NODES) + 1) @ self.coefficients)
 
 
 @dataclass
@@ -138,8 +161,11 @@ class SteppingSolver(Solver):
     keeps_algebraic = False
     """Whether x holds the algebraic variables too."""
 
+    def prepare(self) -> None:
+        stepper.compile_stepper()  # consistent states are found by it
+
     @abstractmethod
-    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         """Start the library's method at a consistent state."""
 
     def solve(self, problem: Problem) -> Result:
@@ -170,14 +196,23 @@ class SteppingSolver(Solver):
                 break
         return _result(progress, status)
 
-    def _split(self, view: View, t: float, x: Array) -> tuple[Array, Array, Array]:
-        """y, ydot, ledger of x."""
-        mask = view.problem.program.algebraic_mask
-        size = len(mask) if self.keeps_algebraic else int(np.sum(~mask))
-        if self.keeps_algebraic:
-            view.guess = x[:size]
-        differential = x[:size][~mask] if self.keeps_algebraic else x[:size]
-        return *view.complete(t, differential), x[size:]
+    def _state(self, view: View, method: Method, t: float) -> tuple[Array, Array]:
+        """State and derivative inside the last step."""
+        x = method.at(t)
+        if not self.keeps_algebraic:
+            return view.complete(t, x)
+        view.guess = x
+        return view.complete(t, x[~view.problem.program.algebraic_mask])
+
+    def _ledger(self, view: View, progress: Progress, method: Method, reached: float) -> StepLedger:
+        """The ledger along the part of the last step that counts."""
+        start, size = progress.t, reached - progress.t
+        first = view.ledger_rates(start, progress.y, progress.ydot)
+        if not len(first):
+            return StepLedger(start, size, progress.ledger, np.zeros((len(NODES), 0)))
+        inside = [start + size * float(node) for node in NODES[1:]]
+        rates = [view.ledger_rates(t, *self._state(view, method, t)) for t in inside]
+        return StepLedger(start, size, progress.ledger, np.array([first, *rates]))
 
     def _segment(self, view: View, progress: Progress, end: float) -> Status:
         fired: set[int] = set()
@@ -189,7 +224,7 @@ class SteppingSolver(Solver):
             progress.margins = view.margins(start, progress.y, progress.ydot)
             progress.restart_sides(fired)
             _start_tables(progress)
-            method = self.begin(view, start, end, progress.y, progress.ydot, progress.ledger)
+            method = self.begin(view, start, end, progress.y, progress.ydot)
             try:
                 fired = self._stretch(view, progress, method, end)
             finally:
@@ -217,8 +252,10 @@ class SteppingSolver(Solver):
             fired: set[int] = set()
             if view.problem.margins:
                 reached, fired = self._find_event(view, progress, method, reached)
-            self._write_outputs(view, progress, method, reached)
-            y, ydot, ledger = self._split(view, reached, method.at(reached))
+            along = self._ledger(view, progress, method, reached)
+            self._write_outputs(view, progress, method, along)
+            y, ydot = self._state(view, method, reached)
+            ledger = along.at(reached)
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
                 raise StepError("a state is not finite")
             progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
@@ -233,14 +270,14 @@ class SteppingSolver(Solver):
 
     def _check_first(self, view: View, progress: Progress, method: Method, reached: float) -> None:
         """A first step far longer than the layer it starts in may end in another solution, unseen by its own test."""
-        y, _, _ = self._split(view, reached, method.at(reached))
+        y, _ = self._state(view, method, reached)
         moved = np.abs(progress.ydot) * (reached - progress.t)
         seen = np.abs(progress.y) + np.abs(y) + view.problem.atol
         if np.any((moved > LONGEST_FIRST * seen)[~view.problem.program.algebraic_mask]):
             raise StepError("the first step is longer than the layer it starts in")
 
     def _margins(self, view: View, method: Method, t: float) -> Array:
-        y, ydot, _ = self._split(view, t, method.at(t))
+        y, ydot = self._state(view, method, t)
         return view.margins(t, y, ydot)
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
@@ -261,11 +298,12 @@ class SteppingSolver(Solver):
             low = t
         return reached, set()
 
-    def _write_outputs(self, view: View, progress: Progress, method: Method, reached: float) -> None:
-        times = view.problem.times
+    def _write_outputs(self, view: View, progress: Progress, method: Method, along: StepLedger) -> None:
+        times, reached = view.problem.times, along.start + along.size
         while len(progress.outputs) < len(times) and times[len(progress.outputs)] <= reached:
             t = float(times[len(progress.outputs)])
-            y, _, ledger = self._split(view, t, method.at(t))
+            y, _ = self._state(view, method, t)
+            ledger = along.at(t)
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ledger))):
                 raise StepError("an output is not finite")
             progress.outputs.append(np.concatenate((y, ledger)))

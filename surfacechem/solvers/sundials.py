@@ -8,7 +8,7 @@ from sksundae.ida import IDA
 
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.reduced import Reduced
-from surfacechem.solvers.stepping import LEDGER_ATOL, Method, StepError, SteppingSolver, View
+from surfacechem.solvers.stepping import Method, StepError, SteppingSolver, View
 
 
 class _Stretch(Method):
@@ -54,7 +54,7 @@ class CVODESolver(SteppingSolver):
 
     name = "cvode"
 
-    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         system = Reduced(view)
 
         def rates(t: float, x: Array, out: Array) -> None:
@@ -64,7 +64,7 @@ class CVODESolver(SteppingSolver):
             out[:] = system.jacobian(t, x)
 
         library = CVODE(rates, rtol=view.problem.rtol, atol=system.atol, jacfn=jacobian, max_num_steps=100_000)
-        return _Stretch(library, t, end, system.start(y, ledger))
+        return _Stretch(library, t, end, system.start(y))
 
 
 class IDASolver(SteppingSolver):
@@ -73,28 +73,23 @@ class IDASolver(SteppingSolver):
     name = "ida"
     keeps_algebraic = True
 
-    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array, ledger: Array) -> Method:
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         program = view.problem.program
-        n = program.n
 
         def residual(t: float, x: Array, rate: Array, out: Array) -> None:
             view.residuals += 1
-            out[:n] = program.residual(view.inputs(t, x[:n], rate[:n]))
-            out[n:] = rate[n:] - view.ledger_rates(t, x[:n], rate[:n])
+            out[:] = program.residual(view.inputs(t, x, rate))
 
         def jacobian(t: float, x: Array, rate: Array, _residual: Array, shift: float, out: Array) -> None:
-            by_state, by_rate = view.matrices(t, x[:n], rate[:n])
-            out[:] = shift * np.eye(len(x))
-            out[:n, :n] = by_state + shift * by_rate
+            by_state, by_rate = view.matrices(t, x, rate)
+            out[:] = by_state + shift * by_rate
 
-        atol = np.concatenate((view.problem.atol, np.full(program.n_ledger, LEDGER_ATOL)))
         library = IDA(
             residual,
             rtol=view.problem.rtol,
-            atol=atol,
+            atol=view.problem.atol,
             jacfn=jacobian,
             max_num_steps=100_000,
             algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
         )
-        start = np.concatenate((y, ledger))
-        return _Stretch(library, t, end, start, np.concatenate((ydot, view.ledger_rates(t, y, ydot))))
+        return _Stretch(library, t, end, y, ydot)

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
-from matplotlib.patches import Patch
 
 from surfacechem.netcdf import Column
-from surfacechem.plots import STYLE
+from surfacechem.solvers import names as known_solvers
+from surfacechem.stability.figure import COLOURS, MARKS
 from surfacechem.stability.matrix import FAILED, LEAST, MOST, OUTCOMES, REFUSED, STEPS, WRONG, Cell, Matrix, Row
 from surfacechem.stability.search import Corner
 from surfacechem.studyreport import Page, Section, Table
 
-MARKS = {REFUSED: "R", FAILED: "×", WRONG: "!"}
-COLOURS = {FAILED: "0.75", WRONG: "#d62728"}
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-DARK = 8.0
-"""Digits above which the colour of a cell is dark."""
+TITLE = "Stability of the solvers in dangerous regimes"
 
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
@@ -87,64 +82,31 @@ def corners_table(corners: Sequence[Corner]) -> Table:
     return Table(("regime", "points", "not solved", "worst", "where"), rows, "Worst corners that a search has found")
 
 
-def page(matrix: Matrix, corners: Sequence[Corner], command: str) -> Page:
+def page(matrix: Matrix, corners: Sequence[Corner], command: str, figure: Figure, left_out: Sequence[str]) -> Page:
     """The report; the terminal shows the summary and the corners."""
     sections = [
-        Section("Digits kept", [MEANING], [summary(matrix)], [figure(matrix)]),
+        Section("Digits kept", [MEANING], [summary(matrix)], [figure]),
         *([Section("Corners", tables=[corners_table(corners)])] if corners else []),
         Section("Every cell", tables=[details(row, matrix.solvers) for row in matrix.rows], details=True),
     ]
-    left_out = [f"runs of more than {STEPS} steps, which count as failed"]
-    return Page("Stability of the solvers in dangerous regimes", command, sections, left_out)
+    return Page(TITLE, command, sections, left_out)
 
 
-def figure(matrix: Matrix) -> Figure:
-    """Digits kept as a heat map, a panel for each solver and a row for each regime; to the right is more extreme."""
-    import matplotlib
-
-    width = max(len(row.values) for row in matrix.rows)
-    count, height = len(matrix.solvers), len(matrix.rows)
-    with matplotlib.rc_context(STYLE):
-        plot = Figure(figsize=(2.2 + 0.23 * width * count, 1.3 + 0.26 * height), layout="constrained")
-        FigureCanvasAgg(plot)
-        axes = np.atleast_1d(plot.subplots(1, count, sharey=True))
-        scale = Normalize(0.0, 14.0)
-        for j, (ax, solver) in enumerate(zip(axes, matrix.solvers, strict=True)):
-            image = _panel(ax, matrix, j, width, scale)
-            ax.set_title(solver, fontsize=9)
-            ax.set_xticks([])
-        axes[0].set_yticks(range(height), [row.regime.name for row in matrix.rows])
-        axes[count // 2].set_xlabel("towards the extreme →")
-        plot.colorbar(image, ax=list(axes), label="digits kept", fraction=0.03, pad=0.01)
-        words = {"R": "ended for the right reason", "×": "failed, and said so", "!": "wrong"}
-        handles = [Patch(facecolor="none", edgecolor="none", label=f"{mark}  {word}") for mark, word in words.items()]
-        plot.legend(handles=handles, loc="outside lower center", ncols=3, handlelength=0, frameon=False, fontsize=8)
-    return plot
-
-
-def _panel(ax: Axes, matrix: Matrix, solver: int, width: int, scale: Normalize) -> AxesImage:
-    digits = np.full((len(matrix.rows), width), np.nan)
-    for i, row in enumerate(matrix.rows):
-        for k, cells in enumerate(row.cells):
-            cell = cells[solver]
-            if cell.outcome in COLOURS:
-                ax.add_patch(_box(k, i, COLOURS[cell.outcome]))
-            else:
-                digits[i, k] = cell.digits
-            mark, dark = MARKS.get(cell.outcome, ""), cell.outcome not in COLOURS and cell.digits > DARK
-            ax.text(k, i, mark, ha="center", va="center", fontsize=7, color="white" if dark else "black")
-    image = ax.imshow(digits, norm=scale, cmap="YlGnBu", aspect="auto")
-    ax.grid(visible=False)
-    for side in ax.spines.values():
-        side.set_visible(False)
-    ax.tick_params(length=0)
-    return image
-
-
-def _box(k: int, i: int, colour: str) -> Patch:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((k - 0.5, i - 0.5), 1.0, 1.0, facecolor=colour, edgecolor="none")
+def omissions(matrix: Matrix, searched: bool) -> list[str]:
+    """What the study could have had and has not, each with its reason."""
+    found = []
+    every, taken = (
+        sum(len(values) for values in each)
+        for each in zip(*((r.regime.values, r.values) for r in matrix.rows), strict=True)
+    )
+    if taken < every:
+        found.append(f"{every - taken} of {every} values of the regimes, for the sake of time")
+    others = [name for name in known_solvers if name not in matrix.solvers]
+    found += [f"the solvers {', '.join(others)}, which were not asked for"] if others else []
+    found += [] if searched else ["the search for worst corners, which was not asked for"]
+    full = sum(cell.steps >= STEPS for row in matrix.rows for cells in row.cells for cell in cells)
+    found += [f"what lies beyond {STEPS} steps of a run: {full} took as many, and count as failed"] if full else []
+    return found
 
 
 def columns(matrix: Matrix) -> list[Column]:

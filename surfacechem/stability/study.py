@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.netcdf import CONVENTIONS
 from surfacechem.solvers import names as known_solvers
 from surfacechem.stability import page as pages
 from surfacechem.stability.matrix import RTOL, SOLVERS, Matrix, few, matrix
 from surfacechem.stability.regimes import chosen
 from surfacechem.stability.search import Corner, worst_corner
-from surfacechem.studyreport import Page, as_dataset, write
+from surfacechem.studyreport import Page, as_dataset, machine, write
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-ROUNDS = 12
-"""Rounds of a search for a worst corner."""
+ROUNDS, MOST_ROUNDS = 12, 10_000
+"""Rounds of a search for a worst corner, and the most that may be asked for."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,21 @@ class Study:
     matrix: Matrix
     corners: Sequence[Corner]
     command: str
+    searched: bool
+    """Whether worst corners were searched for."""
 
     @cached_property
     def page(self) -> Page:
         """The report."""
-        return pages.page(self.matrix, self.corners, self.command)
+        left_out = pages.omissions(self.matrix, self.searched)
+        return pages.page(self.matrix, self.corners, self.command, self.figure, left_out)
 
     @cached_property
     def figure(self) -> Figure:
         """Digits kept, at a glance."""
-        return pages.figure(self.matrix)
+        from surfacechem.stability.figure import figure
+
+        return figure(self.dataset)
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
@@ -50,8 +57,16 @@ class Study:
     @property
     def attributes(self) -> dict[str, str | float | int]:
         """Global attributes of the dataset."""
-        return {"Conventions": "CF-1.11", "title": self.page.title, "study": "stability", "history": self.command,
-                "rtol": self.matrix.rtol}  # fmt: skip
+        return {
+            "Conventions": CONVENTIONS,
+            "title": pages.TITLE,
+            "source": "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')}: {self.command}",
+            "study": "stability",
+            "command": self.command,
+            "rtol": self.matrix.rtol,
+            **machine(),
+        }
 
     def write(self, path: str | Path) -> list[Path]:
         """Save .nc, .svg, .png and .html side by side."""
@@ -75,9 +90,13 @@ def stability(
             raise InputError(f"no solver '{name}'.{suggestion(name, known_solvers)}", Place(path="--solvers"))
     if not 0 < rtol <= 0.1:
         raise InputError(f"{rtol:g} is outside its range: > 0 and <= 0.1.", Place(path="--rtol"))
+    if not 0 <= rounds <= MOST_ROUNDS:
+        raise InputError(f"{rounds} is outside its range: >= 0 and <= {MOST_ROUNDS}.", Place(path="--search"))
+    if len(solvers) == 0:
+        raise InputError("at least one is needed.", Place(path="--solvers"))
     solved = matrix(found, solvers, rtol, few if quick else list)
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
-    return Study(solved, corners, _command(regimes, solvers, rtol, quick, rounds))
+    return Study(solved, corners, _command(regimes, solvers, rtol, quick, rounds), rounds > 0)
 
 
 def _command(regimes: Sequence[str], solvers: Sequence[str], rtol: float, quick: bool, rounds: int) -> str:

@@ -1,0 +1,39 @@
+"""Time that a run spends on getting ready: code compiled and libraries loaded when they are first needed.
+
+It is no run time. What is slow once is done inside ``PREPARING``, as a block or as a decorator.
+
+>>> before = PREPARING.seconds
+>>> with PREPARING:
+...     import decimal
+>>> PREPARING.seconds > before
+True
+"""
+
+import threading
+import time
+from contextlib import ContextDecorator
+from types import TracebackType
+
+
+class _Preparing(ContextDecorator, threading.local):
+    """A stopwatch of each thread; a block within another counts once."""
+
+    seconds = 0.0
+    """Time spent so far [s]."""
+    _depth = 0
+    _start = 0.0
+
+    def __enter__(self) -> None:
+        if self._depth == 0:
+            self._start = time.perf_counter()
+        self._depth += 1
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._start
+
+
+PREPARING = _Preparing()
