@@ -15,9 +15,10 @@ ORIGIN = "override"
 def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
     """The tree with the given values; texts are "path=value" with the value in YAML.
 
-    A number for a parameter that varies replaces its value and keeps its factors.
+    A number for a parameter that varies replaces its value and keeps its factors. No value, or null, removes the key
+    or the law.
 
-    >>> apply(parse("run: {until: 5 s}"), ["run.until=7 s"]).plain()
+    >>> apply(parse("run: {until: 5 s, rtol: 1e-6}"), ["run.until=7 s", "run.rtol="]).plain()
     {'run': {'until': '7 s'}}
     """
     for path, value in _pairs(overrides):
@@ -58,13 +59,25 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return _replaced(tree, new)
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    if keys == ["level"] and not isinstance(tree.value, dict):
+    if keys == ["level"] and not isinstance(tree.value, dict) and not _removes(new):
         return new  # a bare value is the level of a constant history
     if tree.value is not None and not isinstance(tree.value, dict):
         raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
     known = tree.value or {}
+    if len(keys) == 1 and _removes(new):
+        return replace(tree, value=_without(known, keys[0], place))
     child = known.get(keys[0], Tree(None, place))
     return replace(tree, value={**known, keys[0]: _set(child, keys[1:], new, place)})
+
+
+def _removes(new: Tree) -> bool:
+    return new.value is None or new.value == ""
+
+
+def _without(known: Mapping[str, Tree], key: str, place: Place) -> dict[str, Tree]:
+    if key not in known:
+        raise InputError(f"there is no '{key}' to remove.{suggestion(key, known)}", place)
+    return {name: child for name, child in known.items() if name != key}
 
 
 def _replaced(old: Tree, new: Tree) -> Tree:
@@ -82,9 +95,9 @@ def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         names = [label for label in known if label]
         raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
     index = known.index(wanted)
-    items = list(tree.value)
-    items[index] = _set_law(items[index], keys[1:], new, place)
-    return replace(tree, value=items)
+    gone = len(keys) == 1 and _removes(new)
+    changed = [] if gone else [_set_law(tree.value[index], keys[1:], new, place)]
+    return replace(tree, value=[*tree.value[:index], *changed, *tree.value[index + 1 :]])
 
 
 def _set_law(item: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:

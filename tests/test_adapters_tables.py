@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from test_tables import MAKERS, errors
+from test_tables import MAKERS, errors, made
 
 from surfacechem.assembly import assemble
 from surfacechem.integrate import Model, Run, Trajectory
@@ -45,11 +45,11 @@ OUT_OF_REACH = {
 
 @cache
 def model(table: str) -> Model:
-    return Model(assemble(MAKERS[table]().scene))
+    return Model(assemble(made(table).scene))
 
 
 def solved(table: str, library: str, steps: int) -> Trajectory:
-    times = MAKERS[table]().times
+    times = made(table).times
     times = times if times[0] == 0 else np.concatenate([[0.0], times])
     return model(table).solve(Run(times=times, rtol=1e-8, solver=library, max_steps=steps))
 
@@ -64,4 +64,4 @@ def test_right_or_not_a_success(table: str, library: str) -> None:
         return
     trajectory = solved(table, library, STEPS)
     assert trajectory.status == "finished", trajectory.reason
-    assert max(errors(MAKERS[table](), trajectory).values()) < ILL_CONDITIONED.get(table, 1e-5)
+    assert max(errors(made(table), trajectory).values()) < ILL_CONDITIONED.get(table, 1e-5)

@@ -1,6 +1,7 @@
 """Whatever stands in a case file, it loads and assembles or is an input error; nothing else escapes."""
 
 from contextlib import suppress
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -32,6 +33,13 @@ KEYS = [
     *("medium", "fluid", "pressure", "thickness", "viscosity", "closure", "radiation", "vogel"),
 ]
 SAMPLES = [name for name in names() if "kappa" not in name]
+
+
+@cache
+def sample(name):
+    """The text of a case and its plain data, which nothing here changes."""
+    text = load(name).text
+    return text, document.parse(text).plain()
 
 
 def places_of(value, path=()):
@@ -122,7 +130,7 @@ def test_a_message_is_one_line_whatever_it_quotes(text, message):
 @given(name=st.sampled_from(SAMPLES), data=st.data())
 @settings(max_examples=300, suppress_health_check=list(HealthCheck))
 def test_mutated_documents(name, data):
-    plain = document.parse(load(name).text).plain()
+    _, plain = sample(name)
     for _ in range(data.draw(st.integers(1, 3))):
         plain = mutated(plain, data)
     loads_or_is_refused(document.dump(document.from_plain(plain, Place())))
@@ -131,7 +139,7 @@ def test_mutated_documents(name, data):
 @given(name=st.sampled_from(SAMPLES), data=st.data())
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
 def test_mutated_texts(name, data):
-    text = load(name).text
+    text, _ = sample(name)
     for _ in range(data.draw(st.integers(1, 4))):
         start = data.draw(st.integers(0, len(text)))
         end = min(len(text), start + data.draw(st.integers(0, 12)))

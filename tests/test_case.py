@@ -5,6 +5,7 @@ import pytest
 
 from surfacechem import case, document
 from surfacechem.case import load, load_text, names
+from surfacechem.data import mechanisms
 from surfacechem.errors import InputError
 from surfacechem.integrate import Run
 from surfacechem.laws.bonding import BondEnergy
@@ -160,6 +161,16 @@ def test_a_number_for_a_parameter_that_varies_keeps_its_factors():
     changed = load("endothermic", ["interface.bonding.linear-affinity.c_r=7e15 1/J/s"])
     (law,) = changed.scene.interface.reactions
     assert (law.c_r.value, len(law.c_r.factors)) == (7e15, 1)
+
+
+@pytest.mark.parametrize("nothing", ["", "null", None])
+def test_an_override_without_a_value_removes_its_key_or_law(nothing):
+    paths = ["initial.T_2", "bodies.upper.C", "bodies.upper.capacity", "heat.conductance[2]"]
+    case = load("dna-adhesive", {"bodies.upper.temperature": "300 K", **dict.fromkeys(paths, nothing)})
+    assert "T_2" not in case.scene.initial
+    assert case.scene.bodies[1].energy is None
+    assert [path.between for path in case.scene.heat] == [("lower", "interface")]
+    assert load_text(case.text, base=mechanisms()).scene.initial == case.scene.initial
 
 
 def test_overrides_come_in_order_and_make_what_is_missing():

@@ -197,28 +197,12 @@ def test_a_multiplier_is_a_factor_on_a_rate():
     assert slow["T"] == pytest.approx(fast["T"], rel=LOOSE)
 
 
-WARM = """
-bodies:
-  lower: {temperature: T_1, C: 2 kJ/m^2/K, capacity: constant}
-  upper: {temperature: 300 K}
-interface:
-  temperature: T_c
-  potential:
-    - constant-interface-capacity: {C_c: 42 J/m^2/K}
-  mechanism: {file: dna-tethers.yaml, bonds: [bond(s)]}
-heat:
-  - conductance: {between: [lower, interface], h: 2100 W/m^2/K}
-  - conductance: {between: [upper, interface], h: 4200 W/m^2/K}
-T_0: 298.15 K
-initial: {T_1: 298.15 K, T_c: 298.15 K, coverages: {free(s): 1}}
-run: {until: 10 s}
-"""
-
-
 @pytest.fixture
 def warm(tmp_path):
+    """The plates of DNA bonds, one of them cold and kept so."""
     path = tmp_path / "warm.yaml"
-    path.write_text(WARM)
+    changes = {"bodies.upper": {"temperature": "300 K"}, "initial.T_2": None}
+    path.write_text(surfacechem.load("dna-adhesive", changes).case.text)
     return path
 
 

@@ -7,14 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from surfacechem.errors import InputError
+from surfacechem.references._bonded_slider import BondedSlider
 from surfacechem.references._spring_slider import Slip
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.terms import parameter
 
 
-class StickSlipDebonding(Reference):
+class StickSlipDebonding(BondedSlider):
     r"""Stick-slip that begins bonded: sticking bears :math:`\mu_bp` once and :math:`\mu_{ub}p` ever after.
 
     The first slip begins at :math:`t_1=\mu_bp/(kV)` and drops the traction of the spring to :math:`(2\mu_k-\mu_b)p`,
@@ -33,20 +32,6 @@ class StickSlipDebonding(Reference):
     """
 
     name: ClassVar[str] = "stick-slip-debonding"
-
-    m: float = parameter("kg/m^2", "mass", above=0)
-    k: float = parameter("Pa/m", "tangential stiffness", above=0)
-    V: float = parameter("m/s", "speed of the spring's end", above=0)
-    p: float = parameter("Pa", "contact pressure", above=0)
-    mu_b: float = parameter("1", "static friction coefficient of complete bonding", above=0)
-    mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
-    mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
-
-    def __post_init__(self) -> None:
-        """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
-        super().__post_init__()
-        if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
-            raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
 
     @property
     def first(self) -> Slip:

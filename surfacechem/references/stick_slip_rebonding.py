@@ -11,9 +11,10 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.errors import InputError
+from surfacechem.references._bonded_slider import BondedSlider
 from surfacechem.references._roots import increasing_root
 from surfacechem.references._spring_slider import Slip
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array
 from surfacechem.terms import parameter
 
 CYCLES = 1_000_000
@@ -38,7 +39,7 @@ class Cycle:
         return self.stick_time + self.slip.duration
 
 
-class StickSlipRebonding(Reference):
+class StickSlipRebonding(BondedSlider):
     r"""Stick-slip with a sticking limit that grows as bonds form; sliding breaks all of them.
 
     .. math:: \dot\phi=\frac{1-\phi}\tau,\quad t_s=p\,[\mu_{ub}+(\mu_b-\mu_{ub})\phi],\quad
@@ -59,20 +60,7 @@ class StickSlipRebonding(Reference):
 
     name: ClassVar[str] = "stick-slip-rebonding"
 
-    m: float = parameter("kg/m^2", "mass", above=0)
-    k: float = parameter("Pa/m", "tangential stiffness", above=0)
-    V: float = parameter("m/s", "speed of the spring's end", above=0)
-    p: float = parameter("Pa", "contact pressure", above=0)
-    mu_b: float = parameter("1", "static friction coefficient of complete bonding", above=0)
-    mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
-    mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
     tau: float = parameter("s", "time scale of bonding", above=0)
-
-    def __post_init__(self) -> None:
-        """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
-        super().__post_init__()
-        if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
-            raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
 
     @property
     def critical_speed(self) -> float:

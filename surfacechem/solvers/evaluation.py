@@ -18,7 +18,8 @@ CODE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 class Evaluation:
     """State, derivatives and parameters of a program in one buffer, made consistent by :meth:`put`.
 
-    ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from where they were last.
+    ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from ``guess``, where they were
+    last.
     """
 
     def __init__(self, program: Program, y: Array, parameters: Array) -> None:
@@ -32,7 +33,7 @@ class Evaluation:
         )
         self.free = np.flatnonzero(~program.algebraic_mask)
         self._algebraic = np.flatnonzero(program.algebraic_mask)
-        self._guess = y[self._algebraic]
+        self.guess = y[self._algebraic]
         self._counts = np.zeros((1, 10), np.int64)
         self._search = stepper.run_batch()
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
@@ -44,19 +45,30 @@ class Evaluation:
         """Go to a state; whether derivatives and algebraic variables were found there."""
         self.inputs[0] = t
         self.y[self.free] = differential
-        self.y[self._algebraic] = self._guess
+        self.y[self._algebraic] = self.guess
         self.ydot[:] = 0.0
         self._counts[:] = 0
         self.program.filled(self.inputs)
         self._search(*self._arguments)
         found = bool(self._counts[0, END] == 0)
         if found:
-            self._guess = self.y[self._algebraic]
+            self.guess = self.y[self._algebraic]
         return found
+
+    def hold(self, t: float, y: Array, ydot: Array) -> None:
+        """Go to a state that is known."""
+        self.inputs[0] = t
+        self.y[:] = y
+        self.ydot[:] = ydot
+        self.program.filled(self.inputs)
 
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
         return np.concatenate((self.ydot[self.free], self._ledger()))
+
+    def ledger(self) -> Array:
+        """Rates of the ledger."""
+        return self._ledger()
 
     def margins(self) -> Array:
         """Values of the margins."""
@@ -64,15 +76,18 @@ class Evaluation:
 
 
 class _Code:
-    """A compiled function of a fixed buffer."""
+    """A compiled function of a fixed buffer, each of its pieces."""
 
     def __init__(self, function: Function | None, inputs: Array) -> None:
-        self.out = np.zeros(function.n_out if function else 0)
-        self._call: Any = CODE(function.address) if function else None
-        self._arguments = (self.out.ctypes.data, inputs.ctypes.data, function.user) if function else ()
+        self.out = np.zeros(function.size if function else 0)
+        self._calls: list[tuple[Any, int, int, int]] = []
+        place = self.out.ctypes.data
+        for part in (function, *function.rest) if function else ():
+            self._calls.append((CODE(part.address), place, inputs.ctypes.data, part.user))
+            place += part.n_out * self.out.itemsize
         self._keep = function
 
     def __call__(self) -> Array:
-        if self._call is not None:
-            self._call(*self._arguments)
-        return self.out
+        for code, *arguments in self._calls:
+            code(*arguments)
+        return self.out.copy()

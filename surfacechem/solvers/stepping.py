@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
-from surfacechem.solvers.radau import consistent
+from surfacechem.solvers.evaluation import Evaluation
 
 POINTS = 16
 
@@ -40,28 +40,31 @@ class View:
     residuals: int = 0
     """Right-hand sides that the library has asked for; those for outputs and events are not counted."""
     jacobians: int = 0
+    evaluation: Evaluation = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Its buffer serves all states of the segment."""
+        self.evaluation = Evaluation(self.problem.program, self.guess, self.parameters)
 
     def inputs(self, t: float, y: Array, ydot: Array) -> Array:
         return self.problem.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
     def complete(self, t: float, differential: Array) -> tuple[Array, Array]:
         """State and derivative with the algebraic variables found from the equations."""
-        program = self.problem.program
-        y = np.where(program.algebraic_mask, self.guess, 0.0)
-        y[~program.algebraic_mask] = differential
-        found = consistent(program, t, y, np.zeros_like(y), self.parameters)
-        if not found.valid:
-            return np.full_like(y, np.nan), np.full_like(y, np.nan)
-        self.guess = found.y
-        return found.y, found.ydot
+        evaluation = self.evaluation
+        evaluation.guess = self.guess[self.problem.program.algebraic_mask]
+        if not evaluation.put(t, differential):
+            return np.full_like(evaluation.y, np.nan), np.full_like(evaluation.y, np.nan)
+        self.guess = evaluation.y.copy()
+        return self.guess, evaluation.ydot.copy()
 
     def ledger_rates(self, t: float, y: Array, ydot: Array) -> Array:
-        ledger = self.problem.program.ledger
-        return np.zeros(0) if ledger is None else ledger(self.inputs(t, y, ydot))
+        self.evaluation.hold(t, y, ydot)
+        return self.evaluation.ledger()
 
     def margins(self, t: float, y: Array, ydot: Array) -> Array:
-        margins = self.problem.program.margins
-        return np.zeros(0) if margins is None else margins(self.inputs(t, y, ydot))
+        self.evaluation.hold(t, y, ydot)
+        return self.evaluation.margins()
 
     def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
         """G_y and G_ydot."""
@@ -282,7 +285,7 @@ class SteppingSolver(Solver):
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
         low = progress.t
-        for t in np.linspace(progress.t, reached, POINTS + 1)[1:]:
+        for t in np.linspace(progress.t, reached, POINTS + 1)[1:].tolist():
             values = self._margins(view, method, t)
             crossing = [
                 i
@@ -294,7 +297,7 @@ class SteppingSolver(Solver):
                 first = min(zeros.values())
                 near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
                 return first, {i for i, zero in zeros.items() if zero <= first + near}
-            progress.sides = np.where(values != 0.0, np.sign(values), progress.sides)
+            np.copyto(progress.sides, np.sign(values), where=values != 0.0)
             low = t
         return reached, set()
 

@@ -82,13 +82,18 @@ class Stiffness(Regime):
         return three_temperatures(point)
 
 
-MEDIUM = """\
+BETWEEN_RESERVOIRS = """\
 T_0: 300 K
 bodies:
   lower: {temperature: 300 K}
   upper: {temperature: 300 K}
 interface:
   temperature: T_c
+"""
+
+MEDIUM = (
+    BETWEEN_RESERVOIRS
+    + """\
   potential:
     - bond-energy: {K_2: 240 J/m^2}
     - interface-capacity: {C_c: 1 J/m^2/K}
@@ -99,6 +104,7 @@ loading: {phi: 0}
 initial: {T_c: 301 K}
 run: {until: 1 s}
 """
+)
 
 
 class LostCapacity(Regime):
@@ -116,13 +122,9 @@ class LostCapacity(Regime):
         return Problem(MEDIUM, [1.0], Exact(lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)}), changes)
 
 
-FILM = """\
-T_0: 300 K
-bodies:
-  lower: {temperature: 300 K}
-  upper: {temperature: 300 K}
-interface:
-  temperature: T_c
+FILM = (
+    BETWEEN_RESERVOIRS
+    + """\
   friction:
     - viscous: {eta: {value: 1 Pa s, times: [exponential: {beta: -0.05}]}}
 heat:
@@ -131,6 +133,7 @@ heat:
 loading: {g_n: 1 um, v: 0.1 m/s}
 run: {until: 1 s}
 """
+)
 
 
 class Ignition(Regime):
