@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
@@ -62,7 +63,11 @@ class View:
 
     def margins(self, t: float, y: Array, ydot: Array) -> Array:
         margins = self.problem.program.margins
-        return np.zeros(0) if margins is None else margins(self.inputs(t, y, ydot))
+        if margins is None:
+            return np.zeros(0)
+        if self.problem.program.plain_margins:
+            return margins(np.concatenate(([t], y, ydot, self.parameters)))
+        return margins(self.inputs(t, y, ydot))
 
     def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
         """G_y and G_ydot."""
@@ -240,18 +245,19 @@ class SteppingSolver(Solver):
             raise StepError("the first step is longer than the layer it starts in")
 
     def _margins(self, view: View, method: Method, t: float) -> Array:
+        program = view.problem.program
+        if program.plain_margins and not program.algebraic_mask.any():
+            y = method.at(t)[: program.n]
+            return view.margins(t, y, np.zeros_like(y))
         y, ydot, _ = self._split(view, t, method.at(t))
         return view.margins(t, y, ydot)
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
         low = progress.t
+        directions = np.array([margin.direction for margin in view.problem.margins])
         for t in np.linspace(progress.t, reached, POINTS + 1)[1:]:
             values = self._margins(view, method, t)
-            crossing = [
-                i
-                for i, kind in enumerate(view.problem.margins)
-                if _crosses(progress.sides[i], values[i], kind.direction)
-            ]
+            crossing = np.flatnonzero(_crosses(progress.sides, values, directions)).tolist()
             if crossing:
                 zeros = {i: _zero(lambda s, i=i: float(self._margins(view, method, s)[i]), low, t) for i in crossing}  # type: ignore[misc]
                 first = min(zeros.values())
@@ -280,8 +286,10 @@ def _start_tables(progress: Progress) -> None:
         progress.steps.append((progress.t, progress.y, progress.ydot, progress.ledger))
 
 
-def _crosses(side: float, value: float, direction: int) -> bool:
-    return (side > 0.0 >= value and direction <= 0) or (side < 0.0 <= value and direction >= 0)
+def _crosses(sides: Array, values: Array, directions: Array) -> NDArray[np.bool_]:
+    """Which margins have changed their side, in a direction that counts."""
+    falls = (sides > 0) & (values <= 0) & (directions <= 0)
+    return falls | ((sides < 0) & (values >= 0) & (directions >= 0))
 
 
 def _zero(margin: Callable[[float], float], low: float, high: float) -> float:
