@@ -102,6 +102,8 @@ class Program:
     chains: tuple[Chain, ...] = ()
     groups: tuple[int, ...] = ()
     """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
+    plain_margins: bool = False
+    """Whether margins read neither derivatives nor what comes from outside."""
 
     def filled(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, with the parameters that come from outside."""
@@ -227,7 +229,17 @@ def compile_program(
         filler=filler,
         chains=tuple(chains),
         groups=tuple(groups),
+        plain_margins=not _symbols(margins) & {*derivatives, *_outside(parameters, filler, 1 + 2 * n)},
     )
+
+
+def _outside(parameters: Sequence[Any], filler: Filler | None, first: int) -> set[Any]:
+    """The parameters that come from outside; the first of all is the input at position ``first``."""
+    return {parameters[j - first] for j in filler.positions} if filler else set()
+
+
+def _symbols(expressions: Sequence[Any]) -> set[Any]:
+    return {symbol for expression in expressions for symbol in symengine.sympify(expression).free_symbols}
 
 
 def _linked(core: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:

@@ -144,7 +144,10 @@ def _conduction() -> Schema:
 def _interface() -> Schema:
     density = _quantity("density of bonding sites [1/m^2]")
     bonds = {"type": "array", "items": {"type": "string"}, "description": "species that count as bonds"}
-    mechanism = _object({"file": _string("file"), "phase": _string("phase"), "bonds": bonds}, required=("file",))
+    mechanism = _object(
+        {"file": _string("file"), "phase": _string("phase"), "bonds": bonds, "neighbours": _neighbours()},
+        required=("file",),
+    )
     reference = {"reference": _string("the body whose sites define phi")}
     sides = {**_object(reference), "additionalProperties": density}
     properties = {
@@ -160,6 +163,14 @@ def _interface() -> Schema:
     }
     assert set(properties) == set(INTERFACE_KEYS)
     return _object(properties)
+
+
+def _neighbours() -> Schema:
+    fractions = {"type": "object", "additionalProperties": _quantity("mole fraction [1]")}
+    texts = {"pressure": "pressure [Pa]", "electric-potential": "electric potential against the surface [V]"}
+    state = _object({name: _quantity(text) for name, text in texts.items()} | {"composition": fractions})
+    description = "states in which the phases beside the surface are held, by their names"
+    return {"type": "object", "additionalProperties": state, "description": description}
 
 
 def _mechanics() -> Schema:

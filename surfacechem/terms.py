@@ -294,6 +294,23 @@ class RateLaw(Law):
         return None
 
     @property
+    def one_way(self) -> bool:
+        """Whether the law runs one way only."""
+        return self.log_rate is not None
+
+    def turnover(self) -> Mapping[str, int | float]:
+        """Change of everything that takes part, what is no bonding variable included: one law may undo another."""
+        return self.stoichiometry()
+
+    @property
+    def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
+        """Enthalpy and Gibbs energy [J] that one reaction takes from what is beside the interface; None where nothing.
+
+        The first is energy that comes in, the second is part of the affinity.
+        """
+        return None
+
+    @property
     def log_ratio(self) -> Callable[..., Expression] | None:
         """Logarithm of the forward over the backward rate where the law states both; None where they are not its own.
 

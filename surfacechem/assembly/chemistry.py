@@ -8,6 +8,7 @@ from typing import Any
 import symengine
 
 from surfacechem import balances
+from surfacechem.assembly.beside import affinity_taken, supplied
 from surfacechem.assembly.bounds import free_to_react
 from surfacechem.assembly.build import Bond, Build
 from surfacechem.assembly.force import RESOLUTION, SHARED
@@ -31,13 +32,14 @@ def reactions(build: Build) -> None:
         build.law_ranges(law)
     pairs = opposed(laws)
     together = {label: pair.label for pair in pairs for label in pair.labels}
-    affinities = {label: sum(n * mu[x] for x, n in law.stoichiometry().items()) for label, law in laws.items()}
+    affinities = {label: _affinity(build, law, mu) for label, law in laws.items()}
     rates = {label: _rate(build, law, label, affinities[label]) for label, law in laws.items()}
     free = _free(build, laws, rates)
+    named: dict[str, Expression] = {}
     for label, law in laws.items():
         nu, affinity = law.stoichiometry(), affinities[label]
         quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
-        rate = build.name(quantity, rates[label] * free if "phi" in nu else rates[label])
+        rate = named[label] = build.name(quantity, rates[label] * free if "phi" in nu else rates[label])
         # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
         owner = together.get(label, label)
         build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
@@ -45,6 +47,7 @@ def reactions(build: Build) -> None:
             change[x] += n * rate
         own_departure(build, label, law, affinity)
         softening(build, law)
+    supplied(build, laws, named)
     for pair in pairs:
         departure(build, pair, mu)
     for name, bond in build.bonding.items():
@@ -52,6 +55,12 @@ def reactions(build: Build) -> None:
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
     _prescribed_bonding(build)
+
+
+def _affinity(build: Build, law: RateLaw, mu: Mapping[str, Expression]) -> Expression:
+    """Gibbs energy of a reaction, what it takes from neighbours included."""
+    own = sum(n * mu[x] for x, n in law.stoichiometry().items())
+    return own - affinity_taken(build, law) if law.taken else own
 
 
 def _potential_per_area(build: Build, name: str, symbol: Any) -> Expression:

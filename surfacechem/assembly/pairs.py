@@ -46,21 +46,23 @@ class Opposed:
 def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     """The one-way laws that have a counterpart; all that share a stoichiometry belong together."""
     groups: list[Opposed] = []
-    one_way = {label: law for label, law in laws.items() if law.log_rate is not None}
+    one_way = {label: law for label, law in laws.items() if law.one_way}
     for label, law in one_way.items():
-        change = law.stoichiometry()
+        change = law.turnover()
         if not change or any(label in group.labels for group in groups):
             continue
         back = {name: -n for name, n in change.items()}
-        forward = {name: other for name, other in one_way.items() if other.stoichiometry() == change}
-        backward = {name: other for name, other in one_way.items() if other.stoichiometry() == back}
+        forward = {name: other for name, other in one_way.items() if other.turnover() == change}
+        backward = {name: other for name, other in one_way.items() if other.turnover() == back}
         if backward:
             groups.append(Opposed(change, forward, backward))
     return groups
 
 
 def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> None:
-    """Name what the rates of one-way laws lack to balance where the affinity vanishes."""
+    """Name what the rates of one-way laws lack to balance where the affinity vanishes; rates from outside are not."""
+    if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
+        return
     forward, backward = (_log_rate(build, laws.values()) for laws in (group.forward, group.backward))
     affinity = sum(n * mu[name] for name, n in group.change.items())
     _name(build, group.label, f"{group.title} (pair)", forward - backward, affinity)

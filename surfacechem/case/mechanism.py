@@ -8,12 +8,17 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from surfacechem import data, document
-from surfacechem.case.fields import items, mapping, text
+from surfacechem.case.fields import items, mapping, number, text
 from surfacechem.document import Tree
 from surfacechem.errors import suggestion
+from surfacechem.terms import Spec
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
+    from surfacechem.mechanism.neighbours import Neighbour
+
+PRESSURE = Spec("Pa", "pressure", above=0)
+FRACTION = Spec("1", "mole fraction", at_least=0, at_most=1)
 
 
 def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: bool) -> Mechanism | None:
@@ -23,33 +28,52 @@ def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: 
     """
     if tree is None:
         return None
-    file, phase, bonds = _choice(tree)
+    file, phase, bonds, neighbours = _choice(tree)
     if content is None:
         path = _find(file, Path(base), tree)
         document.read(path)
-        return _load(path, phase, bonds, tree, evaluate)
+        return _load(path, phase, bonds, tree, evaluate, neighbours)
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
         path.write_text(content, encoding="utf-8")
-        return _load(path, phase, bonds, tree, evaluate)
+        return _load(path, phase, bonds, tree, evaluate, neighbours)
 
 
-def _load(path: Path, phase: str | None, bonds: Sequence[str] | None, tree: Tree, evaluate: bool) -> Mechanism:
+def _load(
+    path: Path, phase: str | None, bonds: Sequence[str] | None, tree: Tree, evaluate: bool, beside: dict[str, Tree]
+) -> Mechanism:
     from surfacechem.mechanism import load_mechanism
 
-    return load_mechanism(path, phase, bonds, tree.place, evaluate)
+    neighbours = {name: _neighbour(child) for name, child in beside.items()}
+    return load_mechanism(path, phase, bonds, tree.place, evaluate, neighbours)
 
 
-def _choice(tree: Tree) -> tuple[str, str | None, Sequence[str] | None]:
-    """File, phase and names of the bonds."""
+def _neighbour(tree: Tree) -> Neighbour:
+    """The state in which a phase beside the surface is held."""
+    from surfacechem.mechanism.neighbours import Neighbour
+
+    fields = mapping(tree, ["pressure", "composition", "electric-potential"])
+    parts = mapping(fields.get("composition"))
+    volts = fields.get("electric-potential")
+    return Neighbour(
+        number(fields["pressure"], "Pa", "pressure", PRESSURE) if "pressure" in fields else None,
+        {name: number(child, "1", name, FRACTION) for name, child in parts.items()},
+        number(volts, "V", "electric-potential") if volts is not None else 0.0,
+        tree.place,
+    )
+
+
+def _choice(tree: Tree) -> tuple[str, str | None, Sequence[str] | None, dict[str, Tree]]:
+    """File, phase, names of the bonds and states of the neighbours."""
     if not isinstance(tree.value, dict):
-        return _with_suffix(text(tree, "the mechanism")), None, None
-    fields = mapping(tree, ["file", "phase", "bonds"])
+        return _with_suffix(text(tree, "the mechanism")), None, None, {}
+    fields = mapping(tree, ["file", "phase", "bonds", "neighbours"])
     if "file" not in fields:
         raise tree.error("the mechanism needs `file`: the name of a Cantera surface mechanism.")
     phase = text(fields["phase"], "the phase") if "phase" in fields else None
     bonds = [text(item, "a species") for item in items(fields["bonds"])] if "bonds" in fields else None
-    return _with_suffix(text(fields["file"], "the mechanism")), phase, bonds
+    file = _with_suffix(text(fields["file"], "the mechanism"))
+    return file, phase, bonds, mapping(fields.get("neighbours"))
 
 
 def _with_suffix(name: str) -> str:
@@ -60,5 +84,15 @@ def _find(name: str, base: Path, tree: Tree) -> Path:
     for folder in (base, data.mechanisms()):
         if document.is_file(folder / name):
             return folder / name
+    for folder in _of_cantera():
+        if document.is_file(folder / name):
+            return folder / name
     known = [path.stem for folder in (data.mechanisms(),) for path in folder.glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
+
+
+def _of_cantera() -> list[Path]:
+    """The folders in which Cantera itself looks for mechanisms."""
+    import cantera
+
+    return [Path(folder) for folder in cantera.get_data_directories() if folder != "."]

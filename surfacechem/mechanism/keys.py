@@ -9,7 +9,18 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
 from surfacechem.mechanism.dependence import MODEL, check_dependence
 from surfacechem.mechanism.kinds import kind_of, kinds, names
-from surfacechem.mechanism.rates import SurfaceReaction
+from surfacechem.mechanism.rates import InterfaceArrhenius, SurfaceReaction
+from surfacechem.mechanism.remedies import (
+    CHARGED,
+    LEAVE,
+    MODELS,
+    PRESSURE,
+    REMEDIES,
+    STICKING,
+    is_evaluated,
+    is_foreign,
+    needs_neighbour,
+)
 from surfacechem.mechanism.source import Source, chosen, sections, sides
 
 FILE = frozenset(
@@ -73,45 +84,8 @@ STATE = frozenset(("T", "P", "coverages"))
 WRITTEN_SPECIES, WRITTEN_STATE = frozenset(("size", "charge")), frozenset(("X", "Y"))
 """Keys that Cantera writes beside those that it documents; the state of a file is not used."""
 
-REMEDIES = {
-    "adjacent-phases": "bulk and gas neighbours are not part of the compiled path; write all species into one surface "
-    "phase.",
-    "reference-state-coverage": "it belongs to `thermo: coverage-dependent-surface`.",
-    "sticking-coefficient": "a sticking reaction needs a gas; give a `rate-constant` instead.",
-    "Motz-Wise": "this correction is for sticking reactions, which need a gas; remove it.",
-    "sticking-species": "a sticking reaction needs a gas; give a `rate-constant` instead.",
-    "beta": "charge transfer needs an electric potential; give a plain `rate-constant` instead.",
-    "exchange-current-density-formulation": "charge transfer needs an electric potential; give a plain "
-    "`rate-constant` instead.",
-    "efficiencies": "third bodies belong to gases; remove it.",
-    "default-efficiency": "third bodies belong to gases; remove it.",
-    "explicit-third-body-duplicates": "third bodies belong to gases; remove it.",
-    "skip-undeclared-elements": "species would vanish without a word; write down their elements instead.",
-    "skip-undeclared-third-bodies": "third bodies belong to gases; remove it.",
-    "negative-A": "a negative rate goes on where nothing is left to react; use a positive `A`.",
-    "equation-of-state": "a surface species has no volume; remove it.",
-    "critical-parameters": "a surface species has no critical point; remove it.",
-}
-"""What Cantera knows and the compiled path does not, with the way out."""
-
-LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."
-"""The way out for a rate type that is not lowered."""
-
-MODELS = {
-    "edge": "a contact line has rates per length; write the reactions on a surface.",
-}
-"""Phase models that are not plain surfaces, with the way out."""
-
-
-NEIGHBOURS = {
-    "sticking": "a sticking reaction needs a gas beside the surface; give a `rate-constant` instead, the impingement "
-    "rate of a gas at constant pressure included.",
-    "electrochemical": "charge transfer needs an electric potential; give a plain `rate-constant` instead.",
-}
-"""Rate types, by how they begin, of surfaces with neighbours, which a case does not have, with the way out."""
-
-PRESSURE = ("three-body", "falloff", "chemically-activated", "pressure-dependent-Arrhenius", "Chebyshev")
-"""Rate types of gases."""
+BESIDE = frozenset(("adjacent-phases", "skip-undeclared-elements", "Motz-Wise"))
+"""Keys of a phase with neighbours; all elements of its species have to be declared in any case."""
 
 
 def check(source: Source, phase: Any, evaluate: bool = False) -> None:
@@ -119,22 +93,28 @@ def check(source: Source, phase: Any, evaluate: bool = False) -> None:
 
     With ``evaluate`` reactions of other types are left to Cantera.
     """
+    beside = evaluate and has_neighbours(phase)
     _check_file(source)
-    _check_phase(source, phase)
+    _check_phase(source, phase, BESIDE if beside else frozenset())
     entries = list(source.species(phase))
-    for entry in entries:
+    names = _names(source, phase, entries)
+    own = [entry for entry in entries if entry.get("name") in names]
+    for entry in own if beside else entries:
         _check_species(source, entry)
         _check_composition(source, phase, entry)
-    names = _names(source, phase, entries)
-    for entry in entries:
-        if entry.get("name") in names:
-            check_dependence(source, phase, entry, names)
+    for entry in own:
+        check_dependence(source, phase, entry, names)
     _check_state(source, phase, names)
     for entry in source.reactions(phase):
-        if evaluate and is_foreign(entry):
-            _check_equation(source, phase, entry, names, f"reaction {entry['equation']}")
+        if evaluate and is_evaluated(entry, names, beside):
+            _check_evaluated(source, phase, entry, names, beside)
         else:
             _check_reaction(source, phase, entry, names)
+
+
+def has_neighbours(phase: Any) -> bool:
+    """Whether a surface phase has others beside it."""
+    return bool(phase.get("adjacent-phases"))
 
 
 def _check_file(source: Source) -> None:
@@ -148,12 +128,14 @@ def _check_file(source: Source) -> None:
     values.check_units(source, source.data)
 
 
-def _check_phase(source: Source, phase: Any) -> None:
+def _check_phase(source: Source, phase: Any, more: frozenset[str]) -> None:
     title = f"phase {phase.get('name')}"
     model = str(phase.get("thermo"))
-    _keys(source, phase, PHASE | ({"reference-state-coverage"} if model == MODEL else set()), title)
+    if model in MODELS:
+        raise InputError(f"{title}: thermo '{model}' is not lowered: {MODELS[model]}", source.place(phase, "thermo"))
+    _keys(source, phase, PHASE | more | ({"reference-state-coverage"} if model == MODEL else set()), title)
     if model not in ("ideal-surface", MODEL):
-        message = f"{title}: thermo '{model}' is not lowered: {MODELS.get(model, 'use `ideal-surface`.')}"
+        message = f"{title}: thermo '{model}' is not lowered: use `ideal-surface`."
         raise InputError(message, source.place(phase, "thermo"))
     if phase.get("kinetics", "surface") != "surface":
         message = f"{title}: kinetics '{phase['kinetics']}' is not lowered; use `kinetics: surface`."
@@ -241,15 +223,21 @@ def _check_reaction(source: Source, phase: Any, entry: Any, names: list[str]) ->
     _check_rate(source, entry, law, [] if left_out else names, title)
 
 
-def is_foreign(entry: Any) -> bool:
-    """Whether a reaction is of a type that is not known here, but may be one of Cantera's or of another extension."""
-    kind = str(entry.get("type", "Arrhenius"))
-    return "equation" in entry and kind_of(kind) is None and kind not in PRESSURE and not _neighbour(kind)
-
-
-def _neighbour(kind: str) -> str:
-    """Why a rate type needs a neighbour, and the way out; empty where it needs none."""
-    return next((text for start, text in NEIGHBOURS.items() if kind.startswith(start)), "")
+def _check_evaluated(source: Source, phase: Any, entry: Any, names: list[str], beside: bool) -> None:
+    """What Cantera would ignore in a reaction that it evaluates; what another extension reads is its own affair."""
+    title = f"reaction {entry['equation']}"
+    law = kind_of(str(entry.get("type", "Arrhenius")))
+    if law is not None and not law.native:
+        message = f"{title}: a rate of type '{entry['type']}' belongs to surface species; this one has a neighbour's."
+        raise InputError(message, source.place(entry, "type"))
+    if not is_foreign(entry):
+        inner = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
+        _keys(source, entry, {*REACTION, *inner}, title)
+        for key, known in inner.items():
+            if key != "coverage-dependencies" and known and isinstance(entry.get(key), Mapping):
+                _keys(source, entry[key], known, f"{title}: {key}")
+        _check_coverages(source, entry, inner["coverage-dependencies"], names, title)
+    _check_equation(source, phase, entry, [] if beside else names, title)
 
 
 def _own(law: type[SurfaceReaction]) -> set[str]:
@@ -263,8 +251,8 @@ def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
     if kind in PRESSURE:
         message = f"{title}: rate type '{kind}' depends on pressure, which belongs to gases; give a `rate-constant`."
         raise InputError(message, source.place(entry, "type"))
-    if _neighbour(kind):
-        raise InputError(f"{title}: rate type '{kind}': {_neighbour(kind)}", source.place(entry, "type"))
+    if needs_neighbour(kind):
+        raise InputError(f"{title}: rate type '{kind}': {needs_neighbour(kind)}", source.place(entry, "type"))
     law = kind_of(kind)
     if law is None:
         message = f"{title}: rate type '{kind}' is not lowered.{suggestion(kind, names())} {LEAVE}"
@@ -273,7 +261,7 @@ def _law(source: Source, entry: Any, title: str) -> type[SurfaceReaction]:
 
 
 def _check_equation(source: Source, phase: Any, entry: Any, names: list[str], title: str) -> bool:
-    """Whether the reaction is left out, because the phase takes only those of its own species."""
+    """Whether the reaction is left out, because the phase takes only those of its own species; all are in ``names``."""
     reactants, products, _ = sides(str(entry["equation"]))
     place = source.place(entry, "equation")
     for name in (*reactants, *products):
@@ -281,7 +269,7 @@ def _check_equation(source: Source, phase: Any, entry: Any, names: list[str], ti
             raise InputError(f"{title}: third bodies belong to gases; remove '{name}'.", place)
     if not reactants or not products:
         raise InputError(f"{title}: an equation has two sides with `<=>` or `=>` between them.", place)
-    unknown = [name for name in (*reactants, *products) if name not in names]
+    unknown = [name for name in (*reactants, *products) if names and name not in names]
     if unknown and phase.get("reactions", "all") == "declared-species":
         return True
     if unknown:

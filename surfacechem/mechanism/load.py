@@ -13,16 +13,20 @@ from typing import Any
 from surfacechem import data
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.dependence import interactions
-from surfacechem.mechanism.evaluated import EvaluatedReaction, SurfaceEngine
+from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
 from surfacechem.mechanism.fields import rate_fields, spring
-from surfacechem.mechanism.keys import check, is_foreign
+from surfacechem.mechanism.keys import check, has_neighbours
 from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
+from surfacechem.mechanism.neighbours import Neighbour, hold, remarks
 from surfacechem.mechanism.rates import KILO, plain
+from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import Source, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.terms import Potential, RateLaw
+
+NONE: Mapping[str, Neighbour] = {}
 
 SUM_TOLERANCE = 1e-9
 """How far initial coverages may miss one."""
@@ -68,18 +72,21 @@ def load_mechanism(
     bonds: Sequence[str] | None = None,
     place: Place | None = None,
     evaluate: bool = False,
+    neighbours: Mapping[str, Neighbour] = NONE,
 ) -> Mechanism:
     """Read one surface phase of a Cantera mechanism.
 
     ``phase`` may be left out where the file has one; ``bonds`` names the species that count as bonds. ``place`` is
-    where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` rate
-    types that are not lowered are left to Cantera, which gives their rates while a scene runs.
+    where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what is
+    not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which the
+    phases beside the surface are held.
     """
     path = _find(Path(path), place)
     source = Source(str(path), path.read_text(encoding="utf-8"))
     entry = source.phase(phase, place)
     check(source, entry, evaluate)
-    surface, remarks = _cantera(source, entry)
+    surface, said = _cantera(source, entry)
+    hold(surface, neighbours, place)
     species = _species(surface, source, entry)
     chosen = _bonds(species, bonds, place)
     density = surface.site_density * KILO * AVOGADRO
@@ -99,7 +106,7 @@ def load_mechanism(
         phase=str(entry["name"]),
         temperatures=temperatures,
         engine=_engine(surface, species, reactions),
-        remarks=remarks,
+        remarks=(*said, *remarks(surface)),
     )
 
 
@@ -214,18 +221,19 @@ def _law_place(source: Source, node: Any, path: str) -> Place:
 
 
 def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species, ...]) -> tuple[RateLaw, ...]:
-    entries = _kept(source, phase, species)
-    paired = zip(surface.reactions(), entries, strict=True)
-    return tuple(
-        _reaction(reaction, source, entry, f"R{number}", species)
-        for number, (reaction, entry) in enumerate(paired, start=1)
-    )
+    beside = has_neighbours(phase)
+    own = [item.name for item in species]
+    paired = zip(surface.reactions(), _kept(source, phase, surface.kinetics_species_names), strict=True)
+    found: list[RateLaw] = []
+    for number, (reaction, entry) in enumerate(paired, start=1):
+        make = _evaluated if is_evaluated(entry, own, beside) or reaction.rate.uses_electrochemistry else _lowered
+        found.append(make(reaction, source, entry, f"R{number}", species))
+    return tuple(found)
 
 
-def _kept(source: Source, phase: Any, species: tuple[Species, ...]) -> list[Any]:
+def _kept(source: Source, phase: Any, known: Iterable[str]) -> list[Any]:
     """The entries that Cantera keeps: with `reactions: declared-species` those of other species are left out."""
-    known = {item.name for item in species}
-    return [entry for entry in source.reactions(phase) if _species_of(entry) <= known]
+    return [entry for entry in source.reactions(phase) if _species_of(entry) <= set(known)]
 
 
 def _species_of(entry: Any) -> set[str]:
@@ -233,16 +241,26 @@ def _species_of(entry: Any) -> set[str]:
     return {*reactants, *products}
 
 
-def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
+def _evaluated(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
+    """The law of a reaction whose rate only Cantera can say."""
+    place = _law_place(source, entry, f"mechanism.{number}")
+    names = dict.fromkeys((*reaction.reactants, *reaction.products))
+    whole = _change(reaction, {name: name for name in names})
+    change = {s.variable: whole[s.name] for s in species if s.name in whole}
+    elastic = [s.name for s in species if s.name in whole and s.spring is not None]
+    if reaction.reversible and elastic:
+        message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
+        raise InputError(f"{message}does not know. Write two one-way reactions.", place)
+    given: dict[str, Any] = {"whole": whole, "reversible": bool(reaction.reversible), "value": 0.0, "place": place}
+    if len(change) == len(whole):
+        return EvaluatedReaction(number=number, equation=reaction.equation, change=change, **given)
+    return NeighbourReaction(number=number, equation=reaction.equation, change=change, enthalpy=0.0, gibbs=0.0, **given)
+
+
+def _lowered(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
+    """The law of a reaction as a formula."""
     place = _law_place(source, entry, f"mechanism.{number}")
     variables = {item.name: item.variable for item in species}
-    if is_foreign(entry):
-        change = _change(reaction, variables)
-        elastic = [s.name for s in species if change.get(s.variable) and s.spring is not None]
-        if reaction.reversible and elastic:
-            message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
-            raise InputError(f"{message}does not know. Write two one-way reactions.", place)
-        return EvaluatedReaction(number=number, equation=reaction.equation, change=change, value=0.0, place=place)
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:
         message = f"reaction {reaction.equation}: rate type '{reaction.rate.type}' is not lowered."
@@ -267,9 +285,6 @@ def _reaction(reaction: Any, source: Source, entry: Any, number: str, species: t
 def _check_reaction(reaction: Any, orders: Mapping[str, float], place: Place) -> None:
     if any(order < 0 for order in orders.values()):
         message = f"reaction {reaction.equation}: a negative order is infinite where the coverage vanishes; remove it."
-        raise InputError(message, place)
-    if reaction.rate.uses_electrochemistry:
-        message = f"reaction {reaction.equation}: charge transfer is not lowered; give the species no net charge."
         raise InputError(message, place)
 
 

@@ -55,12 +55,13 @@ class Evaluation:
             self.guess = self.y[self._algebraic]
         return found
 
-    def hold(self, t: float, y: Array, ydot: Array) -> None:
-        """Go to a state that is known."""
+    def hold(self, t: float, y: Array, ydot: Array, whole: bool = True) -> None:
+        """Go to a state that is known, with the parameters that come from outside if the whole of it is asked for."""
         self.inputs[0] = t
         self.y[:] = y
         self.ydot[:] = ydot
-        self.program.filled(self.inputs)
+        if whole:
+            self.program.filled(self.inputs)
 
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""

@@ -8,14 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solvers.evaluation import Evaluation
+from surfacechem.solvers.step_ledger import NODES, StepLedger
 
 POINTS = 16
-
 
 LONGEST_FIRST = 1e3
 """First change of a state that its rate may predict, in units of the state."""
@@ -63,7 +64,7 @@ class View:
         return self.evaluation.ledger()
 
     def margins(self, t: float, y: Array, ydot: Array) -> Array:
-        self.evaluation.hold(t, y, ydot)
+        self.evaluation.hold(t, y, ydot, whole=not self.problem.program.plain_margins)
         return self.evaluation.margins()
 
     def matrices(self, t: float, y: Array, ydot: Array) -> tuple[Array, Array]:
@@ -97,30 +98,6 @@ class Method(ABC):
     def rejected(self) -> int:
         """Steps rejected so far, for a solver that counts them."""
         return 0
-
-
-NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.64261575824032258, 0.88252766196473235, 1.0])
-"""Gauss-Lobatto points of a step: the polynomials of the libraries have order five at most."""
-
-TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
-"""From values at the nodes to the coefficients of the integral of their polynomial."""
-
-
-class StepLedger:
-    """The ledger along a step, from its rates at the nodes.
-
-    Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
-    state at rest, which needs no steps, may do work all the same.
-    """
-
-    def __init__(self, start: float, size: float, ledger: Array, rates: Array) -> None:
-        self.start, self.size, self.ledger = start, size, ledger
-        self.coefficients = TO_POWERS @ rates * size
-
-    def at(self, t: float) -> Array:
-        """The ledger at a time within the step."""
-        part = (t - self.start) / self.size
-        return np.asarray(self.ledger + part ** np.arange(1.0, len(NODES) + 1) @ self.coefficients)
 
 
 @dataclass
@@ -280,18 +257,19 @@ class SteppingSolver(Solver):
             raise StepError("the first step is longer than the layer it starts in")
 
     def _margins(self, view: View, method: Method, t: float) -> Array:
+        program = view.problem.program
+        if program.plain_margins and not program.algebraic_mask.any():
+            y = method.at(t)
+            return view.margins(t, y, np.zeros_like(y))
         y, ydot = self._state(view, method, t)
         return view.margins(t, y, ydot)
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
         low = progress.t
+        directions = np.array([margin.direction for margin in view.problem.margins])
         for t in np.linspace(progress.t, reached, POINTS + 1)[1:].tolist():
             values = self._margins(view, method, t)
-            crossing = [
-                i
-                for i, kind in enumerate(view.problem.margins)
-                if _crosses(progress.sides[i], values[i], kind.direction)
-            ]
+            crossing = np.flatnonzero(_crosses(progress.sides, values, directions)).tolist()
             if crossing:
                 zeros = {i: _zero(lambda s, i=i: float(self._margins(view, method, s)[i]), low, t) for i in crossing}  # type: ignore[misc]
                 first = min(zeros.values())
@@ -321,8 +299,10 @@ def _start_tables(progress: Progress) -> None:
         progress.steps.append((progress.t, progress.y, progress.ydot, progress.ledger))
 
 
-def _crosses(side: float, value: float, direction: int) -> bool:
-    return (side > 0.0 >= value and direction <= 0) or (side < 0.0 <= value and direction >= 0)
+def _crosses(sides: Array, values: Array, directions: Array) -> NDArray[np.bool_]:
+    """Which margins have changed their side, in a direction that counts."""
+    falls = (sides > 0) & (values <= 0) & (directions <= 0)
+    return falls | ((sides < 0) & (values >= 0) & (directions >= 0))
 
 
 def _zero(margin: Callable[[float], float], low: float, high: float) -> float:
