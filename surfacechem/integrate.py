@@ -218,9 +218,13 @@ class Model:
         scales = np.array([state.scale for state in system.states])
         parameters = self._segment_parameters(segments[:-1], run, values)
         self._start_modes(parameters, values)
+        start = self._start(np.array(list(initial.values())), parameters)
+        if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
+            settled = {parameter.path: value for parameter, value in zip(system.parameters, parameters[0], strict=True)}
+            check_start(system, {**values, **settled}, dict(zip(initial, start.tolist(), strict=True)))
         return Problem(
             program=self.program,
-            y0=self._start(np.array(list(initial.values())), parameters),
+            y0=start,
             times=np.asarray(run.times, dtype=float),
             segments=segments,
             parameters=parameters,

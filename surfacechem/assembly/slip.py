@@ -283,9 +283,9 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
     stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
-    build.transitions.append(
-        Transition("stop", where(slip**2 > 0, slip * v, 1), "sliding comes to a stop", {slip: onward}, stop)
-    )
+    # What nothing rubs on has nothing to stop at: its velocity may fade to rounding without an end.
+    stops = where(slip**2 > 0, where(limit > 0, slip * v, 1), 1)
+    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop))
 
 
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
