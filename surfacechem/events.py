@@ -196,6 +196,8 @@ class Hybrid:
 
     def _settled(self, point: Point) -> Point | None:
         """The point after all transitions that are due at its own time."""
+        if self.problem.program.margins is None:
+            return point
         while not self._chatters(point.t) or self._hold(point):
             now = self._margins(point)
             if self._ended(now):

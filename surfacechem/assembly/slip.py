@@ -23,6 +23,8 @@ from surfacechem.terms import Friction, reads
 
 NONE = symengine.Integer(0)
 PLACE = Place(path="mechanics.tangential")
+CREEP = 1e-25
+"""Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
@@ -91,7 +93,9 @@ def _modes(build: Build, kind: Kind) -> None:
 def _state(build: Build, name: str, *, algebraic: bool = False) -> Expression:
     symbol, dot = symengine.symbols(f"{name} d{name}_dt")
     start = build.scene.initial.get(name, 0.0)
-    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic))
+    creeps = name == "v" and any(law.internal for law in build.interface.frictions)
+    finest = CREEP if creeps else None
+    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic, finest=finest))
     return symbol
 
 
