@@ -132,7 +132,7 @@ class Jumper:
         return {}
 
     def make(self, index: int, before: Point, since: float, noise: float = 0.0) -> Jump:
-        """Carry out a transition; ``since`` is the time since the one before [s], ``noise`` what its margin rounds to."""
+        """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to."""
         item = self.system.transitions[index]
         values = self._maps[index](before.inputs())
         n = len(before.y)
@@ -164,7 +164,7 @@ class Jumper:
         )
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, noise: float) -> Point | None:
-        """The modes that a transition sets hold while rounding alone says on which side of zero its measure has come."""
+        """The modes that a transition sets hold while its measure is zero but for rounding."""
         if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > noise:
             return after
         return replace(after, parameters=parameters)
