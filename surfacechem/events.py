@@ -196,6 +196,8 @@ class Hybrid:
 
     def _settled(self, point: Point) -> Point | None:
         """The point after all transitions that are due at its own time."""
+        if self.problem.program.margins is None:
+            return point
         while not self._chatters(point.t) or self._hold(point):
             now = self._margins(point)
             if self._ended(now):
@@ -289,7 +291,8 @@ class Hybrid:
 
     def _jump(self, index: int, point: Point) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
-        jump = self.jumper.make(index, point, self._since(point.t))
+        noise = NOISE * float(self.largest[self.first + index])
+        jump = self.jumper.make(index, point, self._since(point.t), noise)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict

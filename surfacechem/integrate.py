@@ -173,7 +173,7 @@ class Model:
             chains=[Chain(*chain) for chain in system.chains],
             groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
         )
-        self.jumper = Jumper(system) if system.transitions else None
+        self.jumper = Jumper(system) if system.in_stretches else None
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
@@ -219,12 +219,16 @@ class Model:
         check_start(system, values, initial)
         end = run.times[-1]
         segments = self._segments(end, values)
-        scales = np.array([state.scale for state in system.states])
+        scales = np.array([state.finest or state.scale for state in system.states])
         parameters = self._segment_parameters(segments[:-1], run, values)
         self._start_modes(parameters, values)
+        start = self._start(np.array(list(initial.values())), parameters)
+        if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
+            settled = {parameter.path: value for parameter, value in zip(system.parameters, parameters[0], strict=True)}
+            check_start(system, {**values, **settled}, dict(zip(initial, start.tolist(), strict=True)))
         return Problem(
             program=self.program,
-            y0=self._start(np.array(list(initial.values())), parameters),
+            y0=start,
             times=np.asarray(run.times, dtype=float),
             segments=segments,
             parameters=parameters,

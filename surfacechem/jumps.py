@@ -23,6 +23,7 @@ ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible
 
 NO_REST = "no gap follows at which the tractions are in equilibrium; with a mass or a damper it would move on"
 NO_HEAT = "it would take more heat than there is"
+NO_ENERGY = "the energy of the interface is not finite after it"
 
 ROUNDING = 1e-12
 """Entropy that counts as none, relative to the entropies that change."""
@@ -130,14 +131,16 @@ class Jumper:
     def _sink_functions(self) -> dict[str, Function]:
         return {}
 
-    def make(self, index: int, before: Point, since: float) -> Jump:
-        """Carry out a transition; ``since`` is the time since the one before [s]."""
+    def make(self, index: int, before: Point, since: float, noise: float = 0.0) -> Jump:
+        """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to."""
         item = self.system.transitions[index]
         values = self._maps[index](before.inputs())
         n = len(before.y)
         parameters = before.parameters.copy()
         parameters[self.mode_columns] = values[n:]
         start = Point(before.t, values[:n], np.zeros(n), parameters)
+        if not np.isfinite(self._books(start.inputs())[0]):
+            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
         books = self._books(before.inputs())
         energy = float(books[0])
         after: Point | None = start
@@ -149,7 +152,7 @@ class Jumper:
             if item.fold is not None:
                 before, after = self.equilibria.let_go(index, before, parameters, heat)
             else:
-                after = self.equilibria.settle(start, heat)
+                after = self._kept(item, self.equilibria.settle(start, heat), parameters, noise)
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             obstacle = NO_REST if after is None else NO_HEAT
@@ -159,6 +162,12 @@ class Jumper:
             Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),
             books,
         )
+
+    def _kept(self, item: Transition, after: Point | None, parameters: Array, noise: float) -> Point | None:
+        """The modes that a transition sets hold while its measure is zero but for rounding."""
+        if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > noise:
+            return after
+        return replace(after, parameters=parameters)
 
     def _judged(self, jump: Jump, books: Array) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
@@ -198,9 +207,10 @@ class Jumper:
         sinks, function = self.system.sinks[kind], self._sink_function(kind)
         free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(sinks) if not s.prescribed]
         values = function(rows)
-        released = energy - values[:, 0]
         now = values[:, 1:].reshape(len(rows), -1, 4)
-        target = now[:, :, 2] + now[:, :, 1] * released[:, None]
+        with np.errstate(invalid="ignore", over="ignore"):  # far away from where it begins a search may see no number
+            released = energy - values[:, 0]
+            target = now[:, :, 2] + now[:, :, 1] * released[:, None]
         rows = rows.copy()
         for _ in range(NEWTON if free else 0):
             done = True

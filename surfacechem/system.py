@@ -65,6 +65,8 @@ class State:
     algebraic: bool
     start: str = ""
     """Whose initial value it takes, where not its own."""
+    finest: float | None = None
+    """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
 
     @property
     def name(self) -> str:
@@ -360,6 +362,11 @@ class System:
         """The margins that change in the course of a run."""
         moving = {self.t, *(x for state in self.states for x in (state.symbol, state.dot))}
         return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving)
+
+    @property
+    def in_stretches(self) -> bool:
+        """Whether a run is made of stretches, each in a time of its own."""
+        return any(parameter.path == START for parameter in self.parameters)
 
     @property
     def jump_energy(self) -> Expression:

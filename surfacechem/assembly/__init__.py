@@ -77,7 +77,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
-    if build.transitions:
+    if build.transitions or any(state.finest for state in build.states):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}

@@ -23,6 +23,8 @@ from surfacechem.terms import Friction, reads
 
 NONE = symengine.Integer(0)
 PLACE = Place(path="mechanics.tangential")
+CREEP = 1e-25
+"""Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
@@ -91,7 +93,9 @@ def _modes(build: Build, kind: Kind) -> None:
 def _state(build: Build, name: str, *, algebraic: bool = False) -> Expression:
     symbol, dot = symengine.symbols(f"{name} d{name}_dt")
     start = build.scene.initial.get(name, 0.0)
-    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic))
+    creeps = name == "v" and any(law.internal for law in build.interface.frictions)
+    finest = CREEP if creeps else None
+    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic, finest=finest))
     return symbol
 
 
@@ -283,9 +287,9 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
     stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
-    build.transitions.append(
-        Transition("stop", where(slip**2 > 0, slip * v, 1), "sliding comes to a stop", {slip: onward}, stop)
-    )
+    # What nothing rubs on has nothing to stop at: its velocity may fade to rounding without an end.
+    stops = where(slip**2 > 0, where(limit > 0, slip * v, 1), 1)
+    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop))
 
 
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from surfacechem.expressions import FRACTION_FLOOR, Expression, is_symbolic, log, log_fraction, log_sum, where
+from surfacechem.expressions import FRACTION_FLOOR, Expression, is_symbolic, log, log_fraction, log_sum, power, where
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import RateFactor, RateLaw, Varying, parameter
 
@@ -137,7 +137,7 @@ class DudkoFactor(RateFactor):
         """Logarithm of the factor."""
         height = self.barrier / (BOLTZMANN * T_c)
         tilt = 1 - self.nu * f * self.x_beta / self.barrier
-        lowest = ((1 - self.nu) / height) ** self.nu + FRACTION_FLOOR
+        lowest = power((1 - self.nu) / height, self.nu) + FRACTION_FLOOR
         s = where(tilt > lowest, tilt, lowest)
         return (1 / self.nu - 1) * log(s) + height * (1 - s ** (1 / self.nu))
 
