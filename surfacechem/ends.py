@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Program
-from surfacechem.solvers.contract import Points, Result, Status
-from surfacechem.system import Margin, State
+from surfacechem.pacing import too_fast
+from surfacechem.solvers.contract import REASONS, Points, Result, Status
+from surfacechem.system import Margin, State, System
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,28 @@ BOUNDLESS = 1e12
 
 SMALL = 1e-6
 """Size of a state that is none, in units of its scale."""
+
+
+def cause(
+    system: System, program: Program, margins: Sequence[Margin], result: Result, values: Mapping[str, float]
+) -> tuple[str, str]:
+    """Status of a run that could not go on, and why, in words."""
+    where = f"t = {result.t:.9g} s"
+    shrunk = closest_margin(program, margins, result)
+    if shrunk is not None:
+        return "stopped", f"{shrunk} near {where}"
+    algebraic = [state for state in system.states if state.algebraic]
+    if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
+        names = " and ".join(state.name for state in algebraic)
+        reason = f"no {names} satisfies the balances that have no inertia or capacity"
+        if all(state.quantity.unit == "K" for state in algebraic):
+            reason = f"ignition: no temperature {names} balances the heat that the interface produces"
+        elif any(state.quantity.unit == "K" for state in algebraic):
+            reason += ": ignition, or sliding that nothing steadies"
+        return "stopped", f"{reason} at {where}"
+    if (fast := runaway(system.states, result)) is not None:
+        return "stopped", f"{fast} near {where}"
+    return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
 
 
 def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem import pieces
 from surfacechem.compile import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
-from surfacechem.ends import closest_margin, runaway
+from surfacechem.ends import cause
 from surfacechem.equilibria import Equilibria, Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
-from surfacechem.pacing import too_fast
 from surfacechem.preparing import PREPARING
 from surfacechem.solvers import ASKING, AUTO, solver
-from surfacechem.solvers.contract import REASONS, Margin, Problem, Result, Solver, Status
+from surfacechem.solvers.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
@@ -47,13 +46,6 @@ ABSOLUTE = 1e-6
 
 STATE = Spec("", "initial value")
 """Initial values need only be finite here; margins say where they may be."""
-
-PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
-"""Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
-which it is left to the steps."""
-
-STRAY, LARGEST_SLACK = 1e3, 1e-3
-"""How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
 
 
 @dataclass(frozen=True)
@@ -204,13 +196,7 @@ class Model:
         return values
 
     def _segments(self, end: float, values: Mapping[str, float]) -> Array:
-        """Pieces of time: between breakpoints, and parts of the period of a load where the state may be at rest."""
-        inside = [t for t in self.system.breakpoints if 0 < t < end]
-        for path in self.system.cycles:
-            count = math.floor(PARTS_OF_A_PERIOD * values[path] * end)
-            if count <= MOST_PARTS:
-                inside += [k / (PARTS_OF_A_PERIOD * values[path]) for k in range(1, count + 1)]
-        return np.unique([0.0, *(t for t in inside if t < end), end])
+        return pieces.segments(self.system, end, values)
 
     def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible."""
@@ -220,8 +206,8 @@ class Model:
         end = run.times[-1]
         segments = self._segments(end, values)
         scales = np.array([state.finest or state.scale for state in system.states])
-        parameters = self._segment_parameters(segments[:-1], run, values)
-        self._start_modes(parameters, values)
+        parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
+        pieces.start_modes(system, parameters, values)
         start = self._start(np.array(list(initial.values())), parameters)
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
             settled = {parameter.path: value for parameter, value in zip(system.parameters, parameters[0], strict=True)}
@@ -240,16 +226,6 @@ class Model:
             record_steps=True,
         )
 
-    def _start_modes(self, parameters: Array, values: Mapping[str, float]) -> None:
-        """Modes that follow from the initial state."""
-        symbols = [p.symbol for p in self.system.parameters]
-        initial = {state.symbol: values[state.path] for state in self.system.states}
-        initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {self.system.t: 0}
-        for mode in self.system.modes:
-            if mode.start is not None:
-                start = float(self.system.expand(mode.start).subs(initial))
-                parameters[:, symbols.index(mode.symbol)] = start
-
     def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.system.equilibria:
@@ -261,17 +237,6 @@ class Model:
             y = settled.y
             table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
         return stable_start(self.system, self.program, y, table[0])
-
-    def _segment_parameters(self, starts: Array, run: Run, values: Mapping[str, float]) -> Array:
-        rows = np.empty((len(starts), len(self.system.parameters)))
-        for j, parameter in enumerate(self.system.parameters):
-            if parameter.load is not None:
-                rows[:, j] = [parameter.at(float(start)) for start in starts]
-            elif parameter.path == "run.slack":
-                rows[:, j] = min(max(values[parameter.path], STRAY * run.rtol), LARGEST_SLACK)
-            else:
-                rows[:, j] = values[parameter.path]
-        return rows
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
@@ -361,21 +326,7 @@ class Model:
             fitted = fit is not None and margin.name == fit.margin
             why = fit.reason(values, self._visited(result, fit.temperature)[-1]) if fit and fitted else margin.reason
             return "stopped", f"{why} at {where}"
-        shrunk = closest_margin(self.program, self.margins, result)
-        if shrunk is not None:
-            return "stopped", f"{shrunk} near {where}"
-        algebraic = [state for state in self.system.states if state.algebraic]
-        if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
-            names = " and ".join(state.name for state in algebraic)
-            reason = f"no {names} satisfies the balances that have no inertia or capacity"
-            if all(state.quantity.unit == "K" for state in algebraic):
-                reason = f"ignition: no temperature {names} balances the heat that the interface produces"
-            elif any(state.quantity.unit == "K" for state in algebraic):
-                reason += ": ignition, or sliding that nothing steadies"
-            return "stopped", f"{reason} at {where}"
-        if (fast := runaway(self.system.states, result)) is not None:
-            return "stopped", f"{fast} near {where}"
-        return "failed", f"{REASONS[result.status]} at {where}{too_fast(self.system, result, values)}"
+        return cause(self.system, self.program, self.margins, result, values)
 
     def evaluate(
         self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None

@@ -36,6 +36,7 @@ FLOORS = {
         "stalls",
         "events",
         "pacing",
+        "pieces",
         "starting",
         "ends",
         "integrate",
