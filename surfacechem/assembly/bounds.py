@@ -56,8 +56,9 @@ def free_to_react(build: Build, rate: Expression) -> Expression:
         return symengine.Integer(1)
     words = {value: text for value, text in HELD_AT.items() if value == 0 or value in sides}
     held = build.mode("held", 0.0, words)
-    for bound in (_lower(build, rate), _upper(build, rate)):
-        if bound.side in sides:
+    for side, made in ((-1, _lower), (1, _upper)):
+        if side in sides:
+            bound = made(build, rate)
             _hold(build, held, bound)
             _let_go(build, held, bound)
     return 1 - held**2
