@@ -41,6 +41,6 @@ class ConductanceTable(HeatTransfer):
         """The ends of a table that is not extrapolated."""
         return self.ranges if self.extrapolation == "refuse" else {}
 
-    def interpolated(self, x: Expression) -> Expression:
+    def _interpolated(self, x: Expression) -> Expression:
         """The conductance at a value of the variable [W/(m^2 K)]."""
         return Curve(self._at, self.conductances).value(x, linear=self.extrapolation == "linear")

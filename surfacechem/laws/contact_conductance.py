@@ -209,4 +209,4 @@ class PressureTable(ConductanceTable):
 
     def conductance(self, p: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
-        return self.interpolated(p)
+        return self._interpolated(p)

@@ -115,4 +115,4 @@ class GapTable(ConductanceTable):
 
     def conductance(self, g_n: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
-        return self.interpolated(g_n)
+        return self._interpolated(g_n)
