@@ -44,8 +44,8 @@ OWN = "radau"
 ABSOLUTE = 1e-6
 """Default absolute tolerance of a state, relative to rtol times its scale."""
 
-STATE = Spec("", "initial value")
-"""Initial values need only be finite here; margins say where they may be."""
+STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
+"""Initial values need only be finite here, and have a logarithm where that is the state; margins say the rest."""
 
 
 @dataclass(frozen=True)
@@ -184,14 +184,14 @@ class Model:
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
-        values |= {state.path: state.initial for state in self.system.states}
-        fixed = {parameter.path for parameter in self.system.parameters if not parameter.changeable}
-        fixed |= set(self.system.outside.engine.gives) if self.system.outside else set()
-        specs = {parameter.path: parameter.spec for parameter in self.system.parameters}
+        values |= {state.path: state.at_start[1] for state in self.system.states}
+        specs = {state.path: POSITIVE if state.given else STATE for state in self.system.states}
+        specs |= {parameter.path: parameter.spec for parameter in self.system.parameters}
+        known = self.system.changeable if changes else {}
         for path, value in (changes or {}).items():
-            if path not in values or path in fixed:
-                raise InputError(f"no parameter '{path}' to change.{suggestion(path, set(values) - fixed)}")
-            specs.get(path, STATE).check(path, float(value))
+            if path not in known:
+                raise InputError(f"no parameter '{path}' to change.{suggestion(path, known)}")
+            specs[path].check(path, float(value))
             values[path] = float(value)
         return values
 
@@ -201,7 +201,7 @@ class Model:
     def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible."""
         system = self.system
-        initial = {state.name: values[state.path] for state in system.states}
+        initial = {state.name: state.from_given(values) for state in system.states}
         check_start(system, values, initial)
         end = run.times[-1]
         segments = self._segments(end, values)

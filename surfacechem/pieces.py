@@ -46,7 +46,7 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
     """Modes that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
-    initial = {state.symbol: values[state.path] for state in system.states}
+    initial = {state.symbol: state.from_given(values) for state in system.states}
     initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
     for mode in system.modes:
         if mode.start is not None:

@@ -21,6 +21,9 @@ from surfacechem.terms import (
     parameter,
 )
 
+MOST_CELLS = 4096
+"""Cells across a body at most, whether a case gives them or an accuracy asks for them."""
+
 
 @dataclass(frozen=True)
 class Body:

@@ -190,9 +190,7 @@ class Simulation:
 
     @cached_property
     def _units(self) -> dict[str, str]:
-        """Unit of everything that a run may change, by path."""
-        units = {p.path: p.spec.unit for p in self.system.parameters if p.changeable}
-        return units | {state.path: state.quantity.unit for state in self.system.states}
+        return self.system.changeable
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = self._units

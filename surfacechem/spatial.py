@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from surfacechem.accuracy import FLOOR, relative_error
 from surfacechem.integrate import Trajectory
 from surfacechem.profiles import profile_values
-from surfacechem.scene import Body, Conduction, Scene
+from surfacechem.scene import MOST_CELLS, Body, Conduction, Scene
 
 Array = NDArray[np.float64]
-
-MOST_CELLS = 1024
-"""Cells across a body at which a search for an accuracy ends."""
 
 HELPED = 0.7
 """Part of the error that more cells must leave at most, lest others than these be the cause."""

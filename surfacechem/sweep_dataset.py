@@ -118,7 +118,8 @@ class SweepSolution:
         """Unit and long name of a swept value."""
         state = next((s for s in self.system.states if path == s.path), None)
         if state is not None:
-            return state.quantity.unit, f"initial {state.quantity.long_name}"
+            quantity, _ = state.at_start
+            return quantity.unit, f"initial {quantity.long_name}"
         spec = next(p.spec for p in self.system.parameters if p.path == path)
         return spec.unit, f"{spec.text} ({path})"
 

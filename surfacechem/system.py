@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -54,6 +55,14 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Given:
+    """What a case gives at the start for a state that is its logarithm."""
+
+    quantity: Quantity
+    value: float
+
+
+@dataclass(frozen=True)
 class State:
     """A variable that the run solves for: evolved by a balance, or algebraic where that has no capacity."""
 
@@ -67,6 +76,8 @@ class State:
     """Whose initial value it takes, where not its own."""
     finest: float | None = None
     """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
+    given: Given | None = None
+    """What is given in its place, where it is the logarithm of that."""
 
     @property
     def name(self) -> str:
@@ -75,8 +86,17 @@ class State:
 
     @property
     def path(self) -> str:
-        """Path of its initial value."""
-        return f"initial.{self.start or self.name}"
+        """Path of its initial value, or of what is given in its place."""
+        return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"
+
+    @property
+    def at_start(self) -> tuple[Quantity, float]:
+        """What is given at the start, and its value."""
+        return (self.given.quantity, self.given.value) if self.given else (self.quantity, self.initial)
+
+    def from_given(self, values: Mapping[str, float]) -> float:
+        """Its initial value, from what is given by path."""
+        return math.log(values[self.path]) if self.given else values[self.path]
 
 
 @dataclass(frozen=True)
@@ -309,6 +329,13 @@ class System:
     def expand(self, expression: Expression) -> Expression:
         """The expression in t, states, derivatives and parameters only."""
         return symengine.sympify(expression).subs(self.definitions)
+
+    @cached_property
+    def changeable(self) -> dict[str, str]:
+        """Units of all that a run may change, by path: parameters and initial values."""
+        given = set(self.outside.engine.gives) if self.outside else set()
+        units = {p.path: p.spec.unit for p in self.parameters if p.changeable and p.path not in given}
+        return units | {state.path: state.at_start[0].unit for state in self.states}
 
     @property
     def inputs(self) -> list[Any]:

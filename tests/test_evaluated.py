@@ -144,6 +144,15 @@ def test_a_compiled_solver_cannot_ask(case):
 def test_an_evaluated_rate_is_no_parameter(case):
     with pytest.raises(InputError, match=r"no parameter 'mechanism\.R1\.value' to change"):
         surfacechem.load(case(FOREIGN)).run({"mechanism.R1.value": 1.0})
+    with pytest.raises(InputError, match=r"no parameter 'x' to sweep\. Known: [^:]*$") as refused:
+        surfacechem.load(case(FOREIGN)).sweep({"x": [1.0]})
+    assert "mechanism.R1" not in str(refused.value)
+
+
+def test_an_evaluated_mechanism_is_swept_run_by_run(case):
+    simulation = surfacechem.load(case(FOREIGN))
+    data = simulation.sweep({"initial.T_2": [330.0, 345.0]}).dataset
+    assert data["T_2"].values[1].tobytes() == simulation.run().dataset["T_2"].values.tobytes()
 
 
 def test_an_interface_without_capacity(case):

@@ -48,6 +48,23 @@ def test_velocity_step_follows_the_exact_age(law):
     np.testing.assert_allclose(outputs(trajectory, "theta"), exact_age(law, t), rtol=1e-9)
 
 
+def test_the_age_at_the_start_is_changed_in_seconds():
+    """What is solved for is its logarithm, which is nothing that a case gives."""
+    simulation = surfacechem.load("rate-and-state-velocity-steps")
+    assert "initial.theta" in simulation.system.changeable
+    data = simulation.sweep({"initial.theta": ["5 s", 10.0]}).dataset
+    np.testing.assert_allclose(data["theta"].values[:, 0], [5.0, 10.0], rtol=1e-14)
+    np.testing.assert_array_equal(data["initial_theta"].values, [5.0, 10.0])
+    assert data["initial_theta"].attrs["units"] == "s"
+    assert data["theta"].values[1].tobytes() == simulation.run().dataset["theta"].values.tobytes()
+    assert data.attrs["error"] < 1e-8
+    for value, message in ((0.0, "outside its range: > 0"), ("1 m", "needs a time")):
+        with pytest.raises(InputError, match=message):
+            simulation.run({"initial.theta": value})
+    with pytest.raises(InputError, match=r"no parameter 'initial\.ln_theta'"):
+        simulation.run({"initial.ln_theta": 1.0})
+
+
 @pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
 def test_friction_jumps_with_a_and_settles_with_a_minus_b(law):
     _, trajectory = velocity_step(law)

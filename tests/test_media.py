@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+import surfacechem
 from surfacechem import case, fits, simulation
 from surfacechem.achieved import computed
 from surfacechem.assembly import assemble
@@ -227,6 +228,15 @@ def test_a_thick_gas_film_conducts_like_a_continuum():
     gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
     rarefied, film = (law(between=("lower", "upper")) for law in (RarefiedFilm, Film))
     assert rarefied.conductance(d_m=1.0, **gas) == pytest.approx(film.conductance(k_m=gas["k_m"], d_m=1.0), rel=1e-6)
+
+
+def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
+    def run(gap, Y):
+        return surfacechem.run("closing-gas-gap", {"loading.g_n": gap, "heat.rarefied-film.Y": Y})
+
+    pressed, apart = run("-1 um", "2 um"), run("1 um", "1 um")
+    assert pressed.status == "finished"
+    np.testing.assert_allclose(pressed.dataset["T_1"], apart.dataset["T_1"], rtol=1e-9)
 
 
 def test_viscosity_laws_fall_with_temperature_and_rise_with_pressure():

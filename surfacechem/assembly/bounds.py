@@ -9,6 +9,7 @@ Source: unilateral bounds of the bonding fraction, Sauer, Duong & Mandadapu (202
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import symengine
 
@@ -16,6 +17,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.holding import Decision
 from surfacechem.assembly.logarithms import LOGARITHM
 from surfacechem.expressions import Expression, where
+from surfacechem.quantities import Quantity
 from surfacechem.system import Transition
 
 INSIDE = 1e-15
@@ -54,8 +56,9 @@ def free_to_react(build: Build, rate: Expression) -> Expression:
         return symengine.Integer(1)
     words = {value: text for value, text in HELD_AT.items() if value == 0 or value in sides}
     held = build.mode("held", 0.0, words)
-    for bound in (_lower(build, rate), _upper(build, rate)):
-        if bound.side in sides:
+    for side, made in ((-1, _lower), (1, _upper)):
+        if side in sides:
+            bound = made(build, rate)
             _hold(build, held, bound)
             _let_go(build, held, bound)
     return 1 - held**2
@@ -64,24 +67,36 @@ def free_to_react(build: Build, rate: Expression) -> Expression:
 def _lower(build: Build, rate: Expression) -> Bound:
     phi, limit = symengine.symbols("phi phi_max")
     words = ("unbonded", "no bond is left", "rebond", "bonds form again")
-    return Bound(-1, symengine.Integer(0), phi, -_rate_at(build, rate, INSIDE * limit), words)
+    return Bound(-1, symengine.Integer(0), phi, -_rate_at(build, rate, INSIDE * limit, words[0]), words)
 
 
 def _upper(build: Build, rate: Expression) -> Bound:
     phi, limit = symengine.symbols("phi phi_max")
     words = ("complete", "bonding is complete", "loosen", "bonds begin to break")
-    return Bound(1, limit, limit - phi, _rate_at(build, rate, (1 - INSIDE) * limit), words)
+    return Bound(1, limit, limit - phi, _rate_at(build, rate, (1 - INSIDE) * limit, words[0]), words)
 
 
-def _rate_at(build: Build, rate: Expression, phi: Expression) -> Expression:
-    """The rate as it would be at a value of the bonding state; as it is where it has none there."""
-    at = {symengine.Symbol("phi"): phi}
-    for item in build.named:
+def _rate_at(build: Build, rate: Expression, phi: Expression, name: str) -> Expression:
+    """The rate as it would be at a value of the bonding state, by name; as it is where it has none there."""
+    at: dict[Any, Expression] = {symengine.Symbol("phi"): phi}
+    if build.expanded(rate).subs(at).atoms(*SINGULAR):
+        return rate
+    needed = _read(build, rate)
+    for item in [item for item in build.named if item.name in needed]:
         there = symengine.sympify(item.expression).subs(at)
         if there != item.expression:
-            at[symengine.Symbol(item.name)] = there
-    there = symengine.sympify(rate).subs(at)
-    return rate if there.atoms(*SINGULAR) else there
+            quantity = replace(item.quantity, name=f"{item.name}_{name}")
+            at[symengine.Symbol(item.name)] = build.name(quantity, there, output=False)
+    return build.name(Quantity(f"R_{name}", "1/(m^2 s)", "net rate at the bound"), rate.subs(at), output=False)
+
+
+def _read(build: Build, expression: Expression) -> set[str]:
+    """Names of the quantities that an expression reads, also through others."""
+    found = {str(symbol) for symbol in expression.free_symbols}
+    for item in reversed(build.named):
+        if item.name in found:
+            found |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
+    return found
 
 
 def _hold(build: Build, held: Expression, bound: Bound) -> None:

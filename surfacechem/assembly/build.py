@@ -3,41 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import symengine
 
 from surfacechem import grids
+from surfacechem.assembly.draft import Draft
 from surfacechem.balances import Node
-from surfacechem.conductors import Profile
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
-from surfacechem.refit import Fit
-from surfacechem.scene import Scene
 from surfacechem.system import (
     HELD,
     Account,
-    Capped,
-    Equilibrium,
     Margin,
     Mode,
     Named,
-    Pace,
-    Pair,
     Range,
-    State,
-    Transition,
 )
 from surfacechem.terms import Law, Load, Spec
-from surfacechem.variables import Parameters, Variables, unit_of
+from surfacechem.variables import unit_of
 
 MANY = range(2, 1000)
-
-NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
-"""Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
 
 BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
@@ -46,104 +34,8 @@ NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
 
 
-@dataclass(frozen=True)
-class Bond:
-    """A bonding variable that is a state: its symbol, its rate and the amount per reference area where it is one."""
-
-    symbol: Any
-    dot: Any
-    density: Expression
-
-
-@dataclass
-class Motion:
-    """What the stages that let the gap and the interface move leave for each other."""
-
-    mechanical: list[Expression] = field(default_factory=list)
-    """Elastic and kinetic energies of the bodies [J/m^2]."""
-    given: dict[str, Expression] = field(default_factory=dict)
-    """Potentials of the far-field tractions [J/m^2], which do work in a jump, by the account of that work."""
-    far_fields: dict[str, Any] = field(default_factory=dict)
-    """Mountings with their symbols, by direction."""
-    drives: dict[str, Expression] = field(default_factory=dict)
-    """Rates of the variables that a programme moves."""
-    slip: Any = None
-    """What determines the tangential motion, where it moves by a balance."""
-    sliding_tractions: list[Expression] = field(default_factory=list)
-    stick_limit: Expression | None = None
-    """Tangential traction that sticking can bear."""
-    gap_rates: dict[str, Expression] = field(default_factory=dict)
-    """Rates of the gaps that move by a balance."""
-
-
-class Build:
-    """What the stages of the assembly share; each stage leaves its results for the next."""
-
-    def __init__(self, scene: Scene, sides: frozenset[int] | None = None) -> None:
-        self.scene = scene
-        self.sides = sides
-        """Bounds at which the bonding state is held: -1 is zero, 1 the upper one; those that it needs where None."""
-        self.decision: Any = None
-        """What tells which bounds are needed, where the bonding state evolves."""
-        self.interface = scene.interface
-        custom = [body.temperature for body in scene.bodies if isinstance(body.temperature, str)]
-        capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
-        self.parameters = Parameters(
-            [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
-        )
-        self.variables = Variables(self.parameters)
-        self.t = symengine.Symbol("t")
-        self.nodes: dict[str, Node] = {}
-        self.node_of: dict[str, Node] = {}
-        """Node of each body name, of 'interface' and of 'surroundings'."""
-        self.slabs: dict[str, Any] = {}
-        """Bodies divided into cells, by name."""
-        self.resistances: dict[str, Expression] = {}
-        """L / k of the bodies that say how they conduct [m^2 K/W]."""
-        self.profiles: list[Profile] = []
-        self.psi: Expression = symengine.Integer(0)
-        self.states: list[State] = []
-        self.named: list[Named] = []
-        self.rows: dict[str, Expression] = {}
-        self.ledger: list[Account] = []
-        self.margins: list[Margin] = []
-        self.bonding: dict[str, Bond] = {}
-        self.about: dict[Any, Expression] = {}
-        """Initial values of the bonding variables, about which capacities are written."""
-        self.frictions: set[str] = set()
-        """Labels of the friction laws, whose power comes from outside."""
-        self.dissipation: dict[str, Expression] = {}
-        """Power that each interface law turns into heat [W/m^2], by the law's label."""
-        self.into_body: dict[str, list[Expression]] = {}
-        """Heat that reaches each body other than through the interface [W/m^2]."""
-        self.from_interface: dict[str, dict[str, Expression]] = {}
-        """Heat that each body receives from the interface and the other body by stated laws, by channel [W/m^2]."""
-        for body in scene.bodies:
-            self.into_body[body.name] = []
-            self.from_interface[body.name] = {}
-        self.loads: dict[str, Load] = {}
-        """Histories that are in use, by variable."""
-        self.rates: dict[Any, Expression] = {}
-        """Time derivatives of what the interface's free energy depends on beside temperature."""
-        self.into_interface: list[Expression] = []
-        """Power and heat that flow into the interface [W/m^2]."""
-        self.breakpoints: set[float] = set()
-        self.cycles: list[str] = []
-        """Paths of the frequencies of histories that repeat themselves."""
-        self.ranges: list[Range] = []
-        self.capped: list[Capped] = []
-        self.modes: list[Mode] = []
-        self.transitions: list[Transition] = []
-        self.equilibria: list[Equilibrium] = []
-        self.motion = Motion()
-        self.pairs: list[Pair] = []
-        self.paces: list[Pace] = []
-        self.conductances: dict[tuple[str, str], list[Expression]] = {}
-        """Conductances in parallel between two ends [W/(m^2 K)]."""
-        self.warnings: list[str] = []
-        self.fit: Callable[[], Fit] | None = None
-        """The fit of the medium's fluid, once a law asks for one of its properties."""
-        self.used_names: set[str] = set()
+class Build(Draft):
+    """What has been assembled so far, and how stages add to it."""
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
         """Add a named quantity and return its symbol."""

@@ -10,7 +10,8 @@ import symengine
 from surfacechem import balances
 from surfacechem.assembly.beside import affinity_taken, supplied
 from surfacechem.assembly.bounds import free_to_react
-from surfacechem.assembly.build import Bond, Build
+from surfacechem.assembly.build import Build
+from surfacechem.assembly.draft import Bond
 from surfacechem.assembly.force import RESOLUTION, SHARED
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.softening import softening

@@ -7,7 +7,8 @@ from typing import Any
 
 import symengine
 
-from surfacechem.assembly.build import NOTHING, Bond, Build
+from surfacechem.assembly.build import NOTHING, Build
+from surfacechem.assembly.draft import Bond
 from surfacechem.assembly.logarithms import initial_bonding
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where

@@ -10,7 +10,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
 from surfacechem.expressions import exp
 from surfacechem.quantities import VARIABLES
-from surfacechem.system import State
+from surfacechem.system import Given, State
 from surfacechem.terms import Friction
 
 
@@ -22,7 +22,8 @@ def memory(build: Build, law: Friction, bound: Friction) -> None:
         if not start > 0:
             raise InputError(f"initial: {of} = {start:g} is outside its range: > 0.")
         build.variables.define(name, lambda symbol=symbol: symbol, "evolved", law.path)  # type: ignore[misc]
-        build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False))
+        given = Given(VARIABLES[of], start)
+        build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given))
         build.name(VARIABLES[of], exp(symbol))
         build.rows[name] = dot
     if law.internal:

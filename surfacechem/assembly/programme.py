@@ -17,6 +17,7 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Stage
 from surfacechem.system import State, Transition
 from surfacechem.terms import Spec
+from surfacechem.variables import unit_of
 
 SCALES = {"m": LENGTH, "m/s": LENGTH}
 
@@ -99,7 +100,7 @@ def _stage_end(build: Build, item: Stage, margin: Expression, advance: dict[Expr
 
 def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
     x = _variable(build, item)
-    spec = Spec(VARIABLES[item.variable].unit if item.variable in VARIABLES else "K", f"end of the stage {item.name}")
+    spec = Spec(unit_of(item.variable), f"end of the stage {item.name}")
     value = build.parameters.add(item.variable, f"programme.{i + 1}.until.{item.variable}", spec, item.value)
     sign = symengine.Integer(1 if item.rising else -1)
     _stage_end(build, item, where(_during(stage, i), sign * (value - x), 1), advance)

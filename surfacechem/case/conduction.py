@@ -9,7 +9,7 @@ from surfacechem.case.fields import choice, mapping, number, whole
 from surfacechem.case.laws import Units, build, history
 from surfacechem.document import Tree
 from surfacechem.errors import InputError
-from surfacechem.scene import Conduction
+from surfacechem.scene import MOST_CELLS, Conduction
 from surfacechem.terms import Load, Spec
 
 CONDUCTION_KEYS = ("thickness", "conductivity", "cells", "grading", "far")
@@ -18,8 +18,6 @@ LUMP, INSULATED = "lump", "insulated"
 
 FIRST_CELLS = 16
 """Cells with which the search for an accuracy starts."""
-
-MOST_CELLS = 4096
 
 ACCURACY = Spec("1", "accuracy", above=0, at_most=0.1)
 GRADING = Spec("1", "grading", at_least=1e-6, at_most=1e6)

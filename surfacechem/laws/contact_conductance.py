@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 from surfacechem.expressions import Expression, power
-from surfacechem.laws.tabulated import Curve
+from surfacechem.laws._tables import ConductanceTable
 from surfacechem.terms import HeatTransfer, Varying, option, parameter
 
 
@@ -189,7 +188,7 @@ class SongYovanovich(HeatTransfer):
         return 1.25 * self.k * self.m / self.sigma * power(self.relative_pressure(p), 0.95)
 
 
-class PressureTable(HeatTransfer):
+class PressureTable(ConductanceTable):
     r"""Measured conductance at given pressures, interpolated by monotone cubics.
 
     .. math:: h = h(p), \quad h(p_j) = h_j
@@ -203,26 +202,11 @@ class PressureTable(HeatTransfer):
     """
 
     channel = "spots"
+    over = "p"
+    points = "pressures"
 
     pressures: Sequence[float] = option("pressures, increasing [Pa]")
-    conductances: Sequence[float] = option("conductances at the pressures [W/(m^2 K)]")
-    extrapolation: Literal["hold", "linear", "refuse"] = option("beyond the ends of the table", default="hold")
-
-    def __post_init__(self) -> None:
-        """Check that the table is one."""
-        super().__post_init__()
-        Curve.check(self.pressures, self.conductances, "pressures", "conductances")
-
-    @property
-    def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """The pressures of the table."""
-        return {"p": (self.pressures[0], self.pressures[-1])}
-
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The ends of a table that is not extrapolated."""
-        return self.ranges if self.extrapolation == "refuse" else {}
 
     def conductance(self, p: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
-        return Curve(self.pressures, self.conductances).value(p, linear=self.extrapolation == "linear")
+        return self._interpolated(p)

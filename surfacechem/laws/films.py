@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from surfacechem.expressions import Expression, sqrt
+from surfacechem.expressions import Expression, positive, sqrt
 from surfacechem.terms import Friction, HeatTransfer, Potential, parameter
 
 
@@ -31,14 +31,15 @@ class Film(HeatTransfer):
 class RarefiedFilm(HeatTransfer):
     r"""Conduction across a gas film, with temperature jumps at its walls.
 
-    .. math:: h = \frac{k_m}{d_m + M}, \quad
+    .. math:: h = \frac{k_m}{Y + d_m + M}, \quad
               M = \left(\frac{2 - \alpha_1}{\alpha_1} + \frac{2 - \alpha_2}{\alpha_2}\right)
               \frac{2 \gamma}{\gamma + 1} \frac{\Lambda}{\mathrm{Pr}}, \quad
               \Lambda = \eta_m \sqrt{\frac{\pi}{2 p_m \rho_m}}
 
-    Everything but the accommodation is a property of the medium at :math:`T_c`. Source: Yovanovich, DeVaal & Hegazy
-    (1982), AIAA paper 82-0888; the jump is that of Kennard, Kinetic Theory of Gases (1938). Dilute gases; from
-    continuum to free molecules within a few per cent where the jumps are small against the temperatures.
+    In contact the gas keeps the mean thickness Y of the voids. Everything but Y and the accommodation is a property of
+    the medium at :math:`T_c`. Source: Yovanovich, DeVaal & Hegazy (1982), AIAA paper 82-0888; the jump is that of
+    Kennard, Kinetic Theory of Gases (1938). Dilute gases; from continuum to free molecules within a few per cent where
+    the jumps are small against the temperatures.
 
     >>> law = RarefiedFilm(between=("lower", "upper"))
     >>> gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
@@ -46,12 +47,11 @@ class RarefiedFilm(HeatTransfer):
     21328.612
     """
 
-    nonnegative = ("d_m",)
-
     channel = "film"
 
     alpha_1: float = parameter("1", "thermal accommodation at the first end", default=1.0, above=0, at_most=1)
     alpha_2: float = parameter("1", "thermal accommodation at the second end", default=1.0, above=0, at_most=1)
+    Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
 
     def conductance(
         self,
@@ -67,7 +67,7 @@ class RarefiedFilm(HeatTransfer):
         walls = (2 - self.alpha_1) / self.alpha_1 + (2 - self.alpha_2) / self.alpha_2
         mean_free_path = eta_m * sqrt(math.pi / (2 * p_m * rho_m))
         prandtl = eta_m * cp_m / k_m
-        return k_m / (d_m + walls * 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl)
+        return k_m / (positive(d_m) + self.Y + walls * 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl)
 
 
 class FilmShear(Friction):

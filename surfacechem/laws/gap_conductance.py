@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal
 
 from surfacechem.expressions import Expression, exp, positive
-from surfacechem.laws.tabulated import Curve
+from surfacechem.laws._tables import ConductanceTable
 from surfacechem.quantities import STEFAN_BOLTZMANN
 from surfacechem.terms import HeatTransfer, option, parameter
 
@@ -95,7 +94,7 @@ class GasGap(HeatTransfer):
         return self.k / (positive(g_n) + self.Y + self.M)
 
 
-class GapTable(HeatTransfer):
+class GapTable(ConductanceTable):
     r"""Measured conductance at given gaps, interpolated by monotone cubics.
 
     .. math:: h = h(g_n), \quad h(g_j) = h_j
@@ -109,26 +108,11 @@ class GapTable(HeatTransfer):
     """
 
     channel = "gap"
+    over = "g_n"
+    points = "gaps"
 
     gaps: Sequence[float] = option("gaps, increasing [m]")
-    conductances: Sequence[float] = option("conductances at the gaps [W/(m^2 K)]")
-    extrapolation: Literal["hold", "linear", "refuse"] = option("beyond the ends of the table", default="hold")
-
-    def __post_init__(self) -> None:
-        """Check that the table is one."""
-        super().__post_init__()
-        Curve.check(self.gaps, self.conductances, "gaps", "conductances")
-
-    @property
-    def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """The gaps of the table."""
-        return {"g_n": (self.gaps[0], self.gaps[-1])}
-
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The ends of a table that is not extrapolated."""
-        return self.ranges if self.extrapolation == "refuse" else {}
 
     def conductance(self, g_n: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
-        return Curve(self.gaps, self.conductances).value(g_n, linear=self.extrapolation == "linear")
+        return self._interpolated(g_n)

@@ -24,7 +24,7 @@ class Start:
         self.run, self.scene = run, scene
         system = run.model.system
         self.parameters = {str(p.symbol): run.values[p.path] for p in system.parameters}
-        self.initial = {state.name: run.values[state.path] for state in system.states}
+        self.initial = {state.name: state.from_given(run.values) for state in system.states}
 
     @cached_property
     def named(self) -> dict[str, float]:
