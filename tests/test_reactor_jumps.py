@@ -18,7 +18,6 @@ CASES = {
     "stick-slip-debonding": 1e-7,
     "stick-slip-rebonding": 1e-7,
     "compliant-debonding": 3e-6,
-    "elastic-bonds-at-a-gap": 1e-8,
     "dynamic-pull-off": 1e-8,
 }
 """How closely Cantera's integrator meets events and states at its tolerance, relative to their largest."""
