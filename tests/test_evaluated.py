@@ -108,7 +108,7 @@ def test_as_if_it_were_lowered(case):
     rate = theirs["R_R1"].values
     np.testing.assert_allclose(ours["R_R1"].values, rate, atol=1e-6 * abs(rate).max(), rtol=0)
     assert evaluated.audit.energy_error < 1e-10
-    assert evaluated.audit.site_error < 1e-10
+    assert evaluated.audit.site_error < 100 * 1e-8  # its tolerance
     assert evaluated.audit.violations == ()
 
 

@@ -336,32 +336,39 @@ def test_a_wall_with_a_history_of_its_own(warm):
         net.advance(1.0)
 
 
-PULLED = """
-bodies:
-  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
-  upper: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
-interface:
-  temperature: T
-  sites: 1e16
-  potential: [penalty: {E_n: 1 MPa/um}]
-  limits: [tensile-strength: {t_max: 1 MPa}]
-loading: {g_n: {ramp: {rate: 1 um/s}}}
-T_0: 300
-initial: {T: 300 K, phi: 1}
-run: {until: 2 s}
-"""
-
-
-def test_a_scene_that_jumps(tmp_path):
-    path = tmp_path / "pulled.yaml"
-    path.write_text(PULLED)
-    with pytest.raises(InputError, match=r"the scene jumps \(.*\), which a reactor network does not follow"):
-        InterfaceReactor(path)
-
-
 def test_area_is_positive():
     with pytest.raises(InputError, match="area = 0 is outside its range"):
         InterfaceReactor("exothermic", area=0)
+
+
+def test_area_with_its_unit():
+    assert InterfaceReactor("exothermic", area="2 cm^2").area == pytest.approx(2e-4, rel=1e-15)
+    with pytest.raises(InputError, match=r"2 cm is a length; area needs an area \[m\^2\]"):
+        InterfaceReactor("exothermic", area="2 cm")
+
+
+def test_a_chamber_that_is_not_in_the_network(tmp_path):
+    (tmp_path / "plate.yaml").write_text(PLATE)
+    chamber = stirred(300.0)
+    interface = InterfaceReactor(tmp_path / "plate.yaml", bodies={"chamber": chamber})
+    with pytest.raises(InputError, match="the reactor that stands for the body chamber of interface is not in the net"):
+        ReactorNet([interface]).advance(1.0)
+    held = InterfaceReactor(tmp_path / "plate.yaml", bodies={"chamber": ct.Reservoir(chamber.phase, clone=True)})
+    net = ReactorNet([held])
+    net.advance(1e6)
+    assert held["T_1"] == pytest.approx(300.0, rel=1e-9)
+
+
+PLATE = """
+bodies:
+  plate: {temperature: T_1, C: 2 kJ/m^2/K, capacity: constant}
+  chamber: {temperature: 298.15 K}
+interface: {}
+heat: [conductance: {between: [plate, chamber], h: 100 W/m^2/K}]
+T_0: 300 K
+initial: {T_1: 350 K}
+run: {until: 100 s}
+"""
 
 
 def test_what_cantera_holds_stays_alive():

@@ -16,6 +16,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import TINY, depends
 from surfacechem.integrate import Model, Run
 from surfacechem.reactor import coupling
+from surfacechem.reactor.moments import Moments
 from surfacechem.solvers.contract import Array
 from surfacechem.solvers.evaluation import Evaluation
 from surfacechem.system import System
@@ -36,10 +37,13 @@ class EndError(Exception):
     """The scene does not go on at a state, with the reason in words."""
 
 
-def _refuse_jumps(system: System) -> None:
-    if system.transitions:
-        reasons = "; ".join(dict.fromkeys(item.reason for item in system.transitions))
-        raise InputError(f"the scene jumps ({reasons}), which a reactor network does not follow. Run the case alone.")
+def _refuse_folds(system: System) -> None:
+    folds = [item.reason for item in system.transitions if item.fold is not None]
+    if folds:
+        raise InputError(
+            f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "
+            "integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
+        )
 
 
 def _widest(system: System, values: dict[str, float]) -> dict[str, float]:
@@ -66,14 +70,16 @@ class EmbeddedScene:
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
             system, self.reactions = coupling.with_multipliers(assemble(scene))
-            _refuse_jumps(system)
+            _refuse_folds(system)
             self.model = Model(system)
             self.values = _widest(system, self.model.values())
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)
         except InputError as error:
             raise case.located(error) from None
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
+        self.moments: Moments | None = None
         self.begin_piece(0.0, DIFFERENCE)
+        self.moments = Moments.of(self.model, self.problem, self.evaluation)
         self._terminal = np.array([margin.terminal for margin in self.model.margins], dtype=bool)
         self._position = {parameter.path: j for j, parameter in enumerate(system.parameters)}
         self.states = tuple(system.states[j].name for j in self.evaluation.free)
@@ -112,7 +118,7 @@ class EmbeddedScene:
         evaluation = self.evaluation
         if not evaluation.put(t, x[: len(self.states)]):
             raise EndError("no state satisfies the equations")
-        closed = self._terminal & ~(evaluation.margins() >= 0)
+        closed = self._terminal & ~(evaluation.margins()[: len(self._terminal)] >= 0)
         if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
         return evaluation.rates()
@@ -122,9 +128,10 @@ class EmbeddedScene:
         evaluation, start = self.evaluation, self.start()
         n = len(self.states)
         evaluation.put(0.0, start[:n])
-        before = evaluation.margins()[self._terminal].copy()
+        terminal = np.flatnonzero(self._terminal)
+        before = evaluation.margins()[terminal]
         evaluation.put(t, x[:n])
-        left = np.abs(evaluation.margins()[self._terminal]) / np.maximum(np.abs(before), TINY)
+        left = np.abs(evaluation.margins()[terminal]) / np.maximum(np.abs(before), TINY)
         if not len(left) or left.min() > STALLED:
             return "the step size fell to rounding level; the scene may end"
         reasons = [margin.reason for margin in self.model.margins if margin.terminal]
@@ -149,6 +156,33 @@ class EmbeddedScene:
 
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
+        modes = self.moments.modes if self.moments else None
         run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
         table = self.model.problem(run, self.values).parameters
         self.evaluation.parameters[:] = table[bisect_right(self.breakpoints, t)]
+        if self.moments and modes is not None:
+            self.moments.keep(modes)
+
+    def transitions(self, t: float, x: Array) -> Array:
+        """Margins of the transitions; that which reaches zero is due."""
+        assert self.moments is not None
+        self.evaluation.put(t, x[: len(self.states)])
+        return self.moments.margins()
+
+    def ledger_rates(self, t: float, x: Array) -> Array:
+        """Rates of the ledger."""
+        self.evaluation.put(t, x[: len(self.states)])
+        return self.evaluation.rates()[len(self.states) :]
+
+    def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
+        """The variables after a transition and what follows, or after what is due anyway; and what the ledger gains.
+
+        EndError where the scene ends with it.
+        """
+        assert self.moments is not None
+        self.evaluation.put(t, x[: len(self.states)])
+        booked = self.moments.settle() if index is None else self.moments.fire(index)
+        if booked is None:
+            raise EndError(self.moments.reason)
+        states = self.evaluation.y[self.evaluation.free]
+        return np.concatenate((states, x[len(self.states) :] + booked)), booked

@@ -41,9 +41,10 @@ class History:
         reason = stop or f"reached the end at t = {self.times[-1]:.9g} s"
         status = "stopped" if stop else "finished"
         result = self._result(Status.EVENT if stop else Status.FINISHED)
-        case = self.scene.case
+        case, moments = self.scene.case, self.scene.moments
+        jumps = tuple(moments.jumps) if moments else ()
         return Solution(
-            Trajectory(self.scene.model, run, result, self.scene.values, status, reason, seconds),
+            Trajectory(self.scene.model, run, result, self.scene.values, status, reason, seconds, jumps),
             title=case.title,
             source=case.source,
             case=case.text if alone else "",

@@ -20,9 +20,13 @@ from surfacechem.reactor.history import History
 from surfacechem.simulation import Simulation
 from surfacechem.solvers.cantera_network import BackOffError, HeldReactor, contents
 from surfacechem.solvers.contract import Array
+from surfacechem.terms import Spec
+from surfacechem.units import parse
 
 if TYPE_CHECKING:
     import xarray
+
+AREA = Spec("m^2", "area of the interface", above=0)
 
 LEDGER_UNIT = 1e100
 """Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
@@ -42,8 +46,9 @@ class InterfaceReactor(HeldReactor):
     """An interface between two bodies as a reactor of a Cantera network.
 
     ``case`` is a case file, the name of a shipped case, a Case or a Simulation; ``overrides`` change it as in
-    ``surfacechem.load``. ``area`` [m^2] turns what the scene counts per area into what the network counts. ``bodies``
-    names reactors that take the place of bodies: {body: reactor}. InputError where the scene does not allow it.
+    ``surfacechem.load``. ``area``, in m^2 or a text with a unit, turns what the scene counts per area into what the
+    network counts. ``bodies`` names reactors that take the place of bodies: {body: reactor}. InputError where the scene
+    does not allow it.
     """
 
     scene: EmbeddedScene
@@ -67,21 +72,22 @@ class InterfaceReactor(HeldReactor):
         self,
         case: str | Path | Case | Simulation,
         *,
-        area: float = 1.0,
+        area: float | str = 1.0,
         bodies: Mapping[str, Any] | None = None,
         overrides: Sequence[str] | Mapping[str, object] = (),
         name: str = "interface",
     ) -> None:
         super().__init__(self.surface, name=name)  # Cantera's own part was made in __new__
-        if not area > 0:
-            raise InputError(f"area = {area} is outside its range: > 0.")
-        self.area, self.bodies = float(area), dict(bodies or {})
+        self.area, self.bodies = parse(area, "m^2", name="area"), dict(bodies or {})
+        AREA.check("area", self.area)
         self.ports: dict[str, Port] = {}
         self.passes_breakpoints = False
         """Whether the network looks after breakpoints."""
         self.t = 0.0
         self._dated = True
         """Whether that is the time of the variables last put."""
+        self._restarted = 0.0
+        """Time of the last jump, after which steps begin at the rounding of the time."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
@@ -96,6 +102,8 @@ class InterfaceReactor(HeldReactor):
         self.names = (*scene.states, *(f"{account} / {LEDGER_UNIT:g}" for account in scene.accounts))
         self.unit = np.array([1.0] * len(scene.states) + [LEDGER_UNIT] * len(scene.accounts))
         self.x = scene.start()
+        self.ledger = self.x[len(scene.states) :].copy()
+        """The ledger of a scene that jumps, which the network integrates by itself."""
         self.reason = ""
         self._last: tuple[float, Array, Array] | None = None
         """Time, variables and rates of the last evaluation."""
@@ -145,7 +153,7 @@ class InterfaceReactor(HeldReactor):
         if self._current and self._last is not None and self._last[0] == t:
             return self._last[2]
         self._listen()
-        if self._last is not None and 0 < t - self._last[0] <= STANDSTILL * t:
+        if self._stands_still(t) and self._last is not None:
             self.reason = f"{self.scene.closest(self._last[0], self._last[1])} near t = {t:.9g} s"
             self.error = InterfaceStopped(self.reason)
             raise self.error
@@ -159,6 +167,11 @@ class InterfaceReactor(HeldReactor):
         self._last, self._current = (t, self.x, rates), True
         return rates
 
+    def _stands_still(self, t: float) -> bool:
+        """Whether steps have become as short as the rounding of the time, other than at a start."""
+        step = t - self._last[0] if self._last is not None else 0.0
+        return 0 < step <= STANDSTILL * t and t - self._restarted > LOCATED * t
+
     def _listen(self) -> None:
         """Take over temperatures, heats and multipliers from the network."""
         for name, reactor in self.bodies.items():
@@ -169,6 +182,12 @@ class InterfaceReactor(HeldReactor):
             self.scene.give(f"multiplier.{label}", self.surface.multiplier(i))
 
     def _check_piece(self, t: float) -> None:
+        if self.scene.moments and not self.passes_breakpoints:
+            reasons = "; ".join(dict.fromkeys(item.reason for item in self.scene.model.system.transitions))
+            raise InputError(
+                f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow. Use "
+                "surfacechem.reactor.ReactorNet."
+            )
         breakpoints = self.scene.breakpoints
         following = bisect_right(breakpoints, self.t)
         if not self.passes_breakpoints and following < len(breakpoints) and t > breakpoints[following]:
@@ -177,10 +196,40 @@ class InterfaceReactor(HeldReactor):
                 "over. Use surfacechem.reactor.ReactorNet."
             )
 
+    def ledger_rates(self, t: float, x: Array) -> Array:
+        """Rates of the ledger [SI per s] at given variables."""
+        self._current = False
+        self._listen()
+        return self.scene.ledger_rates(t, x)
+
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on, at a relative tolerance."""
         self.t, self._current, self._dated = t, False, True
         self.scene.begin_piece(t, rtol)
+
+    def jump(self, t: float, index: int | None = None) -> None:
+        """Carry out a transition at time t [s], or what is due there anyway, and keep what follows."""
+        try:
+            self.x, booked = self.scene.moved(t, self.x, index)
+            self._refuse_sudden_heat(t)
+            self.ledger = self.ledger + booked
+        except EndError as end:
+            self.reason = f"{end} at t = {t:.9g} s"
+            self.error = InterfaceStopped(self.reason)
+            raise self.error from None
+        self._last, self._current, self._restarted = None, False, t
+        for port in self.ports.values():
+            port.warm(float(self.x[self.scene.states.index(port.node)]))
+
+    def _refuse_sudden_heat(self, t: float) -> None:
+        jumps = self.scene.moments.jumps if self.scene.moments else []
+        if self.bodies and any(jump.heat_out for jump in jumps if jump.t == t):
+            names = ", ".join(self.bodies)
+            raise InputError(
+                f"the jump at t = {t:.9g} s gives heat at once to bodies without a capacity of their own, and reactors "
+                f"stand for {names}: a reactor takes heat in time only. Give the body a heat capacity, and put a wall "
+                "between it and the reactor."
+            )
 
     def end(self) -> None:
         """Go back to the last state before the end of the scene, and keep it."""
@@ -212,7 +261,10 @@ class InterfaceReactor(HeldReactor):
         """Keep the present state, at time t [s], for the dataset."""
         self.t, self._dated = t, True
         self._listen()
-        self.history.append(t, self.x)
+        x = self.x
+        if self.scene.moments:
+            x = np.concatenate((x[: len(self.scene.states)], self.ledger))
+        self.history.append(t, x)
 
     @property
     def dataset(self) -> xarray.Dataset:

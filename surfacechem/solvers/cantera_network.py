@@ -58,6 +58,8 @@ class HeldReactor(cantera.ExtensibleReactor):
     surface: Any
     names: tuple[str, ...]
     error: Exception | None = None
+    asked: float = 0.0
+    """Time of the last evaluation [s]: after a step of the integrator, its end."""
 
     def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
         """Keep the surface itself, which Cantera does not: a clone would have lost what Python knows of it."""
@@ -108,6 +110,7 @@ class HeldReactor(cantera.ExtensibleReactor):
 
     def replace_eval(self, t: float, lhs: Any, rhs: Any) -> None:
         lhs[:] = 1.0
+        self.asked = t
         rhs[:] = self.attempt(lambda: self.rates(t))
 
     def replace_component_name(self, i: int) -> str:

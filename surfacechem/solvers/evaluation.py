@@ -63,6 +63,11 @@ class Evaluation:
         if whole:
             self.program.filled(self.inputs)
 
+    def restart(self, y: Array) -> None:
+        """Take over a state after a jump; algebraic variables are searched from there."""
+        self.y[:] = y
+        self.guess = y[self._algebraic]
+
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
         return np.concatenate((self.ydot[self.free], self._ledger()))

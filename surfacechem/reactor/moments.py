@@ -1,0 +1,121 @@
+"""Events of a scene that a reactor network integrates: what is due at a moment, where in a step, and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from surfacechem.equilibria import Point
+from surfacechem.events import AT_ONCE, REACHED, Hybrid
+from surfacechem.integrate import Model
+from surfacechem.solvers import ASKING, solver
+from surfacechem.solvers.contract import Array, Problem
+from surfacechem.solvers.evaluation import Evaluation
+from surfacechem.stretches import changed
+
+GLOBAL = 100
+"""By how much the error of a state may exceed the tolerance of a step."""
+
+POINTS = 16
+"""Points of a step at which margins are looked at."""
+
+LEAST = 4 * float(np.finfo(float).eps)
+"""Part of the time to which zeros are found."""
+
+
+class Moments(Hybrid):
+    """The transitions of a scene whose stretches something else integrates, without a time of their own."""
+
+    evaluation: Evaluation
+    """Present state and parameters of the scene."""
+
+    @classmethod
+    def of(cls, model: Model, problem: Problem, evaluation: Evaluation) -> Moments | None:
+        """Those of a model, None where it has none; ``evaluation`` holds the present state and parameters."""
+        if model.jumper is None:
+            return None
+        made = cls(model.system, solver(ASKING[0]), model.jumper, problem, len(model.margins))
+        made.largest = np.zeros(len(problem.margins))
+        made.booked = np.zeros(problem.program.n_ledger)
+        made.evaluation = evaluation
+        return made
+
+    def until(self, goal: float, rtol: float) -> None:
+        """The time that is integrated next, and how closely; what is brief is so against it."""
+        self.problem = changed(self.problem, segments=np.array([0.0, goal]), rtol=GLOBAL * rtol)
+
+    @property
+    def modes(self) -> Array:
+        """Present modes."""
+        return self.evaluation.parameters[self.jumper.mode_columns].copy()
+
+    def keep(self, modes: Array) -> None:
+        """Go on with modes where other parameters have changed."""
+        self.evaluation.parameters[self.jumper.mode_columns] = modes
+
+    def here(self) -> Point:
+        """The state last put."""
+        at = self.evaluation
+        return Point(float(at.inputs[0]), at.y.copy(), at.ydot.copy(), at.parameters.copy())
+
+    def margins(self) -> Array:
+        """Margins of the transitions at the state last put."""
+        now = self.evaluation.margins().copy()
+        self._see(now)
+        return now[self.first :]
+
+    def soonest(self) -> float:
+        """Time [s] in which a margin of the state last put would close at its present rate."""
+        now, rates = self.margins(), self.jumper.margin_rates(self.here())
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.where((now > 0) & (rates < 0), -now / rates, np.inf)
+        return float(left.min(initial=np.inf))
+
+    def settle(self) -> Array | None:
+        """Carry out what is due at the state last put: additions to the ledger; None where the scene ends here."""
+        before = self.booked.copy()
+        point = self._settled(self.here())
+        return None if point is None else self._taken(point, before)
+
+    def fire(self, index: int) -> Array | None:
+        """Carry out a transition at the state last put, and what follows at once."""
+        before = self.booked.copy()
+        point = self._jump(index, self.here())
+        point = self._settled(point) if point is not None else None
+        return None if point is None else self._taken(point, before)
+
+    def lost(self) -> int | None:
+        """The transition at which an equilibrium was lost near the state last put, if any."""
+        return self.jumper.equilibria.lost(self.here(), self.problem.rtol)
+
+    def _taken(self, point: Point, before: Array) -> Array:
+        self.evaluation.parameters[:] = point.parameters
+        self.evaluation.restart(point.y)
+        return self.booked - before
+
+    def _chatters(self, t: float) -> bool:
+        recent = len(self.jumps) - self.calm
+        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - REACHED * t
+
+
+def first_zero(margins: Callable[[float], Array], low: float, high: float) -> tuple[float, int] | None:
+    """Time and position of the first of the margins that reaches zero between two times; None where none does."""
+    sides = margins(low)
+    at = low
+    for t in np.linspace(low, high, POINTS + 1)[1:].tolist():
+        values = margins(t)
+        closing = np.flatnonzero((sides > 0) & (values <= 0)).tolist()
+        if closing:
+            zeros = {i: _zero(margins, i, at, t) for i in closing}
+            index = min(zeros, key=lambda i: zeros[i])
+            return zeros[index], index
+        sides, at = np.where(values != 0, values, sides), t
+    return None
+
+
+def _zero(margins: Callable[[float], Array], i: int, low: float, high: float) -> float:
+    if margins(low)[i] <= 0:
+        return low
+    return float(brentq(lambda t: float(margins(t)[i]), low, high, xtol=1e-300, rtol=LEAST))

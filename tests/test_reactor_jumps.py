@@ -1,0 +1,146 @@
+"""Scenes that jump in a reactor network: the compiled path's events, states and books."""
+
+from itertools import pairwise
+
+import cantera as ct
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactorNet
+
+CASES = {
+    "debonding": 1e-12,
+    "debonding-cooling": 1e-12,
+    "coulomb-stop": 1e-8,
+    "stick-slip": 1e-7,
+    "stick-slip-debonding": 1e-7,
+    "stick-slip-rebonding": 1e-7,
+    "compliant-debonding": 3e-6,
+    "dynamic-pull-off": 1e-8,
+}
+"""How closely Cantera's integrator meets events and states at its tolerance, relative to their largest."""
+
+
+def network(case, **bodies) -> tuple[InterfaceReactor, ReactorNet]:
+    interface = InterfaceReactor(case, **bodies)
+    net = ReactorNet([*interface.bodies.values(), interface])
+    net.rtol, net.atol = 1e-10, 1e-16
+    return interface, net
+
+
+def compare(interface, solution, within):
+    ours, theirs = interface.scene.moments.jumps, solution.trajectory.jumps
+    assert [jump.transition.name for jump in ours] == [jump.transition.name for jump in theirs]
+    end = solution.trajectory.run.times[-1]
+    np.testing.assert_allclose([j.t for j in ours], [j.t for j in theirs], atol=within * end, rtol=0)
+    for state in interface.scene.states:
+        column = solution.dataset[state].values
+        assert interface[state] == pytest.approx(column[-1], abs=within * np.abs(column).max(), rel=0)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_events_and_states_of_the_compiled_path(name):
+    solution = surfacechem.load(name).run(error="balances")
+    interface, net = network(name)
+    for t in solution.dataset["time"].values[1:]:
+        net.advance(float(t))
+    compare(interface, solution, CASES[name])
+
+
+@pytest.mark.parametrize("name", ["debonding", "stick-slip-debonding", "compliant-debonding"])
+def test_the_books_hold_what_jumps_release(name):
+    solution = surfacechem.load(name).run(error="balances")
+    interface, net = network(name)
+    net.advance(solution.trajectory.run.times[-1])
+    history, data = interface.dataset, solution.dataset
+    for account in ("released", "entropy_events"):
+        size = max(abs(float(data[account][-1])), 1e-3 * float(np.abs(data["E_total"]).max()))
+        assert float(history[account][-1]) == pytest.approx(float(data[account][-1]), abs=1e-5 * size)
+    assert history.attrs["energy_error"] < 1e-7
+    table = [str(name) for name in history["event_name"].values]
+    assert table == [jump.transition.name for jump in solution.trajectory.jumps]
+
+
+def test_single_steps_end_at_the_event():
+    interface, net = network("stick-slip")
+    times = []
+    while net.time < 0.7:
+        times.append(net.step())
+    assert [jump.transition.name for jump in interface.scene.moments.jumps][:2] == ["slip forward", "stop"]
+    for jump in interface.scene.moments.jumps:
+        assert min(abs(t - jump.t) for t in times) < 1e-15
+    assert all(later > before for before, later in pairwise(times))
+
+
+GAS = """
+phases: [{name: gas, thermo: ideal-gas, species: [N2], state: {T: 300 K, P: 1 atm}}]
+species: [{name: N2, composition: {N: 2}, thermo: {model: constant-cp, cp0: 30 J/mol/K}}]
+"""
+CHAMBER = """
+bodies:
+  block: {{temperature: T_1, C: 500 J/m^2/K, capacity: constant}}
+  chamber: {chamber}
+interface:
+  temperature: T_1
+  friction: [coulomb: {{mu: 0.4, mu_s: 0.6}}]
+mechanics: {{tangential: {{k: 100 MPa/m, m: 10 kg/m^2}}}}
+heat: [conductance: {{between: [block, chamber], h: 200 W/m^2/K}}]
+loading: {{p: 0.1 MPa, w_t: {{ramp: {{rate: 1 mm/s}}}}}}
+T_0: 300 K
+initial: {{T_1: 310 K{also}}}
+run: {{until: 2 s, outputs: 5}}
+"""
+
+
+def test_beside_a_closed_chamber(tmp_path):
+    """A gas of constant heat capacity in a closed chamber is a body with that capacity."""
+    chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True, volume=2.0)
+    capacity = chamber.mass * chamber.phase.cv_mass / 0.5
+    body = f"{{temperature: T_2, C: {capacity:.17g}, capacity: constant}}"
+    (tmp_path / "body.yaml").write_text(CHAMBER.format(chamber=body, also=", T_2: 300 K"))
+    (tmp_path / "gas.yaml").write_text(CHAMBER.format(chamber="{temperature: 300 K}", also=""))
+    solution = surfacechem.load(tmp_path / "body.yaml").run(error="balances")
+    interface, net = network(tmp_path / "gas.yaml", area=0.5, bodies={"chamber": chamber})
+    net.advance(2.0)
+    compare(interface, solution, 1e-7)
+    assert pytest.approx(float(solution.dataset["T_2"][-1]), rel=1e-8) == chamber.T
+    assert float(solution.dataset["T_2"][-1]) > 300.1
+
+
+def test_a_reactor_takes_no_heat_at_once():
+    pulled = ["bodies.upper={temperature: 300 K, stiffness: 2e13 Pa/m}"]
+    chamber = ct.IdealGasReactor(ct.Solution(yaml=GAS), clone=True)
+    _, net = network("debonding", bodies={"upper": chamber}, overrides=[*pulled, *SEPARATE])
+    with pytest.raises(InputError, match=r"a reactor takes heat in time only. Give the body a heat capacity"):
+        net.advance(10.0)
+
+
+SEPARATE = ["heat=[{conductance: {between: [lower, upper], h: 10}}]"]
+
+
+def test_an_ordinary_network_is_refused():
+    interface = InterfaceReactor("debonding")
+    net = ct.ReactorNet([interface])
+    with pytest.raises(Exception, match=r"the scene jumps \(.*Use surfacechem\.reactor\.ReactorNet"):
+        net.advance(1.0)
+
+
+def test_what_a_jump_refuses_ends_the_scene():
+    _, net = network("debonding-cooling", overrides=["interface.limits.tensile-strength.violation=refuse"])
+    with pytest.raises(InterfaceStopped, match=r"which destroys entropy at t = 3.87298335 s"):
+        net.advance(10.0)
+
+
+def test_quasi_static_folds_are_refused():
+    with pytest.raises(InputError, match=r"loses a quasi-static equilibrium .* Give the gap a damper or a mass"):
+        InterfaceReactor("snap-in")
+
+
+def test_sensitivities_end_at_an_event():
+    interface = InterfaceReactor("stick-slip-rebonding")
+    net = ReactorNet([interface])
+    interface.add_sensitivity_reaction(0)
+    with pytest.raises(InputError, match="sensitivities end at"):
+        net.advance(10.0)
