@@ -11,7 +11,7 @@ from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solvers import names
 
 LIBRARIES = [name for name in names if name != "radau"]
-STEPS = 1500
+STEPS = 2500
 FEW_STEPS = 150
 LAYERS = (12, 13, 14, 15, 16, 17, 21, 22, 23, 24, 25, 26)
 STEEPER = (30, 31, 32, 33, 34, 35)
@@ -31,15 +31,14 @@ def rows(table: str, *numbers: int) -> set[str]:
 OUT_OF_REACH = {
     # Initial layers down to 1e-135 s and a hundred decades of time: steps by the thousand, none, or beyond a bound.
     "lsoda": rows("x03_exponential", *LAYERS, *STEEPER),
-    "bdf": rows("x03_exponential", 11, 20, 29, *LAYERS, *STEEPER),
+    "bdf": rows("x03_exponential", 20, 29, *LAYERS, *STEEPER),
     "scipy-radau": rows("x03_exponential", *LAYERS),
     # CVODE's smallest step is larger than the layers of x06 too, where its error test fails at the start.
-    "cvode": rows("x03_exponential", *LAYERS, *STEEPER) | rows("x06_stiff_exchange", 3, 8, 12, 13, 15, 16, 17, 18),
+    "cvode": rows("x03_exponential", *LAYERS, *STEEPER) | rows("x06_stiff_exchange", 3, 8, 11, 12, 13, 15, 16, 17, 18),
     # The same integrator, with a Jacobian by differences.
     "cantera": rows("x03_exponential", 2, 11, 20, 29, *LAYERS, *STEEPER)
-    | rows("x06_stiff_exchange", 8, 12, 13, 16, 17, 18),
-    # A capacity that vanishes to 40 digits at the start is algebraic for IDA's error test.
-    "ida": rows("x03_exponential", 8, *LAYERS, *STEEPER) | {"x01_endothermic_kappa_1m2e-40"},
+    | rows("x06_stiff_exchange", 3, 8, 12, 13, 16, 17, 18),
+    "ida": rows("x03_exponential", 8, *LAYERS, *STEEPER),
 }
 
 
