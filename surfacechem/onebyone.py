@@ -24,7 +24,7 @@ def batch(results: Sequence[Result]) -> Batch:
         y=np.array([result.y for result in results]),
         ydot=np.array([result.ydot for result in results]),
         ledger=np.array([result.ledger for result in results]),
-        margins=np.array([result.margins for result in results]),
+        margins=np.array([r.margins if len(r.margins) else np.zeros(r.problem.program.n_margins) for r in results]),
         outputs=filled[0],
         ledger_outputs=filled[1],
         counts=counts,

@@ -43,17 +43,23 @@ def _accuracy(case: Case, done: Sweep, changes: Mapping[str, float], threads: in
 
 
 def _against_exact(case: Case, done: Sweep, named: Reference) -> SweepAccuracy:
-    """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs."""
-    for i in {0, len(done) - 1}:
+    """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs.
+
+    Runs that end before their first output have no error.
+    """
+    begun = np.flatnonzero(done.reached.any(axis=1)).tolist()
+    if not begun:
+        raise InputError("no run reached an output.")
+    for i in {begun[0], begun[-1]}:
         exact_values(named.name, named.options, case.scene, done[i])
-    errors = np.zeros(len(done))
-    found: dict[str, list[float]] = {which: [] for which in WORDS if done.statistics}
-    for i in range(len(done)):
+    errors = np.full(len(done), np.nan)
+    found = {which: np.full(len(done), np.nan) for which in WORDS if done.statistics}
+    for i in begun:
         reference = match(references.get(named.name), named.options, Start(done[i], case.scene))
         for which, values in found.items():
-            values.append(getattr(reference, which))
+            values[i] = getattr(reference, which)
         errors[i] = _of_statistics(done, i, reference) if found else _of_quantities(done, i, reference)
-    return SweepAccuracy(errors, f"exact solution {named.name}", {which: np.array(v) for which, v in found.items()})
+    return SweepAccuracy(errors, f"exact solution {named.name}", found)
 
 
 def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
@@ -82,7 +88,7 @@ def _against_tighter(done: Sweep, changes: Mapping[str, float], threads: int | N
     for i in range(len(done)):
         if done.statistics:
             errors[i] = _of_statistics(done, i, second.statistics[i])
-        elif np.array_equal(done.reached[i], second.reached[i]):
+        elif both[i].any() and np.array_equal(done.reached[i], second.reached[i]):
             parts = [relative_error(done.named[n][i][both[i]], second.named[n][i][both[i]], FLOOR) for n in names]
             errors[i] = max(parts)
     return SweepAccuracy(errors, f"estimate: a second sweep at rtol {other:.0e}")

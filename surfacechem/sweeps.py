@@ -199,7 +199,8 @@ class Sweep:
         rows = self._inputs[self.reached]
         values = np.full((*self.reached.shape, len(system.states) + len(system.outputs)), np.nan)
         n = len(system.states)
-        values[self.reached] = np.concatenate([rows[:, 1 : 1 + n], self.model.output_function(rows)], axis=1)
+        if len(rows):
+            values[self.reached] = np.concatenate([rows[:, 1 : 1 + n], self.model.output_function(rows)], axis=1)
         names = [*(state.name for state in system.states), *(item.name for item in system.outputs)]
         return dict(zip(names, np.moveaxis(values, -1, 0), strict=True))
 

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
+import symengine
 from scenes import SITES, bodies, varying
 
 import surfacechem
 from surfacechem import integrate
 from surfacechem.assembly import assemble
-from surfacechem.assembly.enclosure import enclosure
+from surfacechem.assembly.enclosure import WHOLE, enclosure
 from surfacechem.audit import audit
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
@@ -236,9 +237,14 @@ def test_a_sweep_across_the_need_of_a_bound():
     assert data.attrs["energy_error"] < 1e-9
 
 
-def test_intervals_enclose_values():
-    import symengine
+def test_what_has_no_value_may_be_anything():
+    x = symengine.Symbol("x")
+    for nothing in (symengine.zoo, symengine.nan):
+        assert enclosure(x + nothing, {x: (0.0, 1.0)}) == WHOLE
+        assert enclosure(nothing * x**2, {x: (0.0, 1.0)}) == WHOLE
 
+
+def test_intervals_enclose_values():
     x, y = symengine.symbols("x y")
     known = {x: (-1.5, 2.0), y: (0.25, 3.0)}
     expressions = [

@@ -165,6 +165,35 @@ def test_forces_that_overflow(exponent):
     np.testing.assert_allclose(data["phi"], bond.solution(data["time"].values)["phi"], rtol=1e-6, atol=1e-12)
 
 
+def test_scenes_with_jumps_are_swept_run_by_run():
+    case = surfacechem.load("press-hold-pull")
+    data = case.sweep({"programme.1.until.p": ["8 kPa", "10 kPa"]}).dataset
+    single = case.run({"programme.1.until.p": 8e3})
+    for name in ("g_n", "t_n", "theta_bond_s", "E_total"):
+        assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
+    for name in ("energy_error", "entropy_error", "site_error"):
+        assert data[name].values[0] == single.dataset.attrs[name]
+
+
+def test_fitted_media_are_swept_run_by_run():
+    case = surfacechem.load("closing-gas-gap")
+    data = case.sweep({"initial.T_2": [500.0, 600.0]}).dataset
+    assert data["T_2"].values[1].tobytes() == case.run().dataset["T_2"].values.tobytes()
+
+
+def test_a_run_that_ends_at_its_start_leaves_the_others_alone(tmp_path):
+    limit = "interface.limits.tensile-strength"
+    case = surfacechem.load("debonding-cooling", {f"{limit}.violation": "refuse", "loading.w_n.ramp.start": "1 um"})
+    swept = case.sweep({f"{limit}.t_max": ["1 kPa", "1 GPa"]})
+    data = swept.dataset
+    assert list(data["status"].values) == ["stopped", "finished"]
+    assert data["reason"].values[0].endswith("which destroys entropy at t = 0 s")
+    assert np.isnan(data["T"].values[0]).all()
+    assert np.isnan(data["error"].values[0])
+    assert np.isfinite(data["error"].values[1])
+    assert swept.write(tmp_path / "swept.nc").exists()
+
+
 REFUSED = [
     ({"nothing": [1.0]}, None, r"no parameter 'nothing' to sweep. Known"),
     ({RATE: {"from": 1e-12, "to": 1e-9}}, None, r"a range needs `points`"),

@@ -77,10 +77,12 @@ def affine(expression: Expression) -> tuple[Hashable, float, float]:
     for part in node.args if node.is_Add else (node,):
         numbers = [item for item in part.args if item.is_Number] if part.is_Mul else []
         if part.is_Number:
-            rest += float(part)
+            rest += _real(part)
         else:
             own = symengine.Mul(*(item for item in part.args if not item.is_Number)) if numbers else part
-            terms[own] = math.prod(float(number) for number in numbers)
+            terms[own] = math.prod(_real(number) for number in numbers)
+    if not all(map(math.isfinite, (rest, *terms.values()))):
+        return node, 1.0, 0.0
     if not terms:
         return 0, 0.0, rest
     leading = min(terms, key=hash)
@@ -90,10 +92,14 @@ def affine(expression: Expression) -> tuple[Hashable, float, float]:
     return frozenset((term, value / factor) for term, value in terms.items()), factor, rest
 
 
+def _real(number: Any) -> float:
+    return float(number) if number.is_real else math.nan
+
+
 def narrowed(known: Known, expression: Expression, low: float, high: float) -> Known:
     """What is known where an expression also lies between two values."""
     core, factor, rest = affine(expression)
-    if factor == 0 or not math.isfinite(factor):
+    if factor == 0:
         return known
     ends = sorted(((low - rest) / factor, (high - rest) / factor))
     before = known.get(core, WHOLE)
