@@ -226,6 +226,7 @@ class Model:
         )
 
         self._check_start(values, parameters[0], initial)
+
     def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.system.equilibria:
