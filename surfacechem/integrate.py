@@ -225,7 +225,10 @@ class Model:
             record_steps=True,
         )
 
-        self._check_start(values, parameters[0], initial)
+    def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:
+        """Refuse an initial state outside the range of a law, in the modes that hold there."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        check_start(self.system, {**values, **dict(zip(paths, parameters.tolist(), strict=True))}, initial)
 
     def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
