@@ -205,23 +205,29 @@ class _Books:
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},
-            {law: self.destroyed(law) for law in columns},
+            {law: self.destroyed(law, c) for law, c in columns.items()},
         )
 
-    def destroyed(self, law: str) -> float:
-        """Part of the entropy that a law turns over that it destroys, by the ledger at the steps.
+    def destroyed(self, law: str, column: Array) -> float:
+        """Part of the entropy that a law turns over that it destroys, by the ledger or at the ends of the steps.
 
-        One point says nothing of the steps beside it where production jumps, at the end of a stretch above all. All of
-        it where no step is known, nothing where it is less than the last digits of the total.
+        All of it where no step is known; nothing where it is less than the last digits of the total. The end of a
+        stretch says nothing of the step before it: production may jump there.
         """
         steps = self.trajectory.result.steps
         if steps is None or len(steps.t) < 2:
             return 1.0
         accounts = enumerate(self.system.ledger)
         columns = [j for j, a in accounts if a.kind == "entropy production" and a.law == law]
-        produced = np.diff(steps.ledger[:, columns].sum(axis=1))
-        amount = float(-np.minimum(produced, 0.0).sum())
-        return 0.0 if amount <= self.entropy_rounding else _share(amount, float(np.abs(produced).sum()))
+        booked = np.diff(steps.ledger[:, columns].sum(axis=1))
+        lengths = np.diff(steps.t, prepend=steps.t[0])
+        if steps.segment is not None:
+            lengths[:-1][np.diff(steps.segment) > 0] = 0.0
+        within = column[len(self.trajectory.result.times) :]
+        seen = within * lengths[: len(within)]
+        amount = max(float(-np.minimum(produced, 0.0).sum()) for produced in (booked, seen))
+        whole = max(float(np.abs(produced).sum()) for produced in (booked, seen))
+        return 0.0 if amount <= self.entropy_rounding else _share(amount, whole)
 
     def _before_end(self, values: Array) -> Array:
         """The values but for that of the last step, where a law that ends there may have none."""
