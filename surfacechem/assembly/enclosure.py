@@ -75,11 +75,11 @@ def affine(expression: Expression) -> tuple[Hashable, float, float]:
     node = symengine.expand(expression, deep=False)
     terms, rest = {}, 0.0
     for part in node.args if node.is_Add else (node,):
-        numbers = [item for item in part.args if item.is_Number] if part.is_Mul else []
-        if part.is_Number:
+        numbers = [item for item in part.args if _is_number(item)] if part.is_Mul else []
+        if _is_number(part):
             rest += float(part)
         else:
-            own = symengine.Mul(*(item for item in part.args if not item.is_Number)) if numbers else part
+            own = symengine.Mul(*(item for item in part.args if not _is_number(item))) if numbers else part
             terms[own] = math.prod(float(number) for number in numbers)
     if not terms:
         return 0, 0.0, rest
@@ -88,6 +88,11 @@ def affine(expression: Expression) -> tuple[Hashable, float, float]:
     if len(terms) == 1:
         return leading, factor, rest
     return frozenset((term, value / factor) for term, value in terms.items()), factor, rest
+
+
+def _is_number(item: Expression) -> bool:
+    """Whether it is a number, and not what a division by zero leaves."""
+    return bool(item.is_Number and item.is_real)
 
 
 def narrowed(known: Known, expression: Expression, low: float, high: float) -> Known:
