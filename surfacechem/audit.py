@@ -130,10 +130,35 @@ class _Books:
         return np.zeros((0, 0)) if steps is None else steps.ledger[:, columns]
 
     def rounding(self) -> float:
-        """Rounding of the total energy at each step, added up."""
-        steps = self.trajectory.result.steps
+        """Rounding of the total energy at each step, added up, and that of the time in which work was done."""
         once = max(self.trajectory.roundings["E_total"], EPSILON * _largest([self.column("E_total")]))
-        return once * (ROUNDINGS + (0 if steps is None else len(steps.t)))
+        return once * self.roundings + self._untimed()
+
+    def _untimed(self) -> float:
+        """Energy within the last digits of time: of a history that is steep in it no more is known."""
+        steps, model, result = self.trajectory.result.steps, self.trajectory.model, self.trajectory.result
+        if steps is None or not len(steps.t):
+            return 0.0
+        later = model.evaluate(result, steps.t * (1 + EPSILON), steps.y, steps.ydot, steps.segment)
+        now = self.trajectory.everywhere["E_total"][len(result.times) :]
+        return _largest([later[:, self.names.index("E_total")] - now])
+
+    @cached_property
+    def roundings(self) -> int:
+        """Number of last digits that add up."""
+        steps = self.trajectory.result.steps
+        return ROUNDINGS + (0 if steps is None else len(steps.t))
+
+    @cached_property
+    def turned(self) -> float:
+        """Largest entropy that was exchanged or produced [J/(m^2 K)]."""
+        return _largest([self.changes("S_"), self.booked("entropy supply"), self.booked("entropy production")])
+
+    @cached_property
+    def entropy_rounding(self) -> float:
+        """Rounding of the total entropy at each step, added up [J/(m^2 K)]."""
+        once = EPSILON * max(self.turned, _largest([self.column("S_total")]))
+        return max(self.trajectory.roundings["S_total"], once) * self.roundings
 
     def changes(self, prefix: str) -> Array:
         """Changes of the named totals since the start, shape (times, totals)."""
@@ -148,14 +173,13 @@ class _Books:
 
     def audit(self) -> Audit:
         exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation"), self.between()]
-        turned = [self.changes("S_"), self.booked("entropy supply"), self.booked("entropy production")]
         low, high, destroyed = self.production()
         return Audit(
             energy=self.residual("E_total", ("energy supply",)),
             entropy=self.residual("S_total", ("entropy supply", "entropy production")),
             sites=self.sites(),
             energy_scale=_largest(exchanged),
-            entropy_scale=_largest(turned),
+            entropy_scale=self.turned,
             rtol=self.trajectory.run.rtol,
             energy_rounding=self.rounding(),
             least=low,
@@ -181,17 +205,29 @@ class _Books:
         return (
             {law: float(c.min()) for law, c in columns.items()},
             {law: float(c.max()) for law, c in columns.items()},
-            {law: self.destroyed(c) for law, c in columns.items()},
+            {law: self.destroyed(law, c) for law, c in columns.items()},
         )
 
-    def destroyed(self, column: Array) -> float:
-        """Part of the entropy of all steps that comes with the wrong sign; all of it where no step is known."""
+    def destroyed(self, law: str, column: Array) -> float:
+        """Part of the entropy that a law turns over that it destroys, by the ledger or at the ends of the steps.
+
+        All of it where no step is known; nothing where it is less than the last digits of the total. The end of a
+        stretch says nothing of the step before it: production may jump there.
+        """
         steps = self.trajectory.result.steps
         if steps is None or len(steps.t) < 2:
             return 1.0
+        accounts = enumerate(self.system.ledger)
+        columns = [j for j, a in accounts if a.kind == "entropy production" and a.law == law]
+        booked = np.diff(steps.ledger[:, columns].sum(axis=1))
+        lengths = np.diff(steps.t, prepend=steps.t[0])
+        if steps.segment is not None:
+            lengths[:-1][np.diff(steps.segment) > 0] = 0.0
         within = column[len(self.trajectory.result.times) :]
-        production = within * np.diff(steps.t, prepend=steps.t[0])[: len(within)]
-        return float(_share(-np.minimum(production, 0.0).sum(), np.abs(production).sum()))
+        seen = within * lengths[: len(within)]
+        amount = max(float(-np.minimum(produced, 0.0).sum()) for produced in (booked, seen))
+        whole = max(float(np.abs(produced).sum()) for produced in (booked, seen))
+        return 0.0 if amount <= self.entropy_rounding else _share(amount, whole)
 
     def _before_end(self, values: Array) -> Array:
         """The values but for that of the last step, where a law that ends there may have none."""

@@ -202,16 +202,15 @@ class Model:
         """The initial value problem; InputError where the initial state is not admissible."""
         system = self.system
         initial = {state.name: state.from_given(values) for state in system.states}
-        check_start(system, values, initial)
         end = run.times[-1]
         segments = self._segments(end, values)
         scales = np.array([state.finest or state.scale for state in system.states])
         parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
         pieces.start_modes(system, parameters, values)
+        self._check_start(values, parameters[0], initial)
         start = self._start(np.array(list(initial.values())), parameters)
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
-            settled = {parameter.path: value for parameter, value in zip(system.parameters, parameters[0], strict=True)}
-            check_start(system, {**values, **settled}, dict(zip(initial, start.tolist(), strict=True)))
+            self._check_start(values, parameters[0], dict(zip(initial, start.tolist(), strict=True)))
         return Problem(
             program=self.program,
             y0=start,
@@ -225,6 +224,11 @@ class Model:
             max_seconds=run.max_seconds,
             record_steps=True,
         )
+
+    def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:
+        """Refuse an initial state outside the range of a law, in the modes that hold there."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        check_start(self.system, {**values, **dict(zip(paths, parameters.tolist(), strict=True))}, initial)
 
     def _start(self, y: Array, table: Array) -> Array:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""

@@ -161,6 +161,7 @@ class Jumper:
         return self._judged(
             Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),
             books,
+            noise,
         )
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, noise: float) -> Point | None:
@@ -169,14 +170,26 @@ class Jumper:
             return after
         return replace(after, parameters=parameters)
 
-    def _judged(self, jump: Jump, books: Array) -> Jump:
+    def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
         now = self._books(jump.after.inputs())
         before, after = float(books[1]), float(now[1])
         gain = after - before + jump.entropy_out
         size = max(abs(before), abs(after), abs(jump.entropy_out))
+        known = ROUNDING * size + self._entropy_rounding(jump, noise)
         work = dict(zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True))
-        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -ROUNDING * size else VIOLATES, work=work)
+        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -known else VIOLATES, work=work)
+
+    def _entropy_rounding(self, jump: Jump, noise: float) -> float:
+        """Entropy that the last digits of the states stand for, and the noise of what the margin measures."""
+        point, n = jump.before, len(jump.before.y)
+        nudges = DIGITS * np.abs(point.y)
+        if jump.transition.measure:
+            nudges[self.states.index(jump.transition.measure)] += noise
+        rows = np.repeat(point.inputs()[None], 1 + n, axis=0)
+        rows[1:, 1 : 1 + n] += np.diag(nudges)
+        entropies = self._books(rows)[:, 1]
+        return float(np.sum(np.abs(entropies[1:] - entropies[0])))
 
     def _heated(self, point: Point, kind: str, energy: float) -> tuple[Point, float, float, float] | None:
         """The point with the released energy in its sinks: point, energy, heat and entropy passed to reservoirs."""

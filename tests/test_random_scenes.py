@@ -121,6 +121,11 @@ def test_random_scenes(seed):
         reject()
 
 
+@pytest.mark.parametrize("seed", [2011, 8028, 11002, 11028, 14017, 18006, 20005, 22021, 25001, 34015])
+def test_scenes_that_once_ended_untruly(seed):
+    check(seed)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_a_thousand_random_scenes(block):

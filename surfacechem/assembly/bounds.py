@@ -103,8 +103,8 @@ def _hold(build: Build, held: Expression, bound: Bound) -> None:
     # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
     margin = where(held**2 > 0, 1, where(bound.beyond > 0, bound.gap, 1))
     name, reason, *_ = bound.words
-    jump = {symengine.Symbol("phi"): bound.value}
-    build.transitions.append(Transition(name, margin, reason, {held: symengine.Integer(bound.side)}, jump))
+    modes, jump = {held: symengine.Integer(bound.side)}, {symengine.Symbol("phi"): bound.value}
+    build.transitions.append(Transition(name, margin, reason, modes, jump, measure="phi"))
 
 
 def _let_go(build: Build, held: Expression, bound: Bound) -> None:
