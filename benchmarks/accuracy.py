@@ -1,8 +1,11 @@
 """Achieved against requested accuracy over all exact solutions: the worst of every decade, and what it cost.
 
-python benchmarks/accuracy.py
+python benchmarks/accuracy.py [output folder]
+
+Every error is kept in accuracy.csv, in benchmarks/results if no folder is given.
 """
 
+import csv
 import sys
 from pathlib import Path
 
@@ -15,9 +18,13 @@ WORST = 3
 
 def main() -> None:
     """A line for the worst of each accuracy; the ratio is to what was asked, or to what rounding of times leaves."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "results"
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = []
     print(f"{len(EXACT)} exact solutions\n{'asked':>8} {'ratio':>8} {'error':>9} {'rounding':>9}  run")
     for accuracy in ACCURACIES:
         found = {name: achieved(accuracy) for name, achieved in EXACT.items()}
+        kept += [(name, f"{accuracy:.0e}", run.error, run.rounding, run.rtol) for name, run in found.items()]
         worst = sorted(found, key=lambda name: found[name].ratio(accuracy), reverse=True)[:WORST]
         for name in worst:
             run = found[name]
@@ -27,6 +34,10 @@ def main() -> None:
         within = sum(run.ratio(accuracy) <= 1 for run in found.values())
         tighter = sum(run.rtol < accuracy / 1000 and run.rtol > 1e-13 for run in found.values())
         print(f"{'':8} {within} of {len(found)} within once, {tighter} run again at a tighter tolerance")
+    with (folder / "accuracy.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["exact solution", "asked", "error", "error by rounding of the times", "rtol"])
+        rows.writerows(kept)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ import surfacechem.simulation; done("import the package")
 simulation = surfacechem.simulation.load(sys.argv[1]); done("read and check the case")
 simulation.system; done("assemble the equations")
 simulation.model; done("compile the equations")
-from surfacechem.solvers import stepper; stepper.run_batch(); done("load the stepper (numba)")
+from surfacechem.solvers import stepper; stepper.load_briefly(); stepper.run_batch(); done("load the stepper")
 solution = simulation.run(); done("solve, and again for the error")
 with tempfile.TemporaryDirectory() as folder:
     solution.write(folder + "/run.nc"); done("write the dataset (netCDF4)")

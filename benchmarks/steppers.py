@@ -1,9 +1,10 @@
 """Time against achieved error of every solver, in one interleaved run, and the throughput of a sweep.
 
-    python benchmarks/steppers.py [--quick] [output folder]
+    python benchmarks/steppers.py [--quick] [--cases P1,P4] [output folder]
 
 Keeps, in benchmarks/results if no folder is given, the times (steppers.csv), how many times longer than ours each
-solver takes to the same error (ratios.csv), the machine and the versions (environment.json) and figures.
+solver takes to the same error (ratios.csv), the machine and the versions (environment.json) and figures. The ratios
+are shown beside those that were kept before, and what has become slower against its peers is listed.
 
 P1 is exothermic bonding with 200 outputs (exact solution), P2 a Bell cluster to its rupture, P3 a stick-slip slider
 through 24 events, P4 Robertson's problem to 1e11 s. "scipy-LSODA" and "scikit-sundae-CVODE" are the libraries
@@ -52,6 +53,9 @@ from surfacechem.solvers.radau import solve_many
 
 REPEATS = 3
 CASES = ("P1", "P2", "P3", "P4")
+ERRORS = (1e-4, 1e-6, 1e-7, 1e-8, 1e-10)
+REGRESSION = 0.7
+"""A ratio below this part of the one that was kept is more than the noise of an interleaved run."""
 ROBERTSON_END = np.array([2.083340149701255e-08, 8.333360770334713e-14])
 Run = Callable[[], np.ndarray]
 
@@ -253,18 +257,54 @@ def seconds_at(curves: list[Curve], case: str, name: str, error: float) -> float
     return float(np.exp(np.interp(np.log(error), errors, fastest)))
 
 
-def compare(curves: list[Curve], folder: Path) -> None:
-    """Times at equal error and how many times longer than ours, NaN where the error is not reached."""
+Ratios = dict[tuple[str, str, str], tuple[float, float]]
+
+
+def ratios(curves: list[Curve]) -> Ratios:
+    """By case, error and solver: time at equal error and how many times longer than ours, NaN if it is not reached."""
+    found = {}
+    for case, error in itertools.product(dict.fromkeys(curve.case for curve in curves), ERRORS):
+        ours = seconds_at(curves, case, "radau", error)
+        for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
+            taken = seconds_at(curves, case, name, error)
+            found[case, f"{error:.0e}", name] = 1e6 * taken, taken / ours
+    return found
+
+
+def kept(folder: Path) -> Ratios:
+    """The ratios of the last run that was kept."""
+    file = folder / "ratios.csv"
+    if not file.exists():
+        return {}
+    with file.open(newline="") as lines:
+        rows = list(csv.reader(lines))[1:]
+    return {(case, error, name): (float(micro), float(ratio)) for case, error, name, micro, ratio in rows}
+
+
+def keep(found: Ratios, before: Ratios, folder: Path) -> None:
+    """Write the ratios; those of cases that were not run stay."""
     with (folder / "ratios.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["case", "error", "solver", "microseconds", "times ours"])
-        for case, error in itertools.product(CASES, (1e-4, 1e-6, 1e-7, 1e-8, 1e-10)):
-            ours = seconds_at(curves, case, "radau", error)
-            for name in dict.fromkeys(curve.name for curve in curves if curve.case == case):
-                taken = seconds_at(curves, case, name, error)
-                rows.writerow([case, f"{error:.0e}", name, f"{1e6 * taken:.1f}", f"{taken / ours:.1f}"])
-                ratio = "not reached" if np.isnan(taken) else f"{1e6 * taken:10.1f} us {taken / ours:8.1f}x"
-                print(f"{case} to {error:.0e}  {name:20s} {ratio}")
+        for (case, error, name), (micro, ratio) in sorted((before | found).items()):
+            rows.writerow([case, error, name, f"{micro:.1f}", f"{ratio:.1f}"])
+
+
+def compare(found: Ratios, before: Ratios) -> list[str]:
+    """The table of ratios beside those that were kept; lines on what has become slower against its peers."""
+    slower = []
+    for key, (micro, ratio) in found.items():
+        case, error, name = key
+        line = f"{case} to {error}  {name:20s}"
+        if np.isnan(ratio):
+            print(f"{line} not reached")
+            continue
+        old = before.get(key, (np.nan, np.nan))[1]
+        change = "" if np.isnan(old) else f"   kept {old:8.1f}x, now / kept {ratio / old:5.2f}"
+        print(f"{line} {micro:10.1f} us {ratio:8.1f}x{change}")
+        if ratio < REGRESSION * old:
+            slower.append(f"{line} {old:.1f}x -> {ratio:.1f}x")
+    return slower
 
 
 def environment() -> dict[str, str]:
@@ -283,24 +323,39 @@ def environment() -> dict[str, str]:
     }
 
 
+def all_curves(cases: list[str]) -> list[Curve]:
+    """Every solver at every tolerance on the chosen cases."""
+    curves = []
+    if "P1" in cases:
+        curves += [c for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for c in p1_curves(rtol)]
+    if "P4" in cases:
+        curves += [c for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for c in p4_curves(rtol)]
+    if {"P2", "P3"} & set(cases):
+        both = [c for rtol in (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11, 1e-12) for c in event_curves(rtol)]
+        curves += [c for c in both if c.case in cases]
+    return curves
+
+
 def main() -> None:
     """Run everything."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="no sweeps")
+    parser.add_argument("--cases", default=",".join(CASES), help="some of the problems, with commas between")
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "results")
     choice = parser.parse_args()
-    folder = choice.folder
+    folder, cases = choice.folder, choice.cases.split(",")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "environment.json").write_text(json.dumps(environment(), indent=2) + "\n")
-    curves = [curve for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12) for curve in p1_curves(rtol)]
-    curves += [curve for rtol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12) for curve in p4_curves(rtol)]
-    curves += [curve for rtol in (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11, 1e-12) for curve in event_curves(rtol)]
+    curves = all_curves(cases)
     measure(curves)
     report(curves, folder)
     plot(curves, folder)
-    compare(curves, folder)
+    found, before = ratios(curves), kept(folder)
+    slower = compare(found, before)
+    keep(found, before, folder)
     if not choice.quick:
         sweeps()
+    print("\n".join(["against the ratios that were kept, slower:", *slower] if slower else ["nothing is slower"]))
 
 
 def sweeps() -> None:

@@ -93,7 +93,7 @@ def run(
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(target)
-    solution = solved(lambda: simulation.run(run=settings, error=error), quiet)
+    solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
     solution.write(target)
     _conclude(solution, target, quiet)
 
@@ -314,7 +314,7 @@ def _solved_case(name: str, changes: list[str] | None) -> Solution:
     from surfacechem.simulation import load
 
     simulation = load(name, changes or ())
-    return solved(simulation.run, quiet=False)
+    return solved(simulation.run, quiet=False, brief=True)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -329,7 +329,7 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(output)
-    solution = solved(lambda: again.run_again(record), quiet)
+    solution = solved(lambda: again.run_again(record), quiet, brief=True)
     if output:
         solution.write(output)
     different = again.differences(record, solution)

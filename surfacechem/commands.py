@@ -86,9 +86,14 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     return replace(run, solver=solver or run.solver)
 
 
-def solved(run: Callable[[], S], quiet: bool) -> S:
-    """The solution, its dataset's columns and audit included, so that what follows only writes."""
+def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
+    """The solution, its dataset's columns and audit included, so that what follows only writes; ``brief`` where the
+    stepper is called a few times only.
+    """
     from surfacechem.solvers import stepper
+
+    if brief:
+        stepper.load_briefly()
 
     if not (quiet or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)

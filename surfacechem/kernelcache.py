@@ -43,7 +43,7 @@ def _processor() -> str:
 def kernel_folder(sources: Sequence[Path]) -> Path:
     """Where code compiled from these sources, here, is kept."""
     digest = hashlib.sha256()
-    for text in (version("numba"), sys.version, platform.machine(), _processor()):
+    for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), _processor()):
         digest.update(text.encode())
     for source in sources:
         digest.update(source.read_bytes())

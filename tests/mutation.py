@@ -33,10 +33,11 @@ LONGEST = 600
 """Seconds after which a mutant that hangs counts as noticed."""
 
 OF_BALANCES = [
-    ["equation_values"],
+    ["balances", "equation_values"],
     ["thermodynamics", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "bonds"],
     ["tables", "tables_bonds", "tables_mechanics"],
-    ["events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
+    ["paces", "events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
+    ["rupture", "conduction"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],

@@ -98,6 +98,18 @@ def test_the_contact_goes_to_the_temperature_of_the_effusivities_at_once():
     assert run.accuracy.error < 1e-4
 
 
+@pytest.mark.parametrize("bulk", ["constant", "quadratic"])
+def test_two_temperatures_in_contact_become_the_one_that_keeps_their_energy(bulk):
+    """With energies that are quadratic in temperature that is a mean of squares."""
+    text = TWO.format(
+        first="T", second="T", heat="", lower=LOWER + ", cells: 4", upper=UPPER + ", cells: 4",
+        initial="profile_1: 400 K, profile_2: 300 K",
+    ).replace("capacity: constant", f"capacity: {bulk}")  # fmt: skip
+    start = float(Simulation(load_text(text)).run().dataset["T"][0])
+    power = 1 if bulk == "constant" else 2
+    assert start == pytest.approx(((4 * 400**power + 9 * 300**power) / 13) ** (1 / power), rel=1e-13)
+
+
 @pytest.mark.parametrize("far", FAR)
 @pytest.mark.parametrize("perfect", [True, False])
 def test_both_laws_are_kept_by_the_cells(far, perfect):

@@ -1,6 +1,7 @@
 """Heat paths: conductance laws against exact tables, closures, the ledger of fluxes, ranges and behaviour at touch."""
 
 import dataclasses
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scenes import bodies, path
 from surfacechem.achieved import computed
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
+from surfacechem.case import load_text
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bonding import BondEnergy
@@ -30,6 +32,7 @@ from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.printing import python
 from surfacechem.quantities import STEFAN_BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene
+from surfacechem.simulation import Simulation
 from surfacechem.solution import Solution
 
 ENDS = ("lower", "upper")
@@ -329,3 +332,24 @@ def test_reservoirs_exchange_by_radiation_with_the_surroundings():
     trajectory = solved(scene, 0.0, 100.0)
     assert audit(trajectory).energy_error < 1e-10
     assert computed(trajectory)["q_1a"][0] == pytest.approx(0.9 * STEFAN_BOLTZMANN * (600.0**4 - 290.0**4), rel=1e-13)
+
+
+def test_heat_into_a_body_that_is_kept_warm_is_all_that_the_interface_gives():
+    """Prescribed temperatures: conduction from the other body, friction, and bonds at their internal energy."""
+    text = """
+    T_0: 300 K
+    bodies: {lower: {temperature: T_1}, upper: {temperature: T_2}}
+    interface:
+      temperature: T_1
+      sites: 1e18 1/m^2
+      potential: [bond-energy: {K_0: 0.5 J/m^2, K_1: 0.2 J/m^2}]
+      friction: [coulomb: {mu: 0.25}]
+      bonding: [relaxation: {tau: 0.5 s}]
+    heat: [conductance: {between: [upper, interface], h: 30 W/m^2/K}]
+    loading: {T_1: 310 K, T_2: 350 K, p: 1 kPa, v: 2 mm/s}
+    initial: {phi: 0}
+    run: {times: [0.5, 1, 2], rtol: 1e-12}
+    """
+    data = Simulation(load_text(dedent(text))).run().dataset
+    np.testing.assert_allclose(data.q_1, 30 * 40 + 0.25 * 1e3 * 2e-3 + np.exp(-4 * data.time), rtol=1e-12)
+    np.testing.assert_allclose(data.q_2, -30 * 40, rtol=1e-14)

@@ -102,6 +102,13 @@ def test_a_rigid_interface_that_has_debonded_bears_no_tension():
     assert second.released == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_sticks_slides_both_ways():
+    loading = {"p": Hold(level=1e5), "w_t": Ramp(rate=1e-6)}
+    trajectory = solve(until=1e-3, loading=loading, frictions=[Coulomb(mu=0.5)], tangential=Mounting(k=1e8, m=1.0))
+    (slip,) = (mode for mode in trajectory.model.system.modes if mode.name == "slip")
+    assert slip.words == {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+
+
 def test_a_dead_shear_load_sticks_up_to_the_limit_and_ends_there():
     loading = {"p": Hold(level=1e5), "F_t": Ramp(rate=1e4)}
     trajectory = solve(until=10.0, loading=loading, frictions=[Coulomb(mu=0.5)])

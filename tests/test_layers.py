@@ -26,6 +26,7 @@ FLOORS = {
         "compile",
         "preparing",
         "kernelcache",
+        "objectcode",
     ],
     "time": [
         "solvers.*",

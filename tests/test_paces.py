@@ -10,6 +10,7 @@ from surfacechem.integrate import Model, Run
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
+from surfacechem.pacing import paces
 from surfacechem.scene import Interface, Mounting, Scene
 
 ZONE = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)
@@ -37,6 +38,22 @@ def test_a_damper_too_light_for_the_passage_of_a_fold_says_so(c_g):
     trajectory = solve(20.0, [ZONE], initial=initial, loading={"w_n": Ramp(rate=1e-8)}, normal=mount)
     assert trajectory.status == "failed"
     assert "leave out the damper" in trajectory.reason
+
+
+@pytest.mark.parametrize(("c_b", "c_g"), [(3e2, 5e2), (4e2, 4e2), (8e2, 0.0), (0.0, 8e2)])
+def test_dampers_of_the_bodies_and_of_the_gap_relax_together(c_b, c_g):
+    scene = Scene(
+        bodies("T", "T"),
+        Interface("T", [ZONE]),
+        loading={"w_n": Ramp(rate=1e-8)},
+        T_0=300.0,
+        initial={"T": 300.0, "g_n": 0.0},
+        normal=Mounting(k=1e13, c_b=c_b, c_g=c_g),
+    )
+    model = Model(assemble(scene))
+    ((pace, time),) = paces(model.system, model.values())
+    assert pace.text == "relaxation of the normal gap"
+    assert time == pytest.approx(8e2 / 1e13, rel=1e-14)
 
 
 def test_a_light_damper_touches_and_releases_once():

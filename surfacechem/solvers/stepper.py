@@ -5,12 +5,12 @@ Importing this module imports neither Numba nor the kernel.
 
 import threading
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from surfacechem import objectcode
 from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
 
 _SOURCES = (
@@ -43,8 +43,7 @@ def is_compiled() -> bool:
     return is_filled(_folder())
 
 
-@cache
-def _run_batch() -> Any:
+def _compiled() -> Any:
     from numba import boolean, float64, int64, void
 
     from surfacechem.solvers.native import PARTS
@@ -76,6 +75,7 @@ def _run_batch() -> Any:
     )
     kernel = compile_kernel(run_batch, signature, _folder(), PARTS)
     _call_once(kernel, signature.args)
+    objectcode.keep(kernel, _folder())
     return kernel
 
 
@@ -84,10 +84,24 @@ def _call_once(kernel: Any, kinds: Sequence[Any]) -> None:
     kernel(*(np.zeros((0,) * kind.ndim, str(kind.dtype)) if hasattr(kind, "ndim") else 0 for kind in kinds))
 
 
+class _Loaded:
+    kernel: Any = None
+
+
 def run_batch() -> Any:
     """The compiled loop over a batch of runs, or of states to be made consistent."""
     with _LOCK:
-        return _run_batch()
+        if _Loaded.kernel is None:
+            _Loaded.kernel = _compiled()
+        return _Loaded.kernel
+
+
+def load_briefly() -> None:
+    """Load the stepper without its compiler where that can be: ready sooner, slower to call; for a process of few
+    runs.
+    """
+    with _LOCK:
+        _Loaded.kernel = _Loaded.kernel or objectcode.load(_folder())
 
 
 def compile_stepper() -> None:

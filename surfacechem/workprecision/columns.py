@@ -99,8 +99,12 @@ def stepping(point: Point) -> float:
 
 def count(point: Point, name: str) -> float:
     """A count of a solver; NaN where its library does not tell."""
-    untold = name == "rejected" and not method(point.solver).counts_rejected
-    return np.nan if point.counters is None or untold else float(getattr(point.counters, name))
+    counters = point.counters
+    if counters is None or (name == "rejected" and not method(point.solver).counts_rejected):
+        return np.nan
+    if name == "factorizations" and counters.jacobians > 0 and counters.factorizations == 0:
+        return np.nan
+    return float(getattr(counters, name))
 
 
 def _of_variables(plan: Plan, cases: Sequence[Measured], names: Sequence[str]) -> list[Column]:

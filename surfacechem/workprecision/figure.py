@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from surfacechem.plots import COLOURS, STYLE, Plot, opened
 from surfacechem.workprecision.columns import LABELS
@@ -57,6 +58,8 @@ def figure(data: xarray.Dataset | str | Path) -> Figure:
 
 def _draw(ax: Axes, case: xarray.Dataset, name: str) -> None:
     ax.set(xscale="log", yscale="log")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
     limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
     for k, solver in enumerate(case["solver"].values):
         _draw_solver(ax, case.sel(solver=solver), name, limit, k)

@@ -34,9 +34,10 @@ have taken {BUDGET:g} s together are not timed again. The least time counts; med
 Compilation is apart.
 
 Libraries are called step by step from Python through the adapters of this package, which look for events within each
-step and write the outputs. "In steps" is the part of the time inside the library's own steps, with the right-hand sides
-that it asked for: the least that a leaner adapter could come to. radau does all of it in compiled code; it takes
-tolerances above {LOOSEST:g} as {LOOSEST:g}. A count that a library does not tell is left empty.
+step, write the outputs and integrate the ledger of the balances. "In steps" is the part of the time inside the
+library's own steps, with the right-hand sides that it asked for: the least that a leaner adapter could come to. radau
+does all of it in compiled code; it takes tolerances above {LOOSEST:g} as {LOOSEST:g}. A count that a library does not
+tell is left empty.
 """
 
 
