@@ -55,6 +55,7 @@ def files(folder):
 
 RISING = "{ramp: {start: 300 K, rate: 1 K/s}}"
 GIVEN = """
+T_0: 300 K
 bodies:
   lower: {temperature: 300 K}
   upper: {temperature: OTHER}
