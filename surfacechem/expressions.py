@@ -201,7 +201,13 @@ def positive(x: Expression) -> Expression:
 
 
 def power(base: Expression, exponent: Expression) -> Expression:
-    """base**exponent; a fractional power of what rounding has carried below zero is zero."""
+    """base**exponent; a fractional power of what rounding has carried below zero is zero.
+
+    >>> power(4.0, -0.5), power(-1.0, -0.5)
+    (0.5, 0.0)
+    """
     if isinstance(exponent, int):
         return base**exponent
+    if isinstance(base, int | float) and base <= 0:
+        return 0.0
     return where(base > 0, positive(base) ** exponent, 0 * base)

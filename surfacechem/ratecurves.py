@@ -14,6 +14,7 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.assembly.pairs import Opposed, opposed
+from surfacechem.assembly.pulled import lengths
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
@@ -51,13 +52,14 @@ class Curves:
         }
         self._amounts = {variable.name: variable.density for variable in mechanism.variables}
         self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
+        self._lengths = lengths(self.laws, self.pairs)
         self._psi = sum(self._call(_alone(law).statement) for law in mechanism.potentials)
 
     @property
     def loaded(self) -> bool:
         """Whether a force changes any rate or constant."""
         rates = (self._log_rate([label], law.change) for label, law in self.laws.items())
-        constants = (self._log_equilibrium(law.change) for law in self.laws.values())
+        constants = (self._log_equilibrium(law.change, False) for law in self.laws.values())
         return any(depends(expression, FORCE) for expression in (*rates, *constants))
 
     @property
@@ -93,22 +95,25 @@ class Curves:
 
     def log_equilibrium(self, label: str, temperatures: Array, forces: Array) -> Array:
         """Logarithm of the equilibrium constant of the coverages."""
-        return self._evaluate(self._log_equilibrium(self.laws[label].change), temperatures, forces)
+        paired = any(label in pair.labels for pair in self.pairs)
+        return self._evaluate(self._log_equilibrium(self.laws[label].change, paired), temperatures, forces)
 
     def departure(self, pair: Opposed, temperatures: Array, forces: Array) -> Array:
         """ln(k_f/k_r) - ln K of reactions that undo each other."""
         forward, backward = (self._log_rate(laws, pair.change) for laws in (pair.forward, pair.backward))
-        return self._evaluate(forward - backward - self._log_equilibrium(pair.change), temperatures, forces)
+        return self._evaluate(forward - backward - self._log_equilibrium(pair.change, True), temperatures, forces)
 
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
         """At coverages of one, over the amount of the bond that the reaction makes or breaks."""
         total = log_sum([self._call(self._bound[label].log_forward) for label in labels])
         return self._filled(total) - log(min(self._amounts[name] for name in change))
 
-    def _log_equilibrium(self, change: Mapping[str, int | float]) -> Expression:
+    def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
+        """With the work of a prescribed force on reactions that undo each other."""
         total: Expression = 0
         for name, nu in change.items():
             total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]
+            total -= nu * FORCE * self._lengths.get(name, 0) if paired else 0
         return self._filled(-total / (BOLTZMANN * TEMPERATURE))
 
     def _filled(self, expression: Expression) -> Expression:

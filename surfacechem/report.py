@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from surfacechem.system import System
 
 REGIMES = {
+    "isothermal": "bodies and interface are kept at one temperature; heat is what has to be supplied for it.",
+    "prescribed temperatures": "bodies and interface follow given temperatures; heat is what that takes.",
     "perfect contact": "both bodies and the interface share one temperature; the heat fluxes follow from the balances.",
     "one-sided perfect contact": "the interface shares the temperature of one body; heat passes to the other by laws.",
     "separate interface temperature": "the interface has its own temperature; heat passes to the bodies by laws.",

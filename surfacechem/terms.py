@@ -303,6 +303,11 @@ class RateLaw(Law):
         return self.stoichiometry()
 
     @property
+    def distance(self) -> Expression | None:
+        """Distance to the transition state [m] along the force per bond, where that is all that the force does."""
+        return None
+
+    @property
     def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
         """Enthalpy and Gibbs energy [J] that one reaction takes from what is beside the interface; None where nothing.
 

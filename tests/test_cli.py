@@ -53,6 +53,22 @@ def files(folder):
     return {path.name for path in folder.iterdir()} - {"bonding.yaml", "cooling.yaml"}
 
 
+RISING = "{ramp: {start: 300 K, rate: 1 K/s}}"
+GIVEN = """
+T_0: 300 K
+bodies:
+  lower: {temperature: 300 K}
+  upper: {temperature: OTHER}
+interface:
+  temperature: 300 K
+  sites: 1e18 1/m^2
+  potential: [bond-energy: {K_0: 150 J/m^2}]
+  bonding: [linear-affinity: {c_r: 1e16 1/J/s}]
+initial: {phi: 0}
+run: {until: 1 s}
+"""
+
+
 class TestRun:
     def test_writes_a_dataset_and_says_what_was_done(self, call, tmp_path):
         done = call("run", "bonding.yaml")
@@ -175,6 +191,16 @@ class TestCheck:
         done = call("check", "medium.yaml")
         assert re.search(r"T_c +\[K\] +algebraic", done.stdout), done.output
         assert "separate interface temperature" in done.stdout
+
+    @pytest.mark.parametrize(
+        ("other", "regime"),
+        [("300 K", "isothermal"), ("301 K", "prescribed temperatures"), (RISING, "prescribed temperatures")],
+    )
+    def test_given_temperatures_are_no_separate_one(self, call, other, regime):
+        with open("given.yaml", "w") as file:
+            file.write(GIVEN.replace("OTHER", other))
+        done = call("check", "given.yaml")
+        assert re.search(rf"regime +{regime}: bodies and interface", done.stdout), done.output
 
     def test_what_has_no_effect_is_a_warning(self, call):
         done = call("check", "bonding.yaml", "--set", "loading.p=1 kPa")

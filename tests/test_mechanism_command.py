@@ -16,6 +16,7 @@ from surfacechem.cli import app
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanismsheet import Span, power_of_ten, remarks, sheet, span, verdict
+from surfacechem.quantities import BOLTZMANN
 from surfacechem.ratecurves import Curves
 
 NONE = np.zeros(1)
@@ -82,6 +83,10 @@ def test_numbers_under_force_are_cantera_s(name, force):
             assert rates[i] == 0 if got is None else got == pytest.approx(math.log(rates[i] * KMOL / bond), rel=1e-10)
         log_K = sum(nu * math.log(KMOL / full(surface, law)[x]) for x, nu in law.change.items())
         log_K += math.log(surface.equilibrium_constants[i])
+        for pair in curves.pairs:  # which a prescribed force works on, along the difference of their distances
+            forward, backward = (next(iter(laws.values())) for laws in (pair.forward, pair.backward))
+            sign = {**dict.fromkeys(pair.forward, 1), **dict.fromkeys(pair.backward, -1)}.get(label, 0)
+            log_K += sign * force * (forward.x_beta - backward.x_beta) / (BOLTZMANN * 311.0)
         assert curves.log_equilibrium(label, *at) == pytest.approx(log_K, rel=1e-9, abs=1e-9)
 
 
@@ -109,7 +114,8 @@ def test_forward_over_reverse_is_the_constant(name):
         reverse = curves.log_reverse(label, temperatures, NONE)
         if not law.reversible:
             assert reverse is None
-            assert verdict(curves, label, T, F).startswith("runs one way only")
+            paired = any(label in pair.labels for pair in curves.pairs)
+            assert verdict(curves, label, T, F).startswith("pair with" if paired else "runs one way only")
             continue
         ratio = curves.log_forward(label, temperatures, NONE) - reverse
         np.testing.assert_allclose(ratio, curves.log_equilibrium(label, temperatures, NONE), rtol=1e-12)

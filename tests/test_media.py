@@ -274,3 +274,10 @@ def test_a_medium_gives_only_what_is_asked_for():
     assert not {"gamma_m", "p_m", "rho_m"} & names
     parameters = [p.path for p in assemble(lubricated(medium(), capacity=False)).parameters]
     assert not [path for path in parameters if "rho_m" in path or "cp_m" in path]
+
+
+@pytest.mark.parametrize("T", [138.0, 100.0, 1e-3])
+def test_roelands_is_a_number_beyond_its_pole(T):
+    """A run stops at the pole; a value asked for beyond it is finite."""
+    value = Roelands(eta_0=0.04, Z=0.6, S_0=1.1).value(T_c=T, p=1e8, T_0=313.15)
+    assert 0 < value < 1

@@ -166,6 +166,11 @@ def regime(build: Build) -> str:
     """The thermal regime in words."""
     nodes = [build.node_of[body.name] for body in build.scene.bodies]
     centre = build.node_of.get("interface")
+    if centre is not None and all(node.prescribed for node in (*nodes, centre)):
+        loads = [build.loads[node.name] for node in (*nodes, centre)]
+        starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
+        still = not any(build.slope_of(node.name) != 0 or build.loads[node.name].jumps() for node in (*nodes, centre))
+        return "isothermal" if still and len(starts) == 1 else "prescribed temperatures"
     if centre is None:
         if nodes[0] is nodes[1]:
             return "perfect contact without a medium"

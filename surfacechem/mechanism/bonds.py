@@ -72,6 +72,11 @@ class InterfaceBell(LoadedReaction, BellFactor):
 
     kind = "interface-Bell"
 
+    @property
+    def distance(self) -> Expression | None:
+        """That to the transition state, under a force that is not the bond's own."""
+        return self.x_beta if self.load == "f" else None
+
 
 class InterfaceDembo(LoadedReaction, DemboFactor):
     r"""Rupture of a bond spring in a mechanism, ``type: Dembo``.
