@@ -243,6 +243,8 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
         facts.append(f"error {attributes['error']:.1e} ({source})")
     if "solver" in attributes:
         facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
+    if dataset.sizes.get("event", 0) > dataset.sizes.get("time", 0):
+        facts.append(f"{dataset.sizes['event']} events between {dataset.sizes.get('time', 0)} outputs")
     ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
 
 

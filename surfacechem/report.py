@@ -24,6 +24,7 @@ REGIMES = {
     "perfect contact": "both bodies and the interface share one temperature; the heat fluxes follow from the balances.",
     "one-sided perfect contact": "the interface shares the temperature of one body; heat passes to the other by laws.",
     "separate interface temperature": "the interface has its own temperature; heat passes to the bodies by laws.",
+    "prescribed temperatures": "the bodies and the interface have given temperatures and take up what heat there is.",
     "medium without temperature": "heat crosses it by laws; interface heat goes into the bodies in fixed shares.",
     "no medium": "the bodies touch directly; interface heat goes into them in fixed shares.",
     "perfect contact without a medium": "the bodies share one temperature and there is no medium between them.",
@@ -181,7 +182,7 @@ def _plan(system: System, run: Run) -> str:
     parts = [f"{_method(run)}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
     inside = [t for t in system.breakpoints if 0 < t < run.times[-1]]
     if inside:
-        parts.append(f"{len(inside)} breakpoints")
+        parts.append(f"{len(inside)} breakpoint{'s' if len(inside) > 1 else ''}")
     if any(not margin.terminal for margin in system.margins):
         parts.append("kinks: " + ", ".join(m.reason for m in system.margins if not m.terminal))
     return "; ".join(parts)

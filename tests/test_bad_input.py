@@ -224,7 +224,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
 
 def test_a_missing_case():
     with pytest.raises(
-        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? Known: adhesion"
+        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? `surfacechem cases` lists"
     ):
         load("endotermic")
     with pytest.raises(InputError, match=r"^no file and no case 'x/endotermic.yaml'\. Did you mean 'endothermic'\?"):
@@ -233,6 +233,14 @@ def test_a_missing_case():
         load("a\0b")
     with pytest.raises(InputError, match=r"^no file and no case"):
         load("a" * 5000)
+
+
+def test_a_file_beside_is_the_nearest_guess(tmp_path):
+    (tmp_path / "pulled.yaml").write_text(GOOD)
+    with pytest.raises(InputError, match=r"pull\.yaml'\. Did you mean 'pulled\.yaml'\?"):
+        load(tmp_path / "pull.yaml")
+    with pytest.raises(InputError, match=r"exotermic\.yaml'\. Did you mean 'exothermic'\?"):
+        load(tmp_path / "exotermic.yaml")
 
 
 def test_a_folder_is_no_case(tmp_path):

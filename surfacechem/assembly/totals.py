@@ -170,6 +170,8 @@ def regime(build: Build) -> str:
         if nodes[0] is nodes[1]:
             return "perfect contact without a medium"
         return "medium without temperature" if _has_medium(build) else "no medium"
+    if all(node.prescribed for node in (*nodes, centre)):
+        return "prescribed temperatures"
     if nodes[0] is nodes[1] is centre:
         return "perfect contact"
     if centre in nodes:
