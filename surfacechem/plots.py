@@ -120,9 +120,9 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
                 label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
                 values = dataset[name].values[i]
                 ax.plot(side * dataset[f"x_{name[-1]}"].values, values, color=colour, label=label)
-        ax.set_xlabel("distance from the contact [mm], body 1 to the left")
-        ax.set_ylabel("temperature [K]")
-        ax.legend()
+        ax.set_xlabel("Distance from the contact [mm], body 1 to the left")
+        ax.set_ylabel("Temperature [K]")
+        legend(ax)
         headings(plot, ax, dataset)
     return plot
 
