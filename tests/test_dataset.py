@@ -12,6 +12,8 @@ from surfacechem.case import names
 from surfacechem.errors import InputError
 from surfacechem.netcdf import cf_unit
 
+pytestmark = pytest.mark.around
+
 SKIPPED = ["check_spatiotemporal_dims_have_coordinate_vars"]
 """Wants a calendar date of every coordinate called time; a run has elapsed seconds."""
 

@@ -18,6 +18,8 @@ from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanismsheet import Span, power_of_ten, remarks, sheet, span, verdict
 from surfacechem.ratecurves import Curves
 
+pytestmark = pytest.mark.around
+
 NONE = np.zeros(1)
 T, F = Span(280.0, 360.0), Span(0.0, 1e-10)
 

@@ -10,6 +10,8 @@ from surfacechem.errors import InputError
 from surfacechem.panels import merged
 from surfacechem.plots import figure, logarithmic, save, symbol
 
+pytestmark = pytest.mark.around
+
 
 def dataset(times=None, **more):
     t = np.linspace(0.0, 2.0, 21) if times is None else times

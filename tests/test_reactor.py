@@ -11,6 +11,8 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.reactor import InterfaceReactor, InterfaceStopped, ReactorNet
 
+pytestmark = pytest.mark.around
+
 RTOL = 1e-9
 LOOSE = 1e-6
 """Cantera's integrator misses its tolerance by some orders of magnitude."""
