@@ -5,8 +5,10 @@ VENV ?= .venv
 BIN := $(abspath $(VENV))/bin
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
+# The tests of a file share what they assemble and compile, so that a file stays with one worker.
+PYTEST := $(BIN)/pytest -n 2 --dist loadfile
 
-.PHONY: run test lint unit slow docs cases wheel coverage mutation bench clean
+.PHONY: run test lint unit core slow docs cases wheel coverage mutation bench clean
 
 run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 	mkdir -p results
@@ -21,10 +23,13 @@ lint: $(TOOLS)  ## style and types
 	$(BIN)/mypy
 
 unit: $(TOOLS)  ## the tests, without the slow ones
-	$(BIN)/pytest -n 2
+	$(PYTEST)
+
+core: $(TOOLS)  ## of these the tests of assembly, laws, mechanisms, stepper and exact solutions
+	$(PYTEST) -m "not slow and not around"
 
 slow: $(TOOLS)  ## the slow tests
-	$(BIN)/pytest -n 2 -m slow
+	$(PYTEST) -m slow
 
 docs: $(TOOLS)  ## the documentation, notebooks executed, warnings are errors
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
@@ -45,7 +50,7 @@ wheel: $(TOOLS)  ## the wheel, by itself, in an empty environment and another fo
 coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	$(BIN)/coverage run -m pytest -n 2
+	$(BIN)/coverage run -m pytest -n 2 --dist loadfile
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 

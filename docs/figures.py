@@ -125,7 +125,7 @@ def sudden_contact() -> Figure:
         left.plot(now.x_2 * 1e3, now.profile_2, color=shade)
     left.set_xlabel("epoxy        distance [mm]        glass")
     left.set_ylabel("temperature [K]")
-    left.legend()
+    left.legend(loc="upper right")
     right.semilogx(run.time[1:], run["T"][1:], color=BLUE)
     right.semilogx(run.time[1:], run["T_exact"][1:], color="0.4", linestyle="--", linewidth=0.8)
     right.set_xlabel("time [s]")

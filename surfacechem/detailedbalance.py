@@ -50,14 +50,14 @@ def said(low: float, high: float) -> str:
     """A range of departures in words.
 
     >>> said(-2.3, 0.0)
-    'k_f/k_r departs from K(g, T) by a factor exp(-2.3) at most'
+    'k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(-2.3) at most'
     """
     worst = low if abs(low) > abs(high) else high
     if not math.isfinite(worst):
         return "one of the two never runs, so that k_f/k_r is not K(g, T)"
     if abs(worst) <= ROUNDED:
         return f"k_f/k_r is K(g, T) to within {abs(worst):.1e}"
-    return f"k_f/k_r departs from K(g, T) by a factor exp({worst:.3g}) at most"
+    return f"k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
 
 
 def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:

@@ -49,7 +49,12 @@ def printable(text: str) -> str:
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones."""
     names = sorted(known)
+    return f"{nearest(name, names)} Known: {', '.join(names) or 'none'}."
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it."""
+    names = sorted(known)
     close = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.6)
     guess = next((n for n in names if close and n.lower() == close[0]), None)
-    hint = f" Did you mean '{guess}'?" if guess else ""
-    return f"{hint} Known: {', '.join(names) or 'none'}."
+    return f" Did you mean '{guess}'?" if guess else ""

@@ -32,9 +32,9 @@ class Panel:
 
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K", r"(?!.*_exact$).*"),
-    ("Bonding", "1", r"(?!formed_|.*_residual$|.*_exact$|J_c$|n_c$|gamma_m$|ln_theta$).*"),
+    ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|.*_exact$|J_c$|n_c$|gamma_m$|ln_theta$).*"),
     ("Gap", "m", r"g_(?!.*_exact$)\w*"),
-    ("Tangential displacement", "m", r"u_t"),
+    ("Displacement", "m", r"u_t"),
     ("Velocity", "m s-1", r"(?!.*_exact$)\w+"),
     ("Traction", "Pa", r"(?!.*_exact$|.*_nominal$).*"),
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_exact$|.*_nominal$)\w+"),

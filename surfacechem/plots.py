@@ -120,9 +120,9 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
                 label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
                 values = dataset[name].values[i]
                 ax.plot(side * dataset[f"x_{name[-1]}"].values, values, color=colour, label=label)
-        ax.set_xlabel("distance from the contact [mm], body 1 to the left")
-        ax.set_ylabel("temperature [K]")
-        ax.legend()
+        ax.set_xlabel("Distance from the contact [mm], body 1 to the left")
+        ax.set_ylabel("Temperature [K]")
+        legend(ax)
         headings(plot, ax, dataset)
     return plot
 
@@ -243,6 +243,8 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
         facts.append(f"error {attributes['error']:.1e} ({source})")
     if "solver" in attributes:
         facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
+    if dataset.sizes.get("event", 0) > dataset.sizes.get("time", 0):
+        facts.append(f"{dataset.sizes['event']} events between {dataset.sizes.get('time', 0)} outputs")
     ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
 
 

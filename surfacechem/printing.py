@@ -11,6 +11,7 @@ import linecache
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import ModuleType
 from typing import Any
 
@@ -37,8 +38,12 @@ class Row:
     text: str
 
 
+@lru_cache(maxsize=1000)
 def _sympy(expression: Expression) -> Any:
-    """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently."""
+    """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
+
+    Several functions print the same quantities, and SymPy looks long at the conditions of a piecewise one.
+    """
     with distribute(False):
         return symengine.sympify(expression)._sympy_()
 

@@ -183,7 +183,7 @@ def _plan(system: System, run: Run) -> str:
     parts = [f"{_method(run)}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
     inside = [t for t in system.breakpoints if 0 < t < run.times[-1]]
     if inside:
-        parts.append(f"{len(inside)} breakpoints")
+        parts.append(f"{len(inside)} breakpoint{'s' if len(inside) > 1 else ''}")
     if any(not margin.terminal for margin in system.margins):
         parts.append("kinks: " + ", ".join(m.reason for m in system.margins if not m.terminal))
     return "; ".join(parts)

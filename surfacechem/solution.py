@@ -136,8 +136,9 @@ class Solution:
         fluxes = {name: size for name, size in self.trajectory.roundings.items() if name.startswith("q_")}
         everywhere, duration = self.trajectory.everywhere, self.trajectory.result.t
         largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
-        # What rounding alone carries over the whole run counts against the heat that there is.
-        felt = LOST_HEAT * _largest(everywhere["E_total"])
+        # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
+        content = self.trajectory.roundings.get("E_total", 0.0) / np.finfo(float).eps
+        felt = LOST_HEAT * max(_largest(everywhere["E_total"]), content)
         lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
         advice = "let the two share one temperature, or use the heat_into variables, which are exact"
         return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []

@@ -18,8 +18,8 @@ from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads, resolved_
 L = TypeVar("L", bound=Law)
 
 REMEDIES = {
-    "g_n": "Prescribe `g_n` under `loading`.",
-    "g_t": "Prescribe `g_t` under `loading`.",
+    "g_n": "Prescribe `g_n` under `loading`, or mount the bodies: `mechanics: {normal: {k: ...}}`.",
+    "g_t": "Prescribe `g_t` under `loading`, or mount the bodies: `mechanics: {tangential: {k: ...}}`.",
     "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
     "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",

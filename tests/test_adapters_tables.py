@@ -10,6 +10,8 @@ from surfacechem.assembly import assemble
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solvers import names
 
+pytestmark = pytest.mark.around
+
 LIBRARIES = [name for name in names if name != "radau"]
 STEPS = 2500
 FEW_STEPS = 150

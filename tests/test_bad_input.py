@@ -93,6 +93,7 @@ MISTAKES = [
         "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, v_2,",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
+    ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),
     ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
     ("v: 0.1 m/s", "v: {ramp: {rate: 1 m/s}}", "17: loading.v.ramp.rate: 1 m/s is a velocity; rate needs an accele"),
     ("v: 0.1 m/s", "v: {table: {times: [0, 1], values: [0]}}", "17: loading.v.table: a table needs as many times (2)"),
@@ -224,7 +225,7 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
 
 def test_a_missing_case():
     with pytest.raises(
-        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? Known: adhesion"
+        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? `surfacechem cases` lists"
     ):
         load("endotermic")
     with pytest.raises(InputError, match=r"^no file and no case 'x/endotermic.yaml'\. Did you mean 'endothermic'\?"):
@@ -233,6 +234,14 @@ def test_a_missing_case():
         load("a\0b")
     with pytest.raises(InputError, match=r"^no file and no case"):
         load("a" * 5000)
+
+
+def test_a_file_beside_is_the_nearest_guess(tmp_path):
+    (tmp_path / "pulled.yaml").write_text(GOOD)
+    with pytest.raises(InputError, match=r"pull\.yaml'\. Did you mean 'pulled\.yaml'\?"):
+        load(tmp_path / "pull.yaml")
+    with pytest.raises(InputError, match=r"exotermic\.yaml'\. Did you mean 'exothermic'\?"):
+        load(tmp_path / "exotermic.yaml")
 
 
 def test_a_folder_is_no_case(tmp_path):

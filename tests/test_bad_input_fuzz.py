@@ -11,6 +11,8 @@ from surfacechem import document
 from surfacechem.case import load, load_text, names
 from surfacechem.errors import InputError, Place
 
+pytestmark = pytest.mark.around
+
 VALUES = st.one_of(
     st.none(),
     st.booleans(),

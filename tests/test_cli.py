@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 from surfacechem import data
 from surfacechem.cli import app
 
+pytestmark = pytest.mark.around
+
 BONDING = """\
 title: Bonding in contact
 T_0: 300 K

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.around
+
 HEAVY = ("xarray", "matplotlib", "CoolProp", "cantera", "sympy", "pandas", "dask", "sksundae")
 LONG = """\
 title: Rubbing for a very long time

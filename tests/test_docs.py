@@ -16,6 +16,8 @@ from surfacechem.case import names
 from surfacechem.document import parse
 from surfacechem.solvers import stepper
 
+pytestmark = pytest.mark.around
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.py"))

@@ -11,6 +11,8 @@ from surfacechem import rerun
 from surfacechem.errors import InputError
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 
+pytestmark = pytest.mark.around
+
 MECHANISM = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
 extensions: [{type: python, name: foreign_rates}]

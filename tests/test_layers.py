@@ -13,7 +13,7 @@ import surfacechem.data
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
     "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits", "grids"],
-    "contracts": ["terms", "substances", "scene"],
+    "contracts": ["law", "terms", "substances", "scene"],
     "core": [
         "balances",
         "conductors",

@@ -19,6 +19,8 @@ from surfacechem.mechanismsheet import Span, power_of_ten, remarks, sheet, span,
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.ratecurves import Curves
 
+pytestmark = pytest.mark.around
+
 NONE = np.zeros(1)
 T, F = Span(280.0, 360.0), Span(0.0, 1e-10)
 

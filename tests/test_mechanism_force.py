@@ -120,7 +120,10 @@ def test_the_run_says_how_far_a_pair_departs(file):
     expected = f * 0.6e-9 / KT - f**2 / (2 * STIFFNESS * KT)
     np.testing.assert_allclose(dataset.departure_R1_R2, expected, rtol=1e-10, atol=1e-11)
     worst = float(expected[np.argmax(np.abs(expected.values))])
-    assert f"departs from K(g, T) by a factor exp({worst:.3g}) at most" in solution.attributes["detailed_balance"]
+    assert (
+        f"departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
+        in solution.attributes["detailed_balance"]
+    )
 
 
 def test_the_sheet_shows_force_and_the_figure_has_a_row_for_it(file):

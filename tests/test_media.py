@@ -21,6 +21,8 @@ from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Scene
 
+pytestmark = pytest.mark.around
+
 BOUND = 1e-8
 FLUIDS = [
     ("Nitrogen", 101325.0, 220.0, 480.0),

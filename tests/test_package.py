@@ -13,6 +13,8 @@ from ruamel.yaml import YAML
 
 from surfacechem.data import cases, mechanisms
 
+pytestmark = pytest.mark.around
+
 ROOT = Path(__file__).parents[1]
 
 

@@ -85,8 +85,8 @@ def test_the_departure_is_what_the_parameters_lack(pair, free):
     solution = pair(math.exp(2.3), free=free).run()
     np.testing.assert_allclose(solution.dataset.departure_R1_R2, -2.3, rtol=1e-11)
     expected = (
-        "free(s) <=> bond(s) (pair): k_f/k_r departs from K(g, T) by a factor exp(-2.3) at most; "
-        "entropy production stayed positive"
+        "free(s) <=> bond(s) (pair): k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(-2.3) at "
+        "most; entropy production stayed positive"
     )
     if free == 1.0:
         assert solution.warnings == (expected,)
@@ -185,7 +185,10 @@ def test_a_law_with_both_rates_is_held_against_the_potential(phi, tmp_path):
     f = solution.dataset.f
     expected = f**2 / (2 * 5e-3 * KT) - f * 0.8e-9 / KT
     np.testing.assert_allclose(solution.dataset.departure_bell, expected, rtol=1e-10, atol=1e-10)
-    assert "bell: k_f/k_r departs from K(g, T) by a factor exp(5.79) at most" in solution.attributes["detailed_balance"]
+    assert (
+        "bell: k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(5.79) at most"
+        in solution.attributes["detailed_balance"]
+    )
 
 
 def test_springs_in_the_rates_and_in_the_potential_agree(tmp_path):

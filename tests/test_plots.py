@@ -10,6 +10,8 @@ from surfacechem.errors import InputError
 from surfacechem.panels import merged
 from surfacechem.plots import figure, logarithmic, save, symbol
 
+pytestmark = pytest.mark.around
+
 
 def dataset(times=None, **more):
     t = np.linspace(0.0, 2.0, 21) if times is None else times
@@ -47,7 +49,7 @@ def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
     more = {"g_n": ("m", t), "u_t": ("m", 2 * t), "ln_theta": ("1", t), "gamma_m": ("1", 1 + t)}
     plot = figure(dataset(**more))
     titles = [ax.get_ylabel() for ax in plot.axes]
-    assert titles[1:4] == ["Bonding [1]", "Gap [m]", "Tangential displacement [m]"]
+    assert titles[1:4] == ["Bonding [1]", "Gap [m]", "Displacement [m]"]
     assert labels(plot)[1:4] == [[r"$\phi$"], ["$g_{n}$"], ["$u_{t}$"]]
 
 
@@ -106,6 +108,14 @@ def with_events(times, names, **modes):
         "event_name": ("event", np.array(names, dtype=object), {"units": "1"}),
     }
     return dataset(**modes).assign(given)
+
+
+def test_more_events_than_outputs_are_said():
+    """Curves over time do not show them."""
+    events = xarray.Dataset({"event_time": ("event", np.linspace(0.0, 2.0, 22), {"units": "s"})})
+    heading = figure(dataset().merge(events)).axes[0].get_title(loc="left")
+    assert heading.endswith("22 events between 21 outputs")
+    assert "events" not in figure(dataset()).axes[0].get_title(loc="left")
 
 
 def test_few_events_have_their_names():

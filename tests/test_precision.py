@@ -20,6 +20,8 @@ from surfacechem.workprecision.errors import KINDS
 from surfacechem.workprecision.figure import figure
 from surfacechem.workprecision.truth import establish, numerical
 
+pytestmark = pytest.mark.around
+
 TIMES = ("seconds", "repetitions")
 """What differs from one study to the next."""
 

@@ -20,6 +20,8 @@ from surfacechem.stability.regime import Exact, Refused, Stops
 from surfacechem.stability.regimes import regimes
 from surfacechem.stability.study import stability
 
+pytestmark = pytest.mark.around
+
 BROKEN = {
     # A film of 1e-14 of its thickness: the last bit of the time is a tenth of the gap.
     ("film", 1e-14): FAILED,

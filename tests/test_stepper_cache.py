@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.around
+
 KERNEL = """
 import numpy as np
 

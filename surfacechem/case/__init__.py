@@ -21,7 +21,7 @@ from surfacechem.case.run import Reference, Run, read_reference, read_run
 from surfacechem.case.scene import SceneReader, Source
 from surfacechem.case.sweep import Section, read_sweep
 from surfacechem.document import Tree
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place, nearest
 from surfacechem.scene import Scene
 from surfacechem.system import System
 
@@ -137,10 +137,13 @@ def _find(name: str) -> tuple[Path, str]:
         return path, name
     if name in names():
         return data.cases() / f"{name}.yaml", f"cases/{name}.yaml"
+    beside: list[str] = []
     with suppress(OSError, ValueError):  # no name is too odd to be looked for
         if path.exists():
             return path, name
-    raise InputError(f"no file and no case '{name[:200]}'.{suggestion(path.stem, names())}")
+        beside = [file.name for file in path.parent.glob("*.yaml")]
+    guess = nearest(path.name, beside) or nearest(path.stem, [*names(), *beside])
+    raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
 
 
 def _overridden(tree: Tree, values: Overrides) -> Tree:

@@ -6,6 +6,7 @@ import dataclasses
 import re
 import typing
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, TypeVar
 
@@ -69,8 +70,26 @@ def history(tree: Tree, unit: str, units: Units) -> Load:
         return law(Load, tree, units, unit)  # type: ignore[type-abstract]
     hold: Any = laws.find(Load, "hold")
     name = tree.place.path.rpartition(".")[2]
-    constant: Load = hold(level=number(tree, unit, name), place=tree.place)
+    constant: Load = hold(level=_level(tree, unit, name), place=tree.place)
     return constant
+
+
+def _level(tree: Tree, unit: str, name: str) -> float:
+    """A constant value; who gives a rate means a ramp."""
+    try:
+        return number(tree, unit, name)
+    except InputError as error:
+        if not _is_rate(tree, unit):
+            raise
+        hint = f"To change it in time, write `{{ramp: {{rate: {tree.value}}}}}`."
+        raise InputError(f"{error.message} {hint}", tree.place) from None
+
+
+def _is_rate(tree: Tree, unit: str) -> bool:
+    with suppress(InputError):
+        number(tree, f"({unit})/s", "rate")
+        return True
+    return False
 
 
 def _check_complete(kind: type[Law], given: Mapping[str, Tree], tree: Tree) -> None:

@@ -80,7 +80,9 @@ class GasGap(HeatTransfer):
 
     channel = "gas"
 
-    k: float = parameter("W/(m K)", "conductivity of the gas", above=0)
+    k: float = parameter(
+        "W/(m K)", "conductivity of the gas; of a medium that the case names it is in rarefied-film", above=0
+    )
     M: float = parameter("m", "temperature jump distance of both walls", default=0.0, at_least=0)
     Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
 
