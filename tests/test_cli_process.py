@@ -26,6 +26,21 @@ initial: {T: 280 K}
 run: {until: 100000 s, outputs: 2, max-steps: 1000000000}
 """
 
+SOLVING = """\
+from surfacechem.cli import app
+from surfacechem.integrate import Model
+
+solve = Model.solve
+
+def told(*arguments, **named):
+    print("solving", flush=True)
+    return solve(*arguments, **named)
+
+Model.solve = told
+app(["run", "long.yaml"], prog_name="surfacechem")
+"""
+"""The command line, saying when it has come to the solver."""
+
 
 def surfacechem(*arguments, folder):
     command = [sys.executable, "-m", "surfacechem", *arguments]
@@ -82,10 +97,11 @@ def test_exit_codes_come_without_traceback(tmp_path, arguments, code):
 def test_interrupt_ends_a_long_run_at_once_and_writes_nothing(tmp_path):
     (tmp_path / "long.yaml").write_text(LONG)
     surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
-    command = [sys.executable, "-m", "surfacechem", "run", "long.yaml"]
+    command = [sys.executable, "-c", SOLVING]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        time.sleep(5.0)
+        assert process.stdout.readline() == "solving\n", process.communicate()
+        time.sleep(1.0)  # well inside the compiled loop
         assert process.poll() is None, process.communicate()
         process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=30)
