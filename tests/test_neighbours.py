@@ -179,6 +179,7 @@ def test_at_constant_temperature_as_in_cantera(which, tmp_path):
     assert produced == pytest.approx(-np.sum(rates * g) / CASES[which].T, rel=1e-7, abs=size / CASES[which].T)
     assert float(data["Q_T_c"][-1]) == pytest.approx(np.sum(rates * h), rel=1e-7, abs=size)
     assert solution.audit.energy_error < BOOKS
+    assert solution.audit.entropy_error < BOOKS
     assert solution.audit.site_error < BOOKS
 
 
