@@ -300,6 +300,11 @@ def test_reactions_with_neighbours_are_checked(old, new, message, tmp_path):
     assert "ptcombust.yaml:" in str(caught.value)
 
 
+def test_what_a_reversible_reaction_may_give_back_is_told(tmp_path):
+    system = surfacechem.load(written(tmp_path, ("sofc.yaml", "metal_surface"))).system
+    assert any("the neighbours hold no O2, which reactions make" in text for text in system.warnings)
+
+
 def test_what_neighbours_do_not_hold_is_told(tmp_path):
     neighbours = "{gas: {pressure: 1 atm, composition: {CH4: 0.095, O2: 0.21, AR: 0.695}}}"
     simulation = surfacechem.load(written(tmp_path, ("methane_pox_on_pt.yaml", "Pt_surf"), neighbours=neighbours))

@@ -104,7 +104,8 @@ def _hold(phase: Any, state: Neighbour) -> None:
 
 def remarks(surface: Any) -> tuple[str, ...]:
     """Species that a neighbour does not hold, though reactions give them to it."""
-    made = np.asarray(surface.product_stoich_coeffs).sum(axis=1)
+    back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
+    made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)
     found = []
     for phase in surface.adjacent.values():
         for name, part in zip(phase.species_names, phase.X, strict=True):
