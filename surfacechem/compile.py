@@ -200,9 +200,7 @@ def compile_program(
 
     States and equations that form chains stand behind the others, chain after chain.
     """
-    if not len(states) == len(derivatives) == len(residual):
-        counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
-        raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
+    _check_counts(states, derivatives, residual)
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
     own = residual[:core]
@@ -231,6 +229,12 @@ def compile_program(
         groups=tuple(groups),
         plain_margins=not _symbols(margins) & {*derivatives, *_outside(parameters, filler, 1 + 2 * n)},
     )
+
+
+def _check_counts(states: Sequence[Any], derivatives: Sequence[Any], residual: Sequence[Any]) -> None:
+    if not len(states) == len(derivatives) == len(residual):
+        counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
+        raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
 
 
 def _outside(parameters: Sequence[Any], filler: Filler | None, first: int) -> set[Any]:
