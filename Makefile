@@ -58,9 +58,10 @@ mutation: $(TOOLS)  ## a sign of each balance and law is changed, and a test has
 	$(BIN)/pip install --quiet --editable '.[mutation]'
 	$(BIN)/python tests/mutation.py
 
-bench: $(RUNTIME)  ## time against error of every solver, kept in benchmarks/results, and where the time of a run goes
+bench: $(TOOLS)  ## time against error of every solver beside what was kept in benchmarks/results, and where time goes
 	$(BIN)/python benchmarks/steppers.py
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/accuracy.py
 
 clean:  ## all that make has made
 	rm -rf $(VENV) build dist results site
