@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.equilibria import DRIFT, Point
-from surfacechem.jumps import Jump, Jumper
+from surfacechem.jumps import Jump, Jumper, booked
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
@@ -49,6 +49,7 @@ HOLD, LONGEST_HOLD = 1e-9, 1e-4
 """Transitions whose chatter is resolved, and the parts of a piece of time for which it is: the first time, then
 longer, and at most."""
 
+NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 MOMENT = 1e-15
 """Part of the time that is told from it."""
 
@@ -209,11 +210,18 @@ class Hybrid:
             if jumped is None:
                 return None
             point = jumped
-        self.status, self.reason = (
-            Status.FAILED,
-            f"transitions follow each other without end (chatter): {self.jumps[-1].transition.reason}",
-        )
+        self._end_of_chatter(self.jumps[-1])
         return None
+
+    def _end_of_chatter(self, last: Jump) -> None:
+        """A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run."""
+        if last.transition.fold is not None and np.array_equal(last.before.y, last.after.y):
+            while self.jumps[-2:-1] and self.jumps[-2].transition is last.transition and self.jumps[-2].t == last.t:
+                self.jumps.pop()
+            self.status, self.reason = Status.EVENT, f"{last.transition.reason}, but {NO_PUSH}"
+        else:
+            endless = f"transitions follow each other without end (chatter): {last.transition.reason}"
+            self.status, self.reason = Status.FAILED, endless
 
     def _chatters(self, t: float) -> bool:
         """Whether more transitions have followed each other without time going on than any cause needs."""
@@ -299,7 +307,7 @@ class Hybrid:
             self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
         self.booked = self.booked + np.array(
-            [self._booking(account.law, account.kind, account.quantity.name, jump) for account in self.system.ledger]
+            [booked(jump, account, self.jumper.states) for account in self.system.ledger]
         )
         return jump.after
 
@@ -308,21 +316,6 @@ class Hybrid:
         before = self.jumps[-1].t if self.jumps else float(self.problem.segments[0])
         part = self.parts[-1] if self.parts else None
         return part.result.t if part is not None and part.start.t == before and part.end == t else t - before
-
-    def _booking(self, law: str, kind: str, name: str, jump: Jump) -> float:
-        """What a jump adds to an account of the ledger."""
-        if kind == "bonds":
-            j = self.jumper.states.index(law)
-            return float(jump.after.y[j] - jump.before.y[j])
-        if law != "events":
-            return jump.work.get(name, 0.0)
-        amounts = {
-            "dissipation": jump.released,
-            "entropy production": jump.entropy,
-            "energy supply": -jump.heat_out,
-            "entropy supply": -jump.entropy_out,
-        }
-        return amounts[kind]
 
     # -- one result -----------------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (202
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surfacechem.compile import Function, compile_function
 from surfacechem.equilibria import Equilibria, Point
 from surfacechem.expressions import Expression, derivative
-from surfacechem.system import HELD, System, Transition
+from surfacechem.system import HELD, Account, System, Transition
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,22 @@ class Jump:
     def stops(self) -> bool:
         """Whether the run cannot, or may not, go on."""
         return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.transition.violation == "refuse")
+
+
+def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
+    """What a jump adds to an account of the ledger; ``states`` are the names of the states in order."""
+    if account.kind == "bonds":
+        j = states.index(account.law)
+        return float(jump.after.y[j] - jump.before.y[j])
+    if account.law != "events":
+        return jump.work.get(account.quantity.name, 0.0)
+    amounts = {
+        "dissipation": jump.released,
+        "entropy production": jump.entropy,
+        "energy supply": -jump.heat_out,
+        "entropy supply": -jump.entropy_out,
+    }
+    return amounts[account.kind]
 
 
 class Jumper:

@@ -15,7 +15,7 @@ from surfacechem.integrate import Model, Run
 from surfacechem.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import BondStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.films import Film
@@ -172,3 +172,16 @@ def test_the_rounding_of_a_bound_destroys_no_entropy(phi, verdict):
     values = np.array([parameter.value for parameter in model.system.parameters], dtype=float)
     point = Point(0.0, np.array(states), np.zeros(len(states)), values)
     assert model.jumper.make(index, point, 0.0, noise=1e-13).verdict == verdict
+
+
+def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
+    """Pressed together, opposite surfaces are held where they are least at rest: on top of the shear potential."""
+    zone = XuNeedleman(Phi_n=1.0, g_0=1e-7, g_t0=1e-7, q=1.0, r=0.0)
+    loading, mount = {"w_t": Hold(level=0.0), "g_n": Hold(level=-3e-7)}, Mounting(k=1e10)
+    scene = Scene(bodies("T", "T"), Interface("T", [zone]), (), loading, None, 300.0, {"T": 300.0}, tangential=mount)
+    trajectory = solved(scene, 1.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith(
+        "the quasi-static equilibrium of the gap was lost (mechanical fold), but nothing"
+    )
+    assert names(trajectory) == ["snap"]
