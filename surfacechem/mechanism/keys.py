@@ -97,10 +97,15 @@ def check(source: Source, phase: Any, evaluate: bool = False) -> None:
     _check_file(source)
     _check_phase(source, phase, BESIDE if beside else frozenset())
     entries = list(source.species(phase))
+    for entry in entries:
+        # A neighbour's species are Cantera's affair; but one without a name may be the surface's own, misspelt.
+        if not beside or "name" not in entry:
+            _check_species(source, entry)
     names = _names(source, phase, entries)
     own = [entry for entry in entries if entry.get("name") in names]
-    for entry in own if beside else entries:
+    for entry in own if beside else ():
         _check_species(source, entry)
+    for entry in own if beside else entries:
         _check_composition(source, phase, entry)
     for entry in own:
         check_dependence(source, phase, entry, names)
