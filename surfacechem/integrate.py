@@ -24,7 +24,7 @@ from surfacechem.solvers import ASKING, AUTO, solver
 from surfacechem.solvers.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
-from surfacechem.starting import stable_start
+from surfacechem.starting import creeping_start, stable_start
 from surfacechem.system import Margin as Watched
 from surfacechem.system import System
 from surfacechem.terms import Spec
@@ -240,6 +240,7 @@ class Model:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
             table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
+        y = creeping_start(self.system, self.program, y, table[0])
         return stable_start(self.system, self.program, y, table[0])
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:

@@ -185,3 +185,21 @@ def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
         "the quasi-static equilibrium of the gap was lost (mechanical fold), but nothing"
     )
     assert names(trajectory) == ["snap"]
+
+
+@pytest.mark.parametrize("start", [0.0, 1.2e-3, -1.0e-3])
+@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
+def test_creep_without_inertia_starts_from_any_pull(law, start):
+    """A slack spring leaves no velocity, a taut one tens of decades less than the first guess."""
+    a, b, L, v_0, mu_0, p, mount = 0.008, 0.014, 5e-6, 1e-6, 0.6, 5e6, Mounting(k=2e9, c_b=5e6)
+    friction = law(mu_0=mu_0, a=a, b=b, L=L, v_0=v_0)
+    loading, initial = {"p": Hold(level=p), "w_t": Ramp(start=start, rate=2e-6)}, {"theta": 1.0, "v": 1e-6}
+    scene = Scene(
+        COLD, Interface(Hold(level=300.0), (), [friction]), (), loading, None, 300.0, initial, tangential=mount
+    )
+    trajectory = solved(scene, 20.0)
+    assert trajectory.status == "finished", trajectory.reason
+    u, v, ln_theta = trajectory.result.y
+    pull = mount.k * (start + 4e-5 - u) + mount.c_b * (2e-6 - v)
+    at_rest = np.exp(-(mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a)
+    assert v == pytest.approx(2 * v_0 * at_rest * np.sinh(pull / (a * p)), rel=1e-8)
