@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from surfacechem.compile import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.marching import march, zero_ahead
-from surfacechem.system import SIDE, Equilibrium, Fold, System
+from surfacechem.system import System
+from surfacechem.transitions import SIDE, Equilibrium, Fold
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]

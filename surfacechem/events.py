@@ -19,7 +19,8 @@ from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
 from surfacechem.stretches import Part, all_counters, all_events, all_steps, changed, joined
-from surfacechem.system import HELD, START, System
+from surfacechem.system import START, System
+from surfacechem.transitions import HELD
 
 Array = NDArray[np.float64]
 

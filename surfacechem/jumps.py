@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from surfacechem.compile import Function, compile_function
 from surfacechem.equilibria import Equilibria, Point
 from surfacechem.expressions import Expression, derivative
-from surfacechem.system import HELD, Account, System, Transition
+from surfacechem.system import Account, System
+from surfacechem.transitions import HELD, Transition
 
 Array = NDArray[np.float64]
 

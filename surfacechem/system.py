@@ -19,12 +19,7 @@ from surfacechem.quantities import Quantity
 from surfacechem.refit import Fit
 from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
-
-SIDE = "mode.side"
-"""Path of the mode that says on which side of touch the gap is."""
-
-HELD = "run.held_until"
-"""Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
+from surfacechem.transitions import Equilibrium, Mode, Sink, Transition
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
@@ -139,86 +134,6 @@ class Margin:
     """What to change where it is closed from the start."""
     peak: bool = False
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A discrete variable, such as sticking or sliding; it changes at transitions only."""
-
-    name: str
-    symbol: Any
-    initial: float
-    words: Mapping[float, str]
-    """What each value means."""
-    start: Expression | None = None
-    """The value at the start as it follows from the initial state, where it does."""
-    waits: Mapping[float, str] = field(default_factory=dict)
-    """Until when a value holds, in words, where it is meant to be left."""
-
-
-@dataclass(frozen=True)
-class Fold:
-    """The loss of the equilibrium of the quasi-static gaps."""
-
-    tangent: Expression
-    """Zero at the fold, positive before it."""
-    falls: tuple[Expression, ...]
-    """How fast the stiffness falls along each gap; it tells which way they run."""
-    stiffness: tuple[tuple[Expression, ...], ...]
-    """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
-
-
-@dataclass(frozen=True)
-class Transition:
-    """Something that must stay positive in the present modes; where it reaches zero, modes and state jump.
-
-    ``modes`` and ``jump`` give new values as expressions of the old state. Then the gaps in ``settles`` find the next
-    equilibrium, and the energy that this releases goes into the nodes of ``sinks``, in their shares.
-    """
-
-    name: str
-    margin: Expression
-    reason: str
-    modes: Mapping[Any, Expression] = field(default_factory=dict)
-    jump: Mapping[Any, Expression] = field(default_factory=dict)
-    settles: bool = False
-    sinks: str = "joint"
-    """'joint': the bodies take the released energy; 'local': the interface does."""
-    fold: Fold | None = None
-    """What makes it a fold, where it is one."""
-    passes: bool = False
-    """Whether nothing happens to the interface: a stage of the loading ends."""
-    measure: str = ""
-    """What its margin measures, where that of other transitions measures the same."""
-    violation: str = "warn"
-    """What to do where the jump would destroy entropy: refuse, warn or accept."""
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """A gap without inertia or damping: its balance of tractions, which holds at every time."""
-
-    state: str
-    residual: Expression
-    """Traction that drives the gap open, less what resists [Pa]."""
-    size: Expression
-    """Size of the tractions that balance [Pa]."""
-    along: Mapping[str, Expression] = field(default_factory=dict)
-    """Gaps that move with it, and how far: elastic sticking follows the displacement."""
-    active: Expression = 1
-    """Zero in modes in which it is held."""
-
-
-@dataclass(frozen=True)
-class Sink:
-    """A temperature node that takes part of the energy released in a jump; a prescribed one passes it on."""
-
-    node: str
-    T: Expression
-    energy: Expression
-    """Internal energy of the node [J/m^2]."""
-    share: Expression
-    prescribed: bool
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ FLOORS = {
         "variables",
         "refit",
         "holding",
+        "transitions",
         "system",
         "validity",
         "assembly.*",

@@ -18,7 +18,7 @@ from surfacechem.assembly.holding import Decision
 from surfacechem.assembly.logarithms import LOGARITHM
 from surfacechem.expressions import Expression, where
 from surfacechem.quantities import Quantity
-from surfacechem.system import Transition
+from surfacechem.transitions import Transition
 
 INSIDE = 1e-15
 """Distance from a bound, in parts of the range, at which the law there is asked which way it points.

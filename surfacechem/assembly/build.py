@@ -14,15 +14,9 @@ from surfacechem.balances import Node
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
-from surfacechem.system import (
-    HELD,
-    Account,
-    Margin,
-    Mode,
-    Named,
-    Range,
-)
+from surfacechem.system import Account, Margin, Named, Range
 from surfacechem.terms import Law, Load, Spec
+from surfacechem.transitions import HELD, Mode
 from surfacechem.variables import unit_of
 
 MANY = range(2, 1000)

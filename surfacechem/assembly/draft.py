@@ -13,20 +13,9 @@ from surfacechem.conductors import Profile
 from surfacechem.expressions import Expression
 from surfacechem.refit import Fit
 from surfacechem.scene import Interface, Scene
-from surfacechem.system import (
-    Account,
-    Capped,
-    Equilibrium,
-    Margin,
-    Mode,
-    Named,
-    Pace,
-    Pair,
-    Range,
-    State,
-    Transition,
-)
+from surfacechem.system import Account, Capped, Margin, Named, Pace, Pair, Range, State
 from surfacechem.terms import Load
+from surfacechem.transitions import Equilibrium, Mode, Transition
 from surfacechem.variables import Parameters, Variables
 
 NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))

@@ -16,7 +16,7 @@ import symengine
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
-from surfacechem.system import Equilibrium, Fold, Transition
+from surfacechem.transitions import Equilibrium, Fold, Transition
 
 FOLD = 1e-7
 """Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""

@@ -12,7 +12,8 @@ from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, hel
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Equilibrium, State
+from surfacechem.system import State
+from surfacechem.transitions import Equilibrium
 
 
 def normal_gap(build: Build) -> None:

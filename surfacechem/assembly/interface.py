@@ -13,8 +13,9 @@ from surfacechem.assembly.logarithms import initial_bonding
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Margin, State, Transition
+from surfacechem.system import Margin, State
 from surfacechem.terms import Load, Spec
+from surfacechem.transitions import Transition
 
 LOADABLE = (
     "phi",

@@ -8,8 +8,8 @@ from surfacechem.assembly.breaking import bonds_left, broken, follows_bonds
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, where
-from surfacechem.system import Transition
 from surfacechem.terms import Limit
+from surfacechem.transitions import Transition
 
 OPEN = "the interface debonds as its tensile strength is reached"
 

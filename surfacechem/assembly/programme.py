@@ -15,8 +15,9 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Stage
-from surfacechem.system import State, Transition
+from surfacechem.system import State
 from surfacechem.terms import Spec
+from surfacechem.transitions import Transition
 from surfacechem.variables import unit_of
 
 SCALES = {"m": LENGTH, "m/s": LENGTH}

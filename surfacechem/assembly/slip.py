@@ -18,8 +18,9 @@ from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, hel
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Equilibrium, Margin, State, Transition
+from surfacechem.system import Margin, State
 from surfacechem.terms import Friction, reads
+from surfacechem.transitions import Equilibrium, Transition
 
 NONE = symengine.Integer(0)
 PLACE = Place(path="mechanics.tangential")

@@ -10,8 +10,8 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import far_field, held
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES
-from surfacechem.system import Transition
 from surfacechem.terms import RateLaw
+from surfacechem.transitions import Transition
 
 
 def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:

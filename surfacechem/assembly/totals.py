@@ -11,7 +11,8 @@ from surfacechem.balances import Node
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
-from surfacechem.system import Account, Sink
+from surfacechem.system import Account
+from surfacechem.transitions import Sink
 
 
 def totals(build: Build) -> None:
