@@ -273,7 +273,7 @@ def test_profiles_are_drawn_over_places():
     dataset = two(10).run().dataset
     (axes,) = plots.figure(dataset, ["profile_1", "profile_2"]).axes
     assert len(axes.get_lines()) == 2 * dataset.sizes["time"]
-    assert "distance from the contact" in axes.get_xlabel()
+    assert "Distance from the contact" in axes.get_xlabel()
     with pytest.raises(InputError, match="T_1 goes over time"):
         plots.figure(dataset, ["profile_1", "T_1"])
 
