@@ -19,6 +19,9 @@ STALLED = 1e-3
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
 left to close, explains why a run cannot go on."""
 
+GONE = 1e-30
+"""A margin that has shrunk to this part of its largest value is closed for all that can be told, at any speed."""
+
 RESOLVED = 1e-14
 """Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
 
@@ -70,7 +73,7 @@ def closest_margin(program: Program, margins: Sequence[Margin], result: Result) 
     with np.errstate(invalid="ignore", divide="ignore"):
         shrink = seen[-1] / np.max(np.abs(seen), axis=0)
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
-    closing = terminal & (seen[-1] < seen[before]) & (left < STALLED * t[-1])
+    closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < GONE))
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
     return margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
 

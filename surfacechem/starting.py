@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Program
+from surfacechem.errors import InputError
 from surfacechem.solvers.radau import consistent
 from surfacechem.system import System
 
@@ -55,9 +56,20 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     disturbance ignites or cools down.
     """
     guessed = np.array([state.algebraic and state.quantity.unit == "K" for state in system.states])
-    checks = [i for i, margin in enumerate(system.moving_margins()) if margin.name.startswith(STABLE)]
-    if not (guessed.any() and checks):
+    if not guessed.any():
         return y
+    checks = [i for i, margin in enumerate(system.moving_margins()) if margin.name.startswith(STABLE)]
+    chosen = _stable(program, checks, y, parameters, guessed) if checks else y
+    found = consistent(program, 0.0, chosen, np.zeros_like(y), parameters)
+    if found.valid and np.any(found.y[guessed] <= 0):
+        names = " and ".join(state.name for state, is_one in zip(system.states, guessed, strict=True) if is_one)
+        raise InputError(
+            f"at the start the interface takes up more heat than any temperature {names} above zero brings it."
+        )
+    return chosen
+
+
+def _stable(program: Program, checks: list[int], y: Array, parameters: Array, guessed: NDArray[np.bool_]) -> Array:
     tried = np.vstack([y, *(np.where(guessed, part * y, y) for part in COLDER)])
     if _are_stable(program, checks, tried[:1], parameters)[0]:
         return y
