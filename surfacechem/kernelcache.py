@@ -14,6 +14,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -124,13 +125,39 @@ def _unfinished(parts: Collection[str]) -> Iterator[None]:
         codegen.set_env = set_environment
 
 
+@contextmanager
+def _compared_at_once() -> Iterator[None]:
+    """Numba finds what it has compiled by the flags it did so with, and lists all of them at every look; here only
+    where those that are set differ. The result is the same, a tenth of the time is not needed.
+    """
+    from numba.core.targetconfig import TargetConfig
+
+    flags: Any = TargetConfig
+    usual = flags.__hash__, flags.__eq__
+
+    @cache
+    def digest(kind: Any) -> int:
+        return hash(tuple(sorted(kind.options)))
+
+    def same(self: Any, other: Any) -> bool:
+        if not isinstance(other, TargetConfig):
+            return False
+        return bool(self._values == other._values or self.values() == other.values())
+
+    flags.__hash__, flags.__eq__ = (lambda self: digest(type(self))), same
+    try:
+        yield
+    finally:
+        flags.__hash__, flags.__eq__ = usual
+
+
 def _compile(function: Callable[..., None], signature: Any, folder: Path | None, parts: Collection[str]) -> Any:
     import numba
     from numba.core.compiler_lock import global_compiler_lock
 
     if folder is not None:
         _writable(folder)
-    with global_compiler_lock, _settings(folder), _unfinished(parts):
+    with global_compiler_lock, _settings(folder), _unfinished(parts), _compared_at_once():
         return numba.njit(signature, cache=folder is not None, nogil=True, error_model="numpy")(function)
 
 
