@@ -14,7 +14,6 @@ import tempfile
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -135,16 +134,18 @@ def _compared_at_once() -> Iterator[None]:
     flags: Any = TargetConfig
     usual = flags.__hash__, flags.__eq__
 
-    @cache
-    def digest(kind: Any) -> int:
-        return hash(tuple(sorted(kind.options)))
+    digests: dict[Any, int] = {}
+
+    def digest(self: Any) -> int:
+        kind = type(self)
+        if kind not in digests:
+            digests[kind] = hash(tuple(sorted(kind.options)))
+        return digests[kind]
 
     def same(self: Any, other: Any) -> bool:
-        if not isinstance(other, TargetConfig):
-            return False
-        return bool(self._values == other._values or self.values() == other.values())
+        return isinstance(other, flags) and bool(self._values == other._values or self.values() == other.values())
 
-    flags.__hash__, flags.__eq__ = (lambda self: digest(type(self))), same
+    flags.__hash__, flags.__eq__ = digest, same
     try:
         yield
     finally:
