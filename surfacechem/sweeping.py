@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem import references, sweeps
+from surfacechem import references, sweep_runs
 from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
 from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
@@ -17,7 +17,8 @@ from surfacechem.references._start import Start
 from surfacechem.references.matching import exact_values, match, renamed
 from surfacechem.spectrum import Statistics
 from surfacechem.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
-from surfacechem.sweeps import Plan, Sweep, prepared
+from surfacechem.sweep_runs import prepared
+from surfacechem.sweeps import Plan, Sweep
 
 __all__ = ["prepared", "sweep"]
 
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 
 def sweep(case: Case, model: Model, plan: Plan, changes: Mapping[str, float], threads: int | None) -> SweepSolution:
     """Run the plan with the settings of the case; ``model`` is that of the prepared system."""
-    done = sweeps.solve(model, plan, case.run, changes, threads)
+    done = sweep_runs.solve(model, plan, case.run, changes, threads)
     accuracy = _accuracy(case, done, changes, threads)
     return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", accuracy, changes)
 
@@ -81,7 +82,7 @@ def _against_tighter(done: Sweep, changes: Mapping[str, float], threads: int | N
     """Errors of states and statistics, estimated from a second sweep."""
     other = second_tolerance(done.run.rtol)
     atol = None if done.run.atol is None else done.run.atol * other / done.run.rtol
-    second = sweeps.solve(done.model, done.plan, replace(done.run, rtol=other, atol=atol), changes, threads)
+    second = sweep_runs.solve(done.model, done.plan, replace(done.run, rtol=other, atol=atol), changes, threads)
     names = [state.name for state in done.model.system.states]
     both = done.reached & second.reached
     errors = np.full(len(done), np.nan)

@@ -1,14 +1,8 @@
-"""Sweeps: one compiled model over a grid of parameter values.
-
-All runs are made in one call of the compiled loop where nothing but the stepper is needed; where a scene jumps, or its
-medium is fitted as it goes, they are made one by one.
-"""
+"""Sweeps: a grid of parameter values, and the runs over it."""
 
 from __future__ import annotations
 
 import math
-import os
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,20 +14,15 @@ from numpy.typing import NDArray
 from surfacechem import spectrum
 from surfacechem.audit import EPSILON, SLACK, Audit, audit
 from surfacechem.errors import InputError
-from surfacechem.expressions import derivative
 from surfacechem.integrate import Model, Run, Trajectory
-from surfacechem.onebyone import batch
 from surfacechem.solvers.contract import Counters, Problem, Result, Status
-from surfacechem.solvers.radau import Batch, Radau, consistent, solve_many
+from surfacechem.solvers.radau import Batch, consistent
 from surfacechem.spectrum import Statistics
-from surfacechem.system import System
 
 Array = NDArray[np.float64]
 
 MOST_AXES = 2
 MOST_RUNS = 1_000_000
-USUAL_EVENTS = 4
-"""Events of a run for which there is room at first."""
 
 
 @dataclass(frozen=True)
@@ -78,22 +67,6 @@ class Plan:
         return [dict(zip(paths, point, strict=True)) for point in product(*(axis.values for axis in self.axes))]
 
 
-def prepared(system: System, plan: Plan) -> System:
-    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
-    if plan.until is None:
-        return system
-    if (holding := system.holding) is not None:
-        again = replace(holding, again=lambda sides: prepared(holding.again(sides), plan))
-        system = replace(system, holding=again)
-    spectrum.history(system, plan.until[0])
-    if spectrum.breaks_bonds(system):
-        return spectrum.with_rupture(system, plan.until[0])
-    if spectrum.evolves_bonds(system):
-        warning = "bonds can form again, so that their loss is no spectrum of rupture forces: none is given."
-        return replace(system, warnings=(*system.warnings, warning))
-    return system
-
-
 @dataclass(frozen=True)
 class Sweep:
     """Runs over a grid, in the order of :attr:`Plan.points`."""
@@ -107,8 +80,6 @@ class Sweep:
     seconds: float
     """Run time of the whole batch."""
     exact: Mapping[str, Array] = field(default_factory=dict)
-    trajectories: Sequence[Trajectory] = ()
-    """The runs, where they were made one by one."""
 
     def __len__(self) -> int:
         """Number of runs."""
@@ -116,8 +87,6 @@ class Sweep:
 
     def __getitem__(self, i: int) -> Trajectory:
         """One run."""
-        if self.trajectories:
-            return self.trajectories[i]
         problem, batch, n = self.problems[i], self.batch, int(self.batch.counts[i])
         result = Result(
             problem=problem,
@@ -162,8 +131,6 @@ class Sweep:
     def _inputs(self) -> Array:
         """Arguments of compiled functions at every output, zero where a run did not arrive."""
         program, (runs, outputs, n) = self.model.program, self.batch.outputs.shape
-        if self.trajectories:
-            return self._inputs_one_by_one(np.zeros((runs, outputs, program.n_inputs)))
         table = np.zeros((runs, outputs, program.n_inputs))
         for i, problem in enumerate(self.problems):
             piece = np.searchsorted(problem.segments[1:-1], problem.times, side="left")
@@ -176,21 +143,6 @@ class Sweep:
         rows[:, 1 + n : 1 + 2 * n] = found.ydot
         table[self.reached] = rows
         return table
-
-    def _inputs_one_by_one(self, table: Array) -> Array:
-        for i, trajectory in enumerate(self.trajectories):
-            result = trajectory.result
-            rows = self.model.inputs(result, result.times, result.outputs, trajectory.rates)
-            table[i, : len(rows)] = self.model.program.filled(rows)
-        return table
-
-    def _audited(self, error: str) -> Array:
-        """An error of the audit of each run, where they were made one by one."""
-        return np.array([getattr(book, error) for book in self._audits])
-
-    @cached_property
-    def _audits(self) -> list[Audit]:
-        return [audit(trajectory) for trajectory in self.trajectories]
 
     @cached_property
     def named(self) -> dict[str, Array]:
@@ -214,24 +166,18 @@ class Sweep:
     @cached_property
     def energy_error(self) -> Array:
         """Largest energy residual of each run relative to the energy it exchanged."""
-        if self.trajectories:
-            return self._audited("energy_error")
         supplied, turned = self._booked("energy supply"), self._booked("dissipation")
         return self._residual("E_total", "U_", [supplied], [supplied, turned])
 
     @cached_property
     def entropy_error(self) -> Array:
         """Largest entropy residual of each run relative to the entropy it exchanged or produced."""
-        if self.trajectories:
-            return self._audited("entropy_error")
         booked = [self._booked("entropy supply"), self._booked("entropy production")]
         return self._residual("S_total", "S_", booked, booked)
 
     @cached_property
     def site_error(self) -> Array:
         """Largest residual of the site balances of each run."""
-        if self.trajectories:
-            return self._audited("site_error")
         accounts = [(j, a.law) for j, a in enumerate(self.model.system.ledger) if a.kind == "bonds"]
         worst = np.zeros(len(self))
         for j, name in accounts:
@@ -243,8 +189,6 @@ class Sweep:
     @cached_property
     def destroys_entropy(self) -> NDArray[np.bool_]:
         """Which runs have a law that destroys entropy beyond their tolerance."""
-        if self.trajectories:
-            return np.array([bool(book.violations) for book in self._audits])
         rates = self._productions()
         largest = [np.nanmax(np.abs(rate), axis=1) for rate in rates]
         rounding = EPSILON * np.max(largest, axis=0, initial=0.0)
@@ -285,58 +229,45 @@ class Sweep:
         return np.asarray(np.where(self.reached[:, :, None], values, np.nan))
 
 
-def solve(
-    model: Model, plan: Plan, run: Run, changes: Mapping[str, float] | None = None, threads: int | None = None
-) -> Sweep:
-    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
-    run = model.chosen(run)
-    values = [model.values({**(changes or {}), **point}) for point in plan.points]
-    if (suited := model.suited(values)) is not model:
-        model, values = suited, [suited.adopted(point) for point in values]
-    runs = _scaled(model.system, plan, run, values) if plan.until else [run] * len(values)
-    if model.system.transitions or model.system.fit or run.solver != Radau.name:
-        return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
-    problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
-    first = problems[0]
-    Radau().prepare()
-    start = time.perf_counter()
-    solved = solve_many(
-        model.program,
-        np.array([problem.y0 for problem in problems]),
-        np.array([problem.parameters for problem in problems]),
-        np.array([problem.segments for problem in problems]) if plan.until else first.segments,
-        run.rtol,
-        first.atol,
-        times=np.array([problem.times for problem in problems]) if plan.until else first.times,
-        margins=first.margins,
-        max_steps=run.max_steps,
-        threads=threads or os.cpu_count() or 1,
-        event_rows=USUAL_EVENTS if first.margins else 0,
-    )
-    return Sweep(model, plan, run, values, problems, solved, time.perf_counter() - start)
+@dataclass(frozen=True, kw_only=True)
+class Separate(Sweep):
+    """A sweep whose runs were made one by one."""
 
+    trajectories: Sequence[Trajectory]
 
-def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]]) -> Sweep:
-    trajectories = [model.solve_values(*pair) for pair in pairs]
-    seconds = sum(trajectory.seconds for trajectory in trajectories)
-    results = [trajectory.result for trajectory in trajectories]
-    values, problems = [trajectory.values for trajectory in trajectories], [result.problem for result in results]
-    return Sweep(model, plan, run, values, problems, batch(results), seconds, trajectories=trajectories)
+    def __getitem__(self, i: int) -> Trajectory:
+        """One run."""
+        return self.trajectories[i]
 
+    @cached_property
+    def _inputs(self) -> Array:
+        table = np.zeros((*self.batch.outputs.shape[:2], self.model.program.n_inputs))
+        for i, trajectory in enumerate(self.trajectories):
+            result = trajectory.result
+            rows = self.model.inputs(result, result.times, result.outputs, trajectory.rates)
+            table[i, : len(rows)] = self.model.program.filled(rows)
+        return table
 
-def _scaled(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
-    """The settings of each run, its output times stretched to where the load is reached."""
-    assert plan.until is not None
-    variable, target = plan.until
-    if system.breakpoints:
-        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.")
-    line = spectrum.history(system, variable)
-    shape = np.asarray(run.times) / run.times[-1]
-    runs = []
-    for at in values:
-        point = {parameter.symbol: at[parameter.path] for parameter in system.parameters}
-        start, slope = (float(part.subs({**point, system.t: 0})) for part in (line, derivative(line, system.t)))
-        if not (target - start) * slope > 0:
-            raise InputError(f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s.")
-        runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
-    return runs
+    @cached_property
+    def _audits(self) -> list[Audit]:
+        return [audit(trajectory) for trajectory in self.trajectories]
+
+    @cached_property
+    def energy_error(self) -> Array:
+        """Largest energy residual of each run relative to the energy it exchanged."""
+        return np.array([books.energy_error for books in self._audits])
+
+    @cached_property
+    def entropy_error(self) -> Array:
+        """Largest entropy residual of each run relative to the entropy it exchanged or produced."""
+        return np.array([books.entropy_error for books in self._audits])
+
+    @cached_property
+    def site_error(self) -> Array:
+        """Largest residual of the site balances of each run."""
+        return np.array([books.site_error for books in self._audits])
+
+    @cached_property
+    def destroys_entropy(self) -> NDArray[np.bool_]:
+        """Which runs have a law that destroys entropy beyond their tolerance."""
+        return np.array([bool(books.violations) for books in self._audits])

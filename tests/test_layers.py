@@ -51,6 +51,7 @@ FLOORS = {
         "spectrum",
         "onebyone",
         "sweeps",
+        "sweep_runs",
         "sweep_dataset",
         "sweep_plots",
         "precision",

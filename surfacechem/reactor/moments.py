@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from scipy.optimize import brentq
 
 from surfacechem.equilibria import Point
 from surfacechem.events import AT_ONCE, REACHED, Hybrid
@@ -17,12 +14,6 @@ from surfacechem.stretches import changed
 
 GLOBAL = 100
 """By how much the error of a state may exceed the tolerance of a step."""
-
-POINTS = 16
-"""Points of a step at which margins are looked at."""
-
-LEAST = 4 * float(np.finfo(float).eps)
-"""Part of the time to which zeros are found."""
 
 
 class Moments(Hybrid):
@@ -98,24 +89,3 @@ class Moments(Hybrid):
     def _chatters(self, t: float) -> bool:
         recent = len(self.jumps) - self.calm
         return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - REACHED * t
-
-
-def first_zero(margins: Callable[[float], Array], low: float, high: float) -> tuple[float, int] | None:
-    """Time and position of the first of the margins that reaches zero between two times; None where none does."""
-    sides = margins(low)
-    at = low
-    for t in np.linspace(low, high, POINTS + 1)[1:].tolist():
-        values = margins(t)
-        closing = np.flatnonzero((sides > 0) & (values <= 0)).tolist()
-        if closing:
-            zeros = {i: _zero(margins, i, at, t) for i in closing}
-            index = min(zeros, key=lambda i: zeros[i])
-            return zeros[index], index
-        sides, at = np.where(values != 0, values, sides), t
-    return None
-
-
-def _zero(margins: Callable[[float], Array], i: int, low: float, high: float) -> float:
-    if margins(low)[i] <= 0:
-        return low
-    return float(brentq(lambda t: float(margins(t)[i]), low, high, xtol=1e-300, rtol=LEAST))

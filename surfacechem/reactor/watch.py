@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.reactor.moments import first_zero
 from surfacechem.solvers.contract import Array
+from surfacechem.solvers.crossings import crossings
 
 FIRST = 1e-9
 """First look ahead after a start, as part of what is integrated: the integrator starts with shorter steps still."""
@@ -96,9 +96,13 @@ class Watch:
             return item.scene.transitions(t, self._at(item, t))
 
         passed = np.flatnonzero((before > 0) & (margins(now) <= 0)).tolist()
-        found = (now, passed[0]) if passed else first_zero(margins, now, self.known)
-        if found and (self.event is None or found[0] < self.event.t):
-            self.event = Event(found[0], item, found[1])
+        zeros = dict.fromkeys(passed, now) or crossings(
+            margins, np.sign(margins(now)), np.full(len(before), -1), now, self.known
+        )
+        if zeros:
+            first = min(zeros, key=lambda i: zeros[i])
+            if self.event is None or zeros[first] < self.event.t:
+                self.event = Event(zeros[first], item, first)
 
     def _polynomial(self) -> Array:
         """Coefficients of the powers of the time from now, shape (powers, variables)."""

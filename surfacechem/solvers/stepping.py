@@ -4,19 +4,15 @@ contract.
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from surfacechem.solvers import stepper
 from surfacechem.solvers.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
+from surfacechem.solvers.crossings import crossings
 from surfacechem.solvers.evaluation import Evaluation
 from surfacechem.solvers.step_ledger import NODES, StepLedger
-
-POINTS = 16
 
 LONGEST_FIRST = 1e3
 """First change of a state that its rate may predict, in units of the state."""
@@ -265,18 +261,12 @@ class SteppingSolver(Solver):
         return view.margins(t, y, ydot)
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
-        low = progress.t
         directions = np.array([margin.direction for margin in view.problem.margins])
-        for t in np.linspace(progress.t, reached, POINTS + 1)[1:].tolist():
-            values = self._margins(view, method, t)
-            crossing = np.flatnonzero(_crosses(progress.sides, values, directions)).tolist()
-            if crossing:
-                zeros = {i: _zero(lambda s, i=i: float(self._margins(view, method, s)[i]), low, t) for i in crossing}  # type: ignore[misc]
-                first = min(zeros.values())
-                near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
-                return first, {i for i, zero in zeros.items() if zero <= first + near}
-            np.copyto(progress.sides, np.sign(values), where=values != 0.0)
-            low = t
+        zeros = crossings(lambda t: self._margins(view, method, t), progress.sides, directions, progress.t, reached)
+        if zeros:
+            first = min(zeros.values())
+            near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
+            return first, {i for i, zero in zeros.items() if zero <= first + near}
         return reached, set()
 
     def _write_outputs(self, view: View, progress: Progress, method: Method, along: StepLedger) -> None:
@@ -297,19 +287,6 @@ def _start_tables(progress: Progress) -> None:
         progress.outputs.append(np.concatenate((progress.y, progress.ledger)))
     if progress.problem.record_steps and not progress.steps:
         progress.steps.append((progress.t, progress.y, progress.ydot, progress.ledger))
-
-
-def _crosses(sides: Array, values: Array, directions: Array) -> NDArray[np.bool_]:
-    """Which margins have changed their side, in a direction that counts."""
-    falls = (sides > 0) & (values <= 0) & (directions <= 0)
-    return falls | ((sides < 0) & (values >= 0) & (directions >= 0))
-
-
-def _zero(margin: Callable[[float], float], low: float, high: float) -> float:
-    """Zero in the bracket; its lower end where a margin starts on the far side already."""
-    if margin(low) * margin(high) >= 0.0:
-        return high if margin(high) == 0.0 else float(np.nextafter(low, high))
-    return float(brentq(margin, low, high, xtol=1e-300, rtol=4 * np.finfo(float).eps))
 
 
 def _rows(rows: list[tuple[float, Array, Array, Array]], problem: Problem) -> tuple[Array, Array, Array, Array]:

@@ -1,0 +1,101 @@
+"""The runs of a sweep: in one call of the compiled loop where nothing but the stepper is needed.
+
+Where a scene jumps, or its medium is fitted as it goes, they are made one by one.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import spectrum
+from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
+from surfacechem.integrate import Model, Run
+from surfacechem.onebyone import batch
+from surfacechem.solvers.radau import Radau, solve_many
+from surfacechem.sweeps import Plan, Separate, Sweep
+from surfacechem.system import System
+
+Array = NDArray[np.float64]
+
+USUAL_EVENTS = 4
+"""Events of a run for which there is room at first."""
+
+
+def prepared(system: System, plan: Plan) -> System:
+    """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
+    if plan.until is None:
+        return system
+    if (holding := system.holding) is not None:
+        again = replace(holding, again=lambda sides: prepared(holding.again(sides), plan))
+        system = replace(system, holding=again)
+    spectrum.history(system, plan.until[0])
+    if spectrum.breaks_bonds(system):
+        return spectrum.with_rupture(system, plan.until[0])
+    if spectrum.evolves_bonds(system):
+        warning = "bonds can form again, so that their loss is no spectrum of rupture forces: none is given."
+        return replace(system, warnings=(*system.warnings, warning))
+    return system
+
+
+def solve(
+    model: Model, plan: Plan, run: Run, changes: Mapping[str, float] | None = None, threads: int | None = None
+) -> Sweep:
+    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    run = model.chosen(run)
+    values = [model.values({**(changes or {}), **point}) for point in plan.points]
+    if (suited := model.suited(values)) is not model:
+        model, values = suited, [suited.adopted(point) for point in values]
+    runs = _scaled(model.system, plan, run, values) if plan.until else [run] * len(values)
+    if model.system.transitions or model.system.fit or run.solver != Radau.name:
+        return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
+    problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
+    first = problems[0]
+    Radau().prepare()
+    start = time.perf_counter()
+    solved = solve_many(
+        model.program,
+        np.array([problem.y0 for problem in problems]),
+        np.array([problem.parameters for problem in problems]),
+        np.array([problem.segments for problem in problems]) if plan.until else first.segments,
+        run.rtol,
+        first.atol,
+        times=np.array([problem.times for problem in problems]) if plan.until else first.times,
+        margins=first.margins,
+        max_steps=run.max_steps,
+        threads=threads or os.cpu_count() or 1,
+        event_rows=USUAL_EVENTS if first.margins else 0,
+    )
+    return Sweep(model, plan, run, values, problems, solved, time.perf_counter() - start)
+
+
+def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]]) -> Sweep:
+    trajectories = [model.solve_values(*pair) for pair in pairs]
+    seconds = sum(trajectory.seconds for trajectory in trajectories)
+    results = [trajectory.result for trajectory in trajectories]
+    values, problems = [trajectory.values for trajectory in trajectories], [result.problem for result in results]
+    return Separate(model, plan, run, values, problems, batch(results), seconds, trajectories=trajectories)
+
+
+def _scaled(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
+    """The settings of each run, its output times stretched to where the load is reached."""
+    assert plan.until is not None
+    variable, target = plan.until
+    if system.breakpoints:
+        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.")
+    line = spectrum.history(system, variable)
+    shape = np.asarray(run.times) / run.times[-1]
+    runs = []
+    for at in values:
+        point = {parameter.symbol: at[parameter.path] for parameter in system.parameters}
+        start, slope = (float(part.subs({**point, system.t: 0})) for part in (line, derivative(line, system.t)))
+        if not (target - start) * slope > 0:
+            raise InputError(f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s.")
+        runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
+    return runs
