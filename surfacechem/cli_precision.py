@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from surfacechem.commands import STATUS, Changes, Quiet, solved
+from surfacechem.commands import STATUS, Changes, Quiet, studied
 from surfacechem.errors import InputError, Place
 from surfacechem.guard import refuse_unwritable
 
@@ -52,7 +52,7 @@ def precision(
     for target in files.values():
         refuse_unwritable(target)
     rounds = {} if repeat is None else {"repeat": repeat}
-    study = solved(lambda: compared(cases, overrides=changes or (), **settings, **rounds), quiet)  # type: ignore[arg-type]
+    study = studied(lambda: compared(cases, overrides=changes or (), **settings, **rounds), quiet)  # type: ignore[arg-type]
     study.write(output or Path("precision"))
     if not quiet:
         typer.echo(study.page.text())

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from surfacechem.commands import Quiet, Tolerance, solved
+from surfacechem.commands import Quiet, Tolerance, studied
 from surfacechem.guard import refuse_unwritable
 
 CODES = """\b
@@ -38,7 +38,7 @@ def stability(
     """Solve dangerous regimes over decades of their parameter with several solvers, and report what each keeps."""
     from surfacechem.stability.matrix import RTOL, SOLVERS
     from surfacechem.stability.study import ROUNDS
-    from surfacechem.stability.study import stability as studied
+    from surfacechem.stability.study import stability as compared
     from surfacechem.studyreport import targets
 
     target = output or Path("stability")
@@ -46,8 +46,8 @@ def stability(
     for file in files.values():
         refuse_unwritable(file)
     names = SOLVERS if solvers is None else tuple(part.strip() for part in solvers.split(",") if part.strip())
-    study = solved(
-        lambda: studied(
+    study = studied(
+        lambda: compared(
             *(regimes or ()),
             solvers=names,
             rtol=RTOL if rtol is None else rtol,

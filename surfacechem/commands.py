@@ -101,6 +101,16 @@ def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
     return interruptible(run)
 
 
+def studied(run: Callable[[], S], quiet: bool) -> S:
+    """The same for a study, which takes minutes: it says on a terminal what it is at."""
+    if sys.stderr.isatty() and not quiet:
+        import logging
+
+        logging.basicConfig(format="%(message)s ...")
+        logging.getLogger("surfacechem").setLevel(logging.INFO)
+    return solved(run, quiet)
+
+
 def picture_kind(target: Path) -> str:
     """The kind of picture that a file name asks for."""
     kind = target.suffix.lower().removeprefix(".")

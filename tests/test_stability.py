@@ -175,6 +175,12 @@ def test_where_the_matrix_says_wrong_so_does_the_summary_of_the_run(name, value)
     assert "warning" in run_summary(solution, None)
 
 
+def test_a_study_tells_what_it_is_at(caplog):
+    with caplog.at_level("INFO", "surfacechem"):
+        stability("seconds", "bell", solvers=("radau",), quick=True, rounds=0)
+    assert caplog.messages == ["seconds: 4 values, regime 1 of 2", "bell: 4 values, regime 2 of 2"]
+
+
 def test_names_get_the_nearest_guess():
     for arguments, message in (
         (("endotermic",), "no regime 'endotermic'. Did you mean 'endothermic'?"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from collections.abc import Callable, Sequence
@@ -16,6 +17,8 @@ from surfacechem.case import Case
 from surfacechem.errors import InputError
 from surfacechem.integrate import OWN, Model, Run, Trajectory
 from surfacechem.stability.regime import Exact, Problem, Refused, Regime, Stops
+
+log = logging.getLogger(__name__)
 
 SOLVED, REFUSED, FAILED, WRONG = "solved", "refused", "failed", "wrong"
 OUTCOMES = (SOLVED, REFUSED, FAILED, WRONG)
@@ -82,8 +85,9 @@ def matrix(
 ) -> Matrix:
     """Solve everything; ``pick`` may leave values out."""
     rows = []
-    for regime in regimes:
+    for number, regime in enumerate(regimes, 1):
         values = list(pick(regime.values))
+        log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(regimes))
         rows.append(Row(regime, values, [attempt(regime.problem(value), solvers, rtol) for value in values]))
     return Matrix(rows, list(solvers), rtol)
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import Bounds, differential_evolution
 
 from surfacechem.errors import InputError
 from surfacechem.integrate import OWN
 from surfacechem.stability.matrix import FAILED, MOST, RTOL, WRONG, Cell, attempt
 from surfacechem.stability.regime import Regime
+
+log = logging.getLogger(__name__)
 
 SEED = 20210301
 POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
@@ -40,45 +44,37 @@ def badness(cell: Cell) -> float:
 def worst_corner(regime: Regime, rounds: int = 12, rtol: float = RTOL, seed: int = SEED) -> Corner:
     """Differential evolution over the regime's space, on decimal logarithms; the same seed gives the same corner.
 
-    Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin).
+    Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin), as in SciPy.
     """
-    names, low, high = list(regime.space), *np.array(list(regime.space.values())).T
     random = np.random.default_rng(seed)
-    points = low + (high - low) * random.random((POPULATION, len(names)))
-    cells = [_cell(regime, names, point, rtol) for point in points]
-    seen = list(cells)
-    for _ in range(rounds):
-        for i in range(POPULATION):
-            trial = _trial(points, i, low, high, random)
-            cell = _cell(regime, names, trial, rtol)
-            seen.append(cell)
-            if badness(cell) >= badness(cells[i]):
-                points[i], cells[i] = trial, cell
-    worst = max(range(POPULATION), key=lambda i: badness(cells[i]))
-    unsolved = sum(cell.outcome in BADNESS for cell in seen)
-    return Corner(regime, _values(names, points[worst]), cells[worst], len(seen), unsolved)
+    names, low, high = list(regime.space), *np.array(list(regime.space.values())).T
+    log.info("%s: searching its worst corner", regime.name)
+    seen: list[tuple[dict[str, float], Cell]] = []
+
+    def kept(point: NDArray[np.float64]) -> float:
+        values = {name: float(10.0**x) for name, x in zip(names, point, strict=True)}
+        seen.append((values, _cell(regime, values, rtol)))
+        return -badness(seen[-1][1])
+
+    differential_evolution(
+        kept,
+        Bounds(low, high),
+        strategy="rand1bin",
+        init=low + (high - low) * random.random((POPULATION, len(names))),
+        maxiter=rounds,
+        mutation=WEIGHT,
+        recombination=CROSSOVER,
+        tol=0,
+        polish=False,
+        rng=random,
+    )
+    point, cell = max(seen, key=lambda point_and_cell: badness(point_and_cell[1]))
+    return Corner(regime, point, cell, len(seen), sum(cell.outcome in BADNESS for _, cell in seen))
 
 
-def _trial(
-    points: NDArray[np.float64],
-    i: int,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    random: np.random.Generator,
-) -> NDArray[np.float64]:
-    a, b, c = points[random.choice([j for j in range(len(points)) if j != i], 3, replace=False)]
-    taken = random.random(len(low)) < CROSSOVER
-    taken[random.integers(len(low))] = True
-    return np.asarray(np.clip(np.where(taken, a + WEIGHT * (b - c), points[i]), low, high))
-
-
-def _values(names: list[str], point: NDArray[np.float64]) -> dict[str, float]:
-    return {name: float(10.0**x) for name, x in zip(names, point, strict=True)}
-
-
-def _cell(regime: Regime, names: list[str], point: NDArray[np.float64], rtol: float) -> Cell:
+def _cell(regime: Regime, point: Mapping[str, float], rtol: float) -> Cell:
     try:
-        problem = regime.corner(_values(names, point))
+        problem = regime.corner(point)
     except InputError as error:  # the corner is outside of what the exact solution holds for
         return Cell("refused", MOST, 0, 0, 0.0, error.message)
     return attempt(problem, [OWN], rtol)[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +11,8 @@ from surfacechem.errors import InputError
 from surfacechem.workprecision.measure import Point, measure
 from surfacechem.workprecision.subject import Subject
 from surfacechem.workprecision.truth import Truth, establish
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,12 @@ def measured(subject: Subject, plan: Plan) -> Measured:
     """A case measured by the plan."""
     variables = _variables(subject, plan.variables)
     truth, untrue = None, ""
+    log.info("%s: its reference", subject.name)
     try:
         truth = establish(subject, variables)
     except InputError as error:
         untrue = error.message
+    log.info("%s: %d solvers at %d tolerances", subject.name, len(plan.solvers), len(plan.tolerances))
     points = measure(subject, truth, plan.solvers, plan.tolerances, plan.repeat)
     return Measured(subject, variables, truth, untrue, tuple(points))
 
