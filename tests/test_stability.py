@@ -65,6 +65,14 @@ def test_random_corners_are_solved(name):
     assert corner.cell.digits > 8.0, corner
 
 
+@pytest.mark.parametrize(("exponent", "k_off"), [(374.2, 1.9e11), (459.0, 1.5e-9), (1e4, 3.9e-12), (1e4, 2.6e-5)])
+def test_rates_that_fall_by_decades_within_a_run(exponent, k_off):
+    """A Jacobian of the start is far too stiff for what follows."""
+    problem = regimes()["bell"].corner({"exponent": exponent, "k_off": k_off})
+    cell = attempt(problem, ["radau"])[0]
+    assert (cell.outcome, cell.digits > 8.0) == (SOLVED, True), cell
+
+
 def test_a_search_finds_the_same_corner_again():
     first, second = (search.worst_corner(regimes()["bell"], rounds=1, seed=1) for _ in range(2))
     assert first.point == second.point

@@ -46,9 +46,9 @@ Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.ara
 M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = np.arange(9)
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero."""
-BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED = np.arange(10)
+BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN = np.arange(11)
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
-t."""
+t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian."""
 STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
 MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
@@ -252,9 +252,9 @@ def lay_out(
         chains,
         groups,
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
-        _take(cursor, (10,), np.float64),
-        _take(cursor, (12,), np.int64),
-        _take(cursor, (13, n), np.float64),
+        _take(cursor, (H_JACOBIAN + 1,), np.float64),
+        _take(cursor, (REFUSED + 1,), np.int64),
+        _take(cursor, (NOISE + 1, n), np.float64),
         _take(cursor, (7, n), np.float64),
         _take(cursor, (7, n), np.float64),
         _take(cursor, (7, n), np.float64),
@@ -270,11 +270,11 @@ def lay_out(
         _take(cursor, (3, cells, 3), np.complex128),
         _take(cursor, (4, core), np.int64),
         _take(cursor, (n, 9), np.float64),
-        _take(cursor, (8, n_ledger), np.float64),
+        _take(cursor, (Q_NUDGED + 1, n_ledger), np.float64),
         _take(cursor, (7, n_ledger), np.float64),
         _take(cursor, (8, n_ledger), np.float64),
         _take(cursor, (n, 9), np.float64),
         _take(cursor, (n_ledger, 9), np.float64),
-        _take(cursor, (9, n_margins), np.float64),
+        _take(cursor, (M_HIGH + 1, n_margins), np.float64),
         _take(cursor, (n_margins,), np.int64),
     )

@@ -11,6 +11,7 @@ from surfacechem.solvers.native import (
     CONTRACTION,
     FRESH,
     H_FACTORED,
+    H_JACOBIAN,
     H_LAST,
     LAST_MEMBER,
     LEDGER,
@@ -58,6 +59,11 @@ INVALID, OLD, CURRENT = range(3)
 SLOW, SLOW_REJECTED = 0.8, 0.3
 """Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
 
+LASTS = 10.0
+"""Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
+corrections are small whatever is left to correct.
+"""
+
 GOOD = -1
 STEP_UNDERFLOW = int(Status.STEP_UNDERFLOW)
 MAX_STEPS = int(Status.MAX_STEPS)
@@ -99,10 +105,12 @@ def _prepare(w: Any, h: float) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.clock[H_FACTORED] == h:
         return GOOD
-    if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and w.clock[THETA] >= 1e-3):
+    outgrown = w.clock[THETA] >= 1e-3 or h > LASTS * w.clock[H_JACOBIAN]
+    if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and outgrown):
         if not differentiate_system(w):
             return NONFINITE
         w.count[FRESH] = CURRENT
+        w.clock[H_JACOBIAN] = h
     w.clock[H_FACTORED] = 0.0
     if not factor_newton(w, h):
         return SINGULAR
