@@ -300,8 +300,9 @@ class Hybrid:
 
     def _jump(self, index: int, point: Point) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
-        noise = NOISE * float(self.largest[self.first + index])
-        jump = self.jumper.make(index, point, self._since(point.t), noise)
+        largest = float(self.largest[self.first + index])
+        drift = DRIFT * self.problem.rtol * largest
+        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict

@@ -148,8 +148,10 @@ class Jumper:
     def _sink_functions(self) -> dict[str, Function]:
         return {}
 
-    def make(self, index: int, before: Point, since: float, noise: float = 0.0) -> Jump:
-        """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to."""
+    def make(self, index: int, before: Point, since: float, noise: float = 0.0, drift: float = 0.0) -> Jump:
+        """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
+        far the integration may have carried it.
+        """
         item = self.system.transitions[index]
         values = self._maps[index](before.inputs())
         n = len(before.y)
@@ -169,7 +171,7 @@ class Jumper:
             if item.fold is not None:
                 before, after = self.equilibria.let_go(index, before, parameters, heat)
             else:
-                after = self._kept(item, self.equilibria.settle(start, heat), parameters, noise)
+                after = self._kept(item, self.equilibria.settle(start, heat), parameters, max(noise, drift))
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             obstacle = NO_REST if after is None else NO_HEAT
@@ -181,9 +183,9 @@ class Jumper:
             noise,
         )
 
-    def _kept(self, item: Transition, after: Point | None, parameters: Array, noise: float) -> Point | None:
-        """The modes that a transition sets hold while its measure is zero but for rounding."""
-        if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > noise:
+    def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
+        """The modes that a transition sets hold while its measure is as good as zero."""
+        if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > small:
             return after
         return replace(after, parameters=parameters)
 

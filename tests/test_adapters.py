@@ -1,11 +1,15 @@
 """Solvers by name, and the honesty of the adapters: what a library gets wrong must not be reported as a success."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import symengine as se
 from solver_problems import problem
 
+from surfacechem import load
 from surfacechem.compile import compile_program
+from surfacechem.event_table import event_times
 from surfacechem.solvers import names, solver
 from surfacechem.solvers.contract import Problem
 
@@ -70,3 +74,14 @@ def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
     found = result.ledger_outputs
     np.testing.assert_allclose(found[:, 0], 1 - result.outputs[:, 0], atol=1e-8)
     np.testing.assert_allclose(found, np.stack([1 - exact, 1 - exact**2], axis=1), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_a_peak_before_an_event_is_seen(name: str) -> None:
+    """Attachment peaks at touch, in the last hundredths of a long approach: a step may go on to where it is over."""
+    simulation = load("press-hold-pull")
+    run = replace(simulation.case.run, rtol=1e-7, solver=name, accuracy=None)
+    trajectory = simulation.model.solve(run)
+    times = event_times(trajectory)
+    np.testing.assert_allclose(times["touch"], [0.5], rtol=1e-8)
+    np.testing.assert_allclose(times["release"], [21.15942147473261], rtol=1e-5)

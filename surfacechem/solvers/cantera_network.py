@@ -17,6 +17,9 @@ from surfacechem.solvers.evaluation import Evaluation
 from surfacechem.solvers.reduced import Reduced
 from surfacechem.solvers.stepping import Method, StepError, SteppingSolver, View
 
+LONGEST = 0.1
+"""Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
+
 SMALLEST = 1e-290
 """Absolute tolerances below this count as this."""
 
@@ -145,11 +148,11 @@ class _SystemReactor(HeldReactor):
 
 
 class _Stretch(Method):
-    def __init__(self, view: View, t: float, y: Array) -> None:
+    def __init__(self, view: View, t: float, end: float, y: Array) -> None:
         self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y))
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
-        self.net.initial_time = t
+        self.net.initial_time, self.net.max_time_step = t, LONGEST * (end - t)
         self.t = t
         self.polynomial = np.zeros((1, len(self.reactor.names)))
 
@@ -194,4 +197,4 @@ class CanteraSolver(SteppingSolver):
     counts_rejected = True
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
-        return _Stretch(view, t, y)
+        return _Stretch(view, t, end, y)

@@ -24,5 +24,5 @@ class StepLedger:
 
     def at(self, t: float) -> Array:
         """The ledger at a time within the step."""
-        part = (t - self.start) / self.size
+        part = (t - self.start) / self.size if self.size else 0.0
         return np.asarray(self.ledger + part ** np.arange(1.0, len(NODES) + 1) @ self.coefficients)

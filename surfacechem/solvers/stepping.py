@@ -14,6 +14,9 @@ from surfacechem.solvers.crossings import crossings
 from surfacechem.solvers.evaluation import Evaluation
 from surfacechem.solvers.step_ledger import NODES, StepLedger
 
+MISSED = 100.0
+"""Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
+
 LONGEST_FIRST = 1e3
 """First change of a state that its rate may predict, in units of the state."""
 
@@ -118,6 +121,8 @@ class Progress:
     rejected: int = 0
     stepping: float = 0.0
     """Time inside the library's own steps [s]."""
+    aim: float | None = None
+    """Where a step has to end, since one that went beyond has not seen what lies before."""
 
     def restart_sides(self, fired: set[int]) -> None:
         self.sides = np.sign(self.margins)
@@ -200,9 +205,10 @@ class SteppingSolver(Solver):
             progress.margins = view.margins(start, progress.y, progress.ydot)
             progress.restart_sides(fired)
             _start_tables(progress)
-            method = self.begin(view, start, end, progress.y, progress.ydot)
+            stop = end if progress.aim is None or progress.aim <= start else progress.aim
+            method = self.begin(view, start, stop, progress.y, progress.ydot)
             try:
-                fired = self._stretch(view, progress, method, end)
+                fired = self._stretch(view, progress, method, stop)
             finally:
                 progress.factorizations += method.factorizations
                 progress.jacobians += method.own_jacobians
@@ -228,12 +234,17 @@ class SteppingSolver(Solver):
             fired: set[int] = set()
             if view.problem.margins:
                 reached, fired = self._find_event(view, progress, method, reached)
+                if fired and progress.aim is None and not self._seen(view, progress, method, reached):
+                    progress.aim = reached
+                    return set()
             along = self._ledger(view, progress, method, reached)
             self._write_outputs(view, progress, method, along)
             y, ydot = self._state(view, method, reached)
             ledger = along.at(reached)
             if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
                 raise StepError("a state is not finite")
+            if progress.aim is not None and progress.aim <= progress.t:
+                progress.aim = None
             progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
             progress.margins = view.margins(reached, y, ydot)
             progress.count += 1
@@ -268,6 +279,18 @@ class SteppingSolver(Solver):
             near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
             return first, {i for i, zero in zeros.items() if zero <= first + near}
         return reached, set()
+
+    def _seen(self, view: View, progress: Progress, method: Method, reached: float) -> bool:
+        """Whether the rates up to an event inside the last step add up to its increment; a step that is tested at its
+        end alone passes over a peak on the way.
+        """
+        size = reached - progress.t
+        inside = [progress.t + size * float(node) for node in NODES[1:]]
+        rates = np.array([progress.ydot, *(self._state(view, method, t)[1] for t in inside)])
+        y, problem = self._state(view, method, reached)[0], view.problem
+        missed = np.abs(StepLedger(progress.t, size, progress.y, rates).at(reached) - y)
+        allowed = MISSED * (problem.rtol * np.maximum(np.abs(y), np.abs(progress.y)) + problem.atol)
+        return bool(np.all((missed <= allowed)[~problem.program.algebraic_mask]))
 
     def _write_outputs(self, view: View, progress: Progress, method: Method, along: StepLedger) -> None:
         times, reached = view.problem.times, along.start + along.size
