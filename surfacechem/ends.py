@@ -45,7 +45,7 @@ def cause(
         return "stopped", f"{shrunk} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
-        names = " and ".join(state.name for state in algebraic)
+        names = " and ".join(state.at_start[0].name for state in algebraic)
         reason = f"no {names} satisfies the balances that have no inertia or capacity"
         if all(state.quantity.unit == "K" for state in algebraic):
             reason = f"ignition: no temperature {names} balances the heat that the interface produces"
@@ -97,8 +97,12 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
-    j = int(np.argmax(speed))
-    if not speed[j] * result.t > 1 / RUNAWAY:
+    if not np.max(speed) * result.t > 1 / RUNAWAY:
         return None
+    # What has no inertia or capacity is the first to run away, if it does.
+    free = np.array([state.algebraic for state in states]) & (speed * result.t > 1 / RUNAWAY)
+    j = int(np.argmax(np.where(free, speed, 0.0) if free.any() else speed))
+    if states[j].given is not None:
+        return f"{states[j].at_start[0].name} runs away, faster and faster"
     unit = states[j].quantity.unit
     return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"

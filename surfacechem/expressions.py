@@ -176,6 +176,20 @@ def asinh_exp(x: Expression, exponent: Expression) -> Expression:
     return symengine.Piecewise((plain, exponent < LARGE_EXPONENT), (far, True))
 
 
+def sinh_exp(x: Expression, exponent: Expression) -> Expression:
+    """sinh(x) exp(exponent) without overflow of either, the inverse of arsinh(v exp(-exponent)).
+
+    >>> sinh_exp(0.5, 0.0) == math.sinh(0.5), sinh_exp(-400.0, -400.0), sinh_exp(1e-9, 0.0)
+    (True, -0.5, 1e-09)
+    """
+    return where(x < 0, -_half(-x, exponent), _half(x, exponent))
+
+
+def _half(x: Expression, exponent: Expression) -> Expression:
+    """The same for x >= 0."""
+    return -0.5 * expm1(-2 * x) * exp(x + exponent)
+
+
 def sin(x: Expression) -> Expression:
     """Sine of an angle in radians."""
     return _engine(x).sin(x)

@@ -24,7 +24,7 @@ from surfacechem.solvers import ASKING, AUTO, solver
 from surfacechem.solvers.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
-from surfacechem.starting import creeping_start, stable_start
+from surfacechem.starting import stable_start
 from surfacechem.system import Margin as Watched
 from surfacechem.system import System
 from surfacechem.terms import Spec
@@ -185,7 +185,7 @@ class Model:
         """Every parameter and initial value by path, with some of them changed."""
         values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
         values |= {state.path: state.at_start[1] for state in self.system.states}
-        specs = {state.path: POSITIVE if state.given else STATE for state in self.system.states}
+        specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in self.system.states}
         specs |= {parameter.path: parameter.spec for parameter in self.system.parameters}
         known = self.system.changeable if changes else {}
         for path, value in (changes or {}).items():
@@ -240,7 +240,6 @@ class Model:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
             y = settled.y
             table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
-        y = creeping_start(self.system, self.program, y, table[0])
         return stable_start(self.system, self.program, y, table[0])
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:

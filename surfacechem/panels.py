@@ -32,7 +32,7 @@ class Panel:
 
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K", r"(?!.*_exact$).*"),
-    ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|.*_exact$|J_c$|n_c$|gamma_m$|ln_theta$).*"),
+    ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|.*_exact$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
     ("Gap", "m", r"g_(?!.*_exact$)\w*"),
     ("Displacement", "m", r"u_t"),
     ("Velocity", "m s-1", r"(?!.*_exact$)\w+"),

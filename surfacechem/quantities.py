@@ -53,6 +53,7 @@ VARIABLES = _table(
     ("v_n", "m/s", "opening velocity of the normal gap", r"\dot g_n"),
     ("v_t", "m/s", "tangential velocity of body 2 relative to body 1", r"\dot u_t"),
     ("v", "m/s", "sliding velocity of body 2 relative to body 1", "v"),
+    ("drive", "1", "friction traction in units of its direct effect, a p", r"t_t / a p"),
     ("v_2", "m/s", "sliding velocity across v, along the interface", "v_2"),
     ("theta", "s", "age of the contact", r"\theta"),
     ("ln_theta", "1", "logarithm of the age of the contact in seconds", r"\ln\theta"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,34 +17,6 @@ COLDER = 0.95 ** np.arange(1, 40)
 
 STABLE = "stable "
 """How the names of margins begin that tell a stable state from an unstable one."""
-
-
-DECADES = np.arange(-280.0, 10.0)
-"""Exponents of the velocities [m/s] between which one is looked for on which friction depends logarithmically."""
-
-
-def creeping_start(system: System, program: Program, y: Array, parameters: Array) -> Array:
-    """First guesses of velocities that span tens of decades, of which Newton's method takes less than one at a time."""
-    from scipy.optimize import brentq
-
-    for j, state in enumerate(system.states):
-        if not (state.algebraic and state.finest):
-            continue
-
-        def driving(v: Any, j: int = j, y: Array = y) -> Array:
-            rows = np.repeat(np.concatenate([[0.0], y, np.zeros_like(y), parameters])[None], np.size(v), axis=0)
-            rows[:, 1 + j] = v
-            return np.atleast_2d(program.residual(program.filled(rows)))[:, j]
-
-        side = float(np.sign(driving(0.0)[0]))
-        ends = np.nonzero(side * driving(side * 10.0**DECADES) <= 0)[0]
-        found = 0.0
-        if side and len(ends) and ends[0]:
-            low, high = DECADES[ends[0] - 1], DECADES[ends[0]]
-            found = side * 10.0 ** brentq(lambda x: driving(side * 10.0**x)[0], low, high)  # noqa: B023
-        if side == 0.0 or found:
-            y = np.where(np.arange(len(y)) == j, found, y)
-    return y
 
 
 def stable_start(system: System, program: Program, y: Array, parameters: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -51,10 +51,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Given:
-    """What a case gives at the start for a state that is its logarithm."""
+    """What a case gives at the start for a state that stands for it: as a rule one that is its logarithm."""
 
     quantity: Quantity
     value: float
+    state: Callable[[Mapping[str, float]], float] | None = None
+    """The state from all values by path, where it is not the logarithm."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class State:
     finest: float | None = None
     """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
     given: Given | None = None
-    """What is given in its place, where it is the logarithm of that."""
+    """What is given in its place, where it stands for that."""
 
     @property
     def name(self) -> str:
@@ -91,7 +93,9 @@ class State:
 
     def from_given(self, values: Mapping[str, float]) -> float:
         """Its initial value, from what is given by path."""
-        return math.log(values[self.path]) if self.given else values[self.path]
+        if self.given is None:
+            return values[self.path]
+        return self.given.state(values) if self.given.state else math.log(values[self.path])
 
 
 @dataclass(frozen=True)

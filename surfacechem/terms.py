@@ -84,6 +84,12 @@ class Friction(Law):
     traction: ClassVar[Callable[..., Expression]]
     limit: ClassVar[Callable[..., Expression]]
     """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
+    drive: ClassVar[Callable[..., Expression]]
+    """What sliding at a velocity takes, as one number that may stand for the velocity; absent where that serves."""
+    velocity: ClassVar[Callable[..., Expression]]
+    """Its inverse [m/s]."""
+    driven: ClassVar[Callable[..., Expression]]
+    """Traction by that number [Pa]."""
     transverse: ClassVar[Callable[..., Expression]]
     """Traction across v, along the interface [Pa]; absent where a law has none."""
     evolution: ClassVar[Callable[..., Mapping[str, Expression]]]

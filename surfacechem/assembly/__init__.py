@@ -77,7 +77,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
-    if build.transitions or any(state.finest for state in build.states):
+    if build.transitions or any(state.finest for state in build.states) or build.motion.creeping:
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
@@ -148,8 +148,7 @@ def _outside(build: Build) -> Outside | None:
 
 def _refuse_idle_initial_values(build: Build) -> None:
     """An initial value belongs to something that evolves."""
-    states = {state.start or state.name for state in build.states}
-    states |= {name for law in build.interface.frictions for name in law.internal.values()}
+    states = {state.start or state.at_start[0].name for state in build.states}
     for name in build.scene.initial:
         if name in states:
             continue

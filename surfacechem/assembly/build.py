@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Margin, Named, Range
-from surfacechem.terms import Law, Load, Spec
+from surfacechem.terms import Friction, Law, Load, Spec
 from surfacechem.transitions import HELD, Mode
 from surfacechem.variables import unit_of
 
@@ -39,6 +39,13 @@ class Build(Draft):
     def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
         """A scene-level number as a run-time parameter."""
         return self.parameters.constant(name, path, spec, value, internal)
+
+    def bound(self, law: Friction) -> Friction:
+        """A friction law with its parameters as symbols, made once."""
+        if law not in self.bound_frictions:
+            path = f"interface.friction.{law.name()}"
+            self.bound_frictions[law] = self.variables.bind(law, path)
+        return self.bound_frictions[law]
 
     def label(self, law: Law) -> str:
         """A short unique name of a law for its quantities."""

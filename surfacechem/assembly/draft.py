@@ -14,7 +14,7 @@ from surfacechem.expressions import Expression
 from surfacechem.refit import Fit
 from surfacechem.scene import Interface, Scene
 from surfacechem.system import Account, Capped, Margin, Named, Pace, Pair, Range, State
-from surfacechem.terms import Load
+from surfacechem.terms import Friction, Load
 from surfacechem.transitions import Equilibrium, Mode, Transition
 from surfacechem.variables import Parameters, Variables
 
@@ -45,6 +45,10 @@ class Motion:
     """Rates of the variables that a programme moves."""
     slip: Any = None
     """What determines the tangential motion, where it moves by a balance."""
+    slides_by: Any = None
+    """The variable that the balance of tangential tractions determines, where sliding has no inertia."""
+    creeping: Any = None
+    """The friction law whose traction is the variable of sliding, where that is not the velocity."""
     sliding_tractions: list[Expression] = field(default_factory=list)
     stick_limit: Expression | None = None
     """Tangential traction that sticking can bear."""
@@ -81,6 +85,7 @@ class Draft:
     bonding: dict[str, Bond] = field(default_factory=dict)
     about: dict[Any, Expression] = field(default_factory=dict)
     """Initial values of the bonding variables, about which capacities are written."""
+    bound_frictions: dict[Friction, Friction] = field(default_factory=dict)
     frictions: set[str] = field(default_factory=set)
     """Labels of the friction laws, whose power comes from outside."""
     dissipation: dict[str, Expression] = field(default_factory=dict)

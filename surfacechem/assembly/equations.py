@@ -183,10 +183,10 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
     """Slope of a balance of heat with temperature as a sliding velocity that has no inertia follows it."""
-    v = symengine.Symbol("v")
-    if not (depends(heat, v) and any(state.algebraic and state.name == "v" for state in build.states)):
+    v = build.motion.slides_by
+    if v is None or not depends(heat, v):
         return derivative(heat, T)
-    tractions = build.expanded(build.rows["v"])
+    tractions = build.expanded(build.rows[str(v)])
     return derivative(heat, T) - derivative(heat, v) * derivative(tractions, T) / derivative(tractions, v)
 
 

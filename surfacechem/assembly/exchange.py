@@ -22,10 +22,11 @@ def friction(build: Build) -> None:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     for law in build.interface.frictions:
         label = build.label(law)
-        bound = build.variables.bind(law, f"interface.friction.{law.name()}")
+        bound = build.bound(law)
         memory(build, law, bound)
         pressed = _pressed(build, law)
-        traction = build.variables.call(bound, bound.statement, pressed)
+        formula = bound.driven if law is build.motion.creeping else bound.statement
+        traction = build.variables.call(bound, formula, pressed)
         build.law_margins(law, {}, met=pressed)
         traction = build.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
         v = build.variables.get("v", law)

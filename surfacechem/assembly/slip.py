@@ -14,6 +14,7 @@ import symengine
 
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.creep import creeping_law, driven_sliding
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
@@ -76,12 +77,21 @@ def tangential_gap(build: Build) -> None:
     if kind.elastic:
         _elastic_gap(build, kind)
     if kind.rate_dependent and not (kind.inertial and not kind.elastic):
-        symbol = _state(build, "v", algebraic=True)
-        build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
+        _sliding(build)
         if not kind.elastic:
-            build.motion.gap_rates["u_t"] = symbol
+            build.motion.gap_rates["u_t"] = symengine.Symbol("v")
     elif not kind.inertial or kind.elastic:
         build.variables.define("v", partial(_sliding_velocity, build, kind), "derived", "what does not stick")
+
+
+def _sliding(build: Build) -> None:
+    """A velocity without inertia, by itself or by what drives it."""
+    law = creeping_law(build)
+    if law is not None:
+        build.motion.slides_by = driven_sliding(build, law)
+        return
+    symbol = build.motion.slides_by = _state(build, "v", algebraic=True)
+    build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
 
 
 def _modes(build: Build, kind: Kind) -> None:
@@ -192,8 +202,7 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         v = symengine.Symbol("v")
         build.rows["u_t"] = du - v
         driving = far.force(u, v) - t_f - far.c_g * v
-        build.rows["v"] = slides * driving + (1 - slides) * v
-        _stable_sliding(build, slides, driving, v)
+        _sliding_row(build, slides, driving)
     else:
         driving = far.force(u, NONE) - t_f
         if far.k == 0:
@@ -237,8 +246,7 @@ def _elastic_rows(
     if kind.rate_dependent:
         build.rows["g_t"] = dg - (rate - v)
         driving = t_e - t_f
-        build.rows["v"] = slides * driving + (1 - slides) * v
-        _stable_sliding(build, slides, driving, symengine.Symbol("v"))
+        _sliding_row(build, slides, driving)
         return
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
@@ -254,8 +262,10 @@ def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
         build.margins.append(Margin("tangential stiffness", margin, reason))
 
 
-def _stable_sliding(build: Build, slides: Expression, driving: Expression, v: Expression) -> None:
-    """A velocity without inertia is stable while what resists it grows with it."""
+def _sliding_row(build: Build, slides: Expression, driving: Expression) -> None:
+    """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it."""
+    v = build.motion.slides_by
+    build.rows[str(v)] = slides * driving + (1 - slides) * v
     slope = -derivative(build.expanded(driving), v)
     if slope == 0:
         raise InputError(

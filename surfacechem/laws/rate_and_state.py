@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from surfacechem.expressions import Expression, absolute, asinh_exp, exp, log, where
+from surfacechem.expressions import Expression, absolute, asinh_exp, exp, log, sinh_exp, where
 from surfacechem.terms import Friction, parameter
 
 SLOWEST = 1e-300
@@ -27,8 +27,22 @@ class RateAndState(Friction):
 
     def traction(self, p: Expression, v: Expression, ln_theta: Expression) -> Expression:
         """Tangential traction [Pa]."""
-        exponent = (self.mu_0 + self.b * (log(self.v_0 / self.L) + ln_theta)) / self.a
-        return self.a * p * asinh_exp(v / (2 * self.v_0), exponent)
+        return self.driven(p, self.drive(v, ln_theta))
+
+    def driven(self, p: Expression, drive: Expression) -> Expression:
+        """Tangential traction [Pa] by how many times it is that of the direct effect."""
+        return self.a * p * drive
+
+    def drive(self, v: Expression, ln_theta: Expression) -> Expression:
+        """Traction at a velocity in units of the direct effect, a p."""
+        return asinh_exp(v / (2 * self.v_0), self._strength(ln_theta))
+
+    def velocity(self, drive: Expression, ln_theta: Expression) -> Expression:
+        """Sliding velocity [m/s] at a traction in units of the direct effect: the inverse of :meth:`drive`."""
+        return 2 * self.v_0 * sinh_exp(drive, -self._strength(ln_theta))
+
+    def _strength(self, ln_theta: Expression) -> Expression:
+        return (self.mu_0 + self.b * (log(self.v_0 / self.L) + ln_theta)) / self.a
 
     @abstractmethod
     def evolution(self, v: Expression, ln_theta: Expression) -> Mapping[str, Expression]:
