@@ -97,12 +97,12 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
-    if not np.max(speed) * result.t > 1 / RUNAWAY:
+    j = int(np.argmax(speed))
+    if not speed[j] * result.t > 1 / RUNAWAY:
         return None
-    # What has no inertia or capacity is the first to run away, if it does.
-    free = np.array([state.algebraic for state in states]) & (speed * result.t > 1 / RUNAWAY)
-    j = int(np.argmax(np.where(free, speed, 0.0) if free.any() else speed))
     if states[j].given is not None:
-        return f"{states[j].at_start[0].name} runs away, faster and faster"
+        # A velocity without inertia takes the age of the contact with it.
+        names = [state.at_start[0].name for state in states if state.given and (state.algebraic or state is states[j])]
+        return f"{names[0]} runs away, faster and faster"
     unit = states[j].quantity.unit
     return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"

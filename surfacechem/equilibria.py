@@ -162,6 +162,11 @@ class Equilibria:
                 return moved
         return None
 
+    def pushed(self, point: Point, rtol: float) -> bool:
+        """Whether tractions are out of balance by more than the drift of an integration."""
+        values = self._balance(point.inputs())
+        return bool(np.any(np.abs(values[::2]) > DRIFT * rtol * values[1::2]))
+
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
         if not self.items:

@@ -7,7 +7,7 @@ reaches zero the stretch ends, the jump is made, and the next one starts from th
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -18,9 +18,9 @@ from surfacechem.jumps import Jump, Jumper, booked
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
-from surfacechem.stretches import Part, all_counters, all_events, all_steps, changed, joined
+from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined
 from surfacechem.system import START, System
-from surfacechem.transitions import HELD
+from surfacechem.transitions import HELD, LOAD_STEP
 
 Array = NDArray[np.float64]
 
@@ -38,9 +38,6 @@ LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 
 LATE, RENEWALS = 1e-6, 4
 """Part of a run below which a stretch is short, and the number of short ones that may follow each other."""
-
-ATOM = 1e-20
-"""Gap [m] that counts as none where a run stalls."""
 
 AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
@@ -102,11 +99,20 @@ class Hybrid:
             parameters = row.copy()
             parameters[self.jumper.mode_columns] = modes
             point = Point(float(start), y, np.zeros(len(y)), parameters)
-            ended = self._segment(self.jumper.equilibria.polished(point), float(end))
+            begun = self._begun(point)
+            ended = self._segment(begun, float(end)) if begun is not None else None
             if ended is None:
                 break
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
         return self._merged()
+
+    def _begun(self, point: Point) -> Point | None:
+        """The start of a piece of time, where a traction that jumps there has moved what is in equilibrium with it."""
+        names = [item.name for item in self.system.transitions]
+        equilibria = self.jumper.equilibria
+        if LOAD_STEP in names and equilibria.pushed(point, self.problem.rtol):
+            return self._jump(names.index(LOAD_STEP), point)
+        return equilibria.polished(point)
 
     def _segment(self, point: Point, end: float) -> Point | None:
         """From a point to the end of its segment; None where the run ends before."""
@@ -121,7 +127,7 @@ class Hybrid:
             if part.status is Status.FINISHED:
                 return point
             index = self._transition(part, point)
-            across = self._across_kink(part, point) if index is None else None
+            across = across_kink(self.system.states, point) if index is None and part.status in LOST else None
             renews = self._renews(part)
             if across is not None or (index is None and renews):
                 point = across or point
@@ -185,14 +191,6 @@ class Hybrid:
         """Whether a stretch that time could not resolve any more goes on in a time of its own."""
         self.renewed = self.renewed + 1 if part.result.t < LATE * self.problem.segments[-1] else 0
         return part.status is Status.STEP_UNDERFLOW and part.result.t > 0 and self.renewed < RENEWALS
-
-    def _across_kink(self, part: Part, point: Point) -> Point | None:
-        """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
-        if part.status not in LOST:
-            return None
-        gaps = np.array([state.quantity.unit == "m" for state in self.system.states])
-        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
-        return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
 
     # -- what happens at one moment -------------------------------------------------------------------------------
 

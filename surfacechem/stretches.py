@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.equilibria import Point
 from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Status
+from surfacechem.system import State
 
 Array = NDArray[np.float64]
+
+ATOM = 1e-20
+"""Gap [m] that counts as none where a run stalls."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,13 @@ def changed(problem: Problem, **changes: object) -> Problem:
     for name, value in changes.items():
         object.__setattr__(other, name, value)
     return other
+
+
+def across_kink(states: Sequence[State], point: Point) -> Point | None:
+    """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
+    gaps = np.array([state.quantity.unit == "m" for state in states])
+    closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+    return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
 
 
 def joined(blocks: Sequence[Array], width: int) -> Array:

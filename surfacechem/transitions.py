@@ -30,6 +30,10 @@ class Mode:
     """Until when a value holds, in words, where it is meant to be left."""
 
 
+LOAD_STEP = "load"
+"""Name of the transition that a jump of a far-field traction makes."""
+
+
 @dataclass(frozen=True)
 class Fold:
     """The loss of the equilibrium of the quasi-static gaps."""

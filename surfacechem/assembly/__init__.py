@@ -16,6 +16,7 @@ from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
+from surfacechem.assembly.load_steps import load_steps
 from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
@@ -53,6 +54,7 @@ STAGES = (
     normal_motion,
     tangential_motion,
     folds,
+    load_steps,
     heat_paths,
     mean_influx,
     equations,

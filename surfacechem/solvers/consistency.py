@@ -27,7 +27,7 @@ from surfacechem.solvers.native import (
 )
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
-LIMIT = 60
+LIMIT = 100
 SMALLEST_PIVOT = 1e-15
 
 
@@ -96,37 +96,37 @@ def _shift(w: Any, delta: Any, fraction: float) -> None:
 
 
 @compiled
-def _damped(w: Any, delta: Any) -> bool:
-    """Move as far along the correction as keeps the residual finite and not larger, in units of the matrix rows."""
-    before = 0.0
+def _size(w: Any, delta: Any, unit: Any) -> float:
+    """Size of a correction of the algebraic variables in these units; not a number where it is none."""
+    norm = 0.0
     for j in range(delta.shape[0]):
-        before = max(before, abs(w.vector[RHS, j]) * w.vector[ERROR, j])
+        if w.algebraic[j] and not abs(delta[j]) / unit[j] <= norm:
+            norm = abs(delta[j]) / unit[j]
+    return norm
+
+
+@compiled
+def _damped(w: Any, delta: Any) -> bool:
+    """Move as far along the correction as lets the next one by the same matrix be no larger; False if there is no such
+    move.
+
+    Residuals are no measure: those of rates are as large as what they divide by is small, and linear anyway.
+    Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural monotonicity test.
+    """
+    following, unit = w.g[1], w.vector[ERROR]
+    for j in range(delta.shape[0]):
+        unit[j] = abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290
+    before = _size(w, delta, unit)
     fraction = 1.0
     _shift(w, delta, 1.0)
     for _halving in range(40):
         if _residual(w):
-            after = 0.0
-            for j in range(delta.shape[0]):
-                after = max(after, abs(w.vector[RHS, j]) * w.vector[ERROR, j])
-            if after <= before or after == 0.0:
+            _correction(w, following)
+            if _size(w, following, unit) <= before:
                 return True
         fraction *= 0.5
         _shift(w, delta, -fraction)
     return False
-
-
-@compiled
-def _row_units(w: Any) -> None:
-    """Inverse row sizes of the matrix into ERROR, the units of a residual."""
-    n = w.real.shape[0]
-    for i in range(n):
-        row = 0.0
-        for m in range(n):
-            row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]) * w.vector[COLUMNS, m])
-        w.vector[ERROR, i] = 1.0 / row if row > 0.0 else 0.0
-    for i in range(w.band_derivatives.shape[1]):
-        row = abs(w.band_derivatives[1, i, 1])
-        w.vector[ERROR, n + i] = 1.0 / row if row > 0.0 else 0.0
 
 
 @compiled
@@ -149,9 +149,8 @@ def find_consistent(w: Any) -> int:
         if not nonlinear or norm <= 1e-15 or norm_last <= 1e-11:
             _shift(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
-        _row_units(w)
         if not _damped(w, delta):
-            # At rounding level the residual cannot fall any more.
+            # At rounding level the corrections cannot fall any more.
             return CONSISTENT if norm <= 1e-9 else NO_STATE
         norm_last = norm
     return NO_STATE
