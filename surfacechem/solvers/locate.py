@@ -16,7 +16,6 @@ from surfacechem.solvers.native import (
     M_BEFORE,
     M_EARLIER,
     M_HIGH,
-    M_LARGEST,
     M_LOW,
     M_NOW,
     M_PROBE,
@@ -27,8 +26,6 @@ from surfacechem.solvers.native import (
     TAU,
     TRIAL,
     TRIAL_DOT,
-    YDOT,
-    Y,
     compiled,
     copy,
     evaluate,
@@ -37,15 +34,13 @@ from surfacechem.solvers.native import (
 from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
-
-LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
-"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
+from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, noise, update_sides
 
 EDGE = 1e-6
 """The slopes at both ends of a step are seen at this distance."""
 
-NOISE = 4e-15
-"""Relative to the largest value seen, a margin this small is zero."""
+ALIKE = 1e3
+"""Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
 
 AT_START = -1.0
 
@@ -63,65 +58,6 @@ def _margin_inside(w: Any, h: float, x: float, row: int) -> None:
 def _probe(w: Any, h: float, m: int, x: float) -> float:
     _margin_inside(w, h, x, M_PROBE)
     return float(w.margin[M_PROBE, m])
-
-
-@compiled
-def _noise(w: Any, m: int) -> float:
-    return float(NOISE * w.margin[M_LARGEST, m])
-
-
-@compiled
-def is_limit(kinds: Any, m: int) -> bool:
-    """Whether the run may not go on where this margin is below zero."""
-    return bool(kinds[m, 0] == 1 and kinds[m, 1] <= 0)
-
-
-@compiled
-def start_margins(w: Any, kinds: Any) -> None:
-    """Sides of zero at a start or restart."""
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    set_inputs(w, w.vector[Y], w.vector[YDOT])
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-    copy(w.margin[M_NOW], w.margin[M_BEFORE])
-    for m in range(w.margin.shape[1]):
-        value = w.margin[M_NOW, m]
-        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        if w.fired[m] != 0:
-            w.margin[M_SIDE, m] = LEAVING
-        elif abs(value) <= _noise(w, m):
-            w.margin[M_SIDE, m] = AT_ZERO if is_limit(kinds, m) else LEAVING
-        elif value > 0.0:
-            w.margin[M_SIDE, m] = 1.0
-        else:
-            w.margin[M_SIDE, m] = BEYOND if is_limit(kinds, m) else -1.0
-
-
-@compiled
-def _crosses(side: float, value: float, direction: int) -> bool:
-    falling = side == 1.0 and value <= 0.0 and direction <= 0
-    rising = side == -1.0 and value >= 0.0 and direction >= 0
-    return falling or rising
-
-
-@compiled
-def _falls_from_start(w: Any, m: int) -> bool:
-    """Whether a limit that started at zero or beyond is now found to have gone the wrong way."""
-    side, value = w.margin[M_SIDE, m], w.margin[M_NOW, m]
-    if side == AT_ZERO:
-        return bool(value < -_noise(w, m))
-    return bool(side == BEYOND and value < w.margin[M_BEFORE, m] - _noise(w, m))
-
-
-@compiled
-def _update_sides(w: Any) -> None:
-    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
-    for m in range(w.margin.shape[1]):
-        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
-        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        moved = value - w.margin[M_BEFORE, m] if side == BEYOND else value
-        if abs(moved) > (0.0 if abs(side) == 1.0 else _noise(w, m)):
-            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
-        w.margin[M_BEFORE, m] = value
 
 
 @compiled
@@ -161,7 +97,7 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bo
             c, at_c = x, at_x
         else:
             a, at_a = x, at_x
-    return b if touches and at_b <= _noise(w, m) else -1.0
+    return b if touches and at_b <= noise(w, m) else -1.0
 
 
 @compiled
@@ -186,14 +122,14 @@ def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float)
     found = 0.0
     for m in range(kinds.shape[0]):
         w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
-        falls = _falls_from_start(w, m)
+        falls = falls_from_start(w, m)
         if falls and before <= EDGE:
             found = AT_START
         elif falls:
             w.margin[M_HIGH, m] = before
         marked = (
             falls
-            or _crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
+            or crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
             or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
         )
         w.fired[m] = marked
@@ -230,7 +166,7 @@ def _scan(w: Any, h: float, kinds: Any) -> float:
             _mark_dips(w, h, kinds, before, x)
         if found != 0.0:
             return found
-        _update_sides(w)
+        update_sides(w)
         earlier, before = before, x
     return 0.0
 
@@ -293,10 +229,12 @@ def _margins_at_end(w: Any, size: float) -> None:
 @compiled
 def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
-    step fails or its error is not below the worst. A margin that touches zero has no slope to refine with.
+    step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
+    that all but touches it none to be trusted.
     """
     side = w.margin[M_SIDE, m]
-    size = x * h
+    size = best = x * h
+    closest = np.inf
     store_polynomial(w, h, 0.0)
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     for attempt in range(12):
@@ -308,6 +246,12 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
         crossed = value * side <= 0.0 or slope == 0.0
         if crossed and (abs(change) <= resolution or value == 0.0 or attempt >= 6):
             return size
+        if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
+            # Where it came closest it is zero, or the polynomial was too coarse to tell.
+            touches = closest <= ALIKE * noise(w, m) and _step_onto(w, best) < worst
+            return best if touches else 0.0
+        if abs(value) < closest:
+            best, closest = size, abs(value)
         if not crossed and abs(change) <= resolution:
             change = resolution * 2.0**attempt
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
@@ -321,8 +265,8 @@ def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
     near = 1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size)
     for m in range(kinds.shape[0]):
         value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
-        across = _crosses(w.margin[M_SIDE, m], value, kinds[m, 1])
-        close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= _noise(w, m)
+        across = crosses(w.margin[M_SIDE, m], value, kinds[m, 1])
+        close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
         w.fired[m] = across or (w.fired[m] != 0 and close)
 
 

@@ -26,6 +26,7 @@ _SOURCES = (
     "consistency",
     "dense",
     "quadrature",
+    "sides",
     "locate",
     "radau_outputs",
     "trajectory",

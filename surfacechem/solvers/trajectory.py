@@ -6,7 +6,7 @@ import numpy as np
 
 from surfacechem.solvers.consistency import find_consistent
 from surfacechem.solvers.contract import Status
-from surfacechem.solvers.locate import AT_START, find_event, start_margins
+from surfacechem.solvers.locate import AT_START, find_event
 from surfacechem.solvers.native import (
     ATOL,
     BASE,
@@ -44,6 +44,7 @@ from surfacechem.solvers.radau_advance import (
 )
 from surfacechem.solvers.radau_outputs import write_outputs
 from surfacechem.solvers.radau_step import first_size, loosening
+from surfacechem.solvers.sides import start_margins
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)

@@ -1,0 +1,88 @@
+"""Sides of zero on which margins are: where they start, and what counts as a crossing."""
+
+from typing import Any
+
+from surfacechem.solvers.native import (
+    BASE,
+    M_BEFORE,
+    M_EARLIER,
+    M_LARGEST,
+    M_NOW,
+    M_SIDE,
+    MARGINS,
+    TAU,
+    YDOT,
+    Y,
+    compiled,
+    copy,
+    evaluate,
+    set_inputs,
+)
+
+LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
+"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
+
+NOISE = 4e-15
+"""Relative to the largest value seen, a margin this small is zero."""
+
+
+@compiled
+def noise(w: Any, m: int) -> float:
+    """Size of a margin that is zero for all that can be told."""
+    return float(NOISE * w.margin[M_LARGEST, m])
+
+
+@compiled
+def is_limit(kinds: Any, m: int) -> bool:
+    """Whether the run may not go on where this margin is below zero."""
+    return bool(kinds[m, 0] == 1 and kinds[m, 1] <= 0)
+
+
+@compiled
+def start_margins(w: Any, kinds: Any) -> None:
+    """Sides of zero at a start or restart."""
+    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
+    set_inputs(w, w.vector[Y], w.vector[YDOT])
+    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+    copy(w.margin[M_NOW], w.margin[M_BEFORE])
+    for m in range(w.margin.shape[1]):
+        value = w.margin[M_NOW, m]
+        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
+        if w.fired[m] != 0:
+            w.margin[M_SIDE, m] = LEAVING
+        elif abs(value) <= noise(w, m):
+            w.margin[M_SIDE, m] = AT_ZERO if is_limit(kinds, m) else LEAVING
+        elif value > 0.0:
+            w.margin[M_SIDE, m] = 1.0
+        else:
+            w.margin[M_SIDE, m] = BEYOND if is_limit(kinds, m) else -1.0
+
+
+@compiled
+def crosses(side: float, value: float, direction: int) -> bool:
+    """Whether a value lies across zero from its side, in a direction that counts."""
+    falling = side == 1.0 and value <= 0.0 and direction <= 0
+    rising = side == -1.0 and value >= 0.0 and direction >= 0
+    return falling or rising
+
+
+@compiled
+def falls_from_start(w: Any, m: int) -> bool:
+    """Whether a limit that started at zero or beyond is now found to have gone the wrong way."""
+    side, value = w.margin[M_SIDE, m], w.margin[M_NOW, m]
+    if side == AT_ZERO:
+        return bool(value < -noise(w, m))
+    return bool(side == BEYOND and value < w.margin[M_BEFORE, m] - noise(w, m))
+
+
+@compiled
+def update_sides(w: Any) -> None:
+    """Move on to the margins of now: their sides, the largest seen, and what was before."""
+    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+    for m in range(w.margin.shape[1]):
+        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
+        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
+        moved = value - w.margin[M_BEFORE, m] if side == BEYOND else value
+        if abs(moved) > (0.0 if abs(side) == 1.0 else noise(w, m)):
+            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
+        w.margin[M_BEFORE, m] = value
