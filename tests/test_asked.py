@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from asked import ACCURACIES, EXACT
+from asked import ACCURACIES, EXACT, exact
 
 import surfacechem
 from surfacechem import choice
@@ -27,8 +27,6 @@ QUICK = (
 )
 """Some that are easy and those that are hardest."""
 
-REST = [name for name in EXACT if name not in QUICK]
-
 
 def assert_achieved(name: str, accuracy: float) -> None:
     found = EXACT[name](accuracy)
@@ -42,8 +40,9 @@ def test_accuracy_is_achieved(name, accuracy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("accuracy", ACCURACIES)
-@pytest.mark.parametrize("name", [*QUICK, *REST])
+@pytest.mark.parametrize(
+    ("name", "accuracy"), [(name, accuracy) for accuracy in ACCURACIES for name in exact(accuracy)]
+)
 def test_accuracy_is_achieved_everywhere(name, accuracy):
     assert_achieved(name, accuracy)
 
@@ -56,6 +55,20 @@ def test_a_run_that_misses_is_run_again():
     assert solution.accuracy.asked == 1e-3
     assert solution.attributes["error_asked"] == 1e-3
     assert solution.accuracy.error < 1e-3
+
+
+def test_cells_are_as_accurate_as_the_run_is_asked_to_be():
+    solution = surfacechem.run("sudden-contact", ["run={until: 60 s, outputs: 20, accuracy: 1e-5}"])
+    assert solution.accuracy.error < 1e-5
+    assert not solution.notes
+
+
+def test_a_given_number_of_cells_that_is_too_small_is_named():
+    cells = [f"bodies.{name}.conduction.cells=80" for name in ("epoxy", "glass")]
+    solution = surfacechem.run("sudden-contact", [*cells, "run={until: 60 s, outputs: 20, accuracy: 1e-7}"])
+    assert solution.accuracy.error > 1e-6
+    (note,) = solution.notes
+    assert "number is given for epoxy and glass: let `cells: {accuracy: 1e-07}` choose it" in note
 
 
 def test_what_rounding_forbids_is_said():
