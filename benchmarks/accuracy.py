@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from asked import ACCURACIES, EXACT
+from asked import ACCURACIES, EXACT, exact
 
 WORST = 3
 
@@ -23,7 +23,7 @@ def main() -> None:
     kept = []
     print(f"{len(EXACT)} exact solutions\n{'asked':>8} {'ratio':>8} {'error':>9} {'rounding':>9}  run")
     for accuracy in ACCURACIES:
-        found = {name: achieved(accuracy) for name, achieved in EXACT.items()}
+        found = {name: EXACT[name](accuracy) for name in exact(accuracy)}
         kept += [(name, f"{accuracy:.0e}", run.error, run.rounding, run.rtol) for name, run in found.items()]
         worst = sorted(found, key=lambda name: found[name].ratio(accuracy), reverse=True)[:WORST]
         for name in worst:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile import Function, compile_function
+from surfacechem.compile import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.marching import march, zero_ahead
 from surfacechem.system import System
@@ -28,6 +28,9 @@ least a nanometre."""
 
 DIGITS = 64 * float(np.finfo(float).eps)
 """Last digits of a sum of tractions."""
+
+SOON = 1e-9
+"""Part of the time of a fold within which nothing but the gaps changes."""
 
 POLISH = 3
 DRIFTED = 1e-3
@@ -59,11 +62,21 @@ class Way:
     """Weights of the driving tractions, shape (equilibria,)."""
 
 
+@dataclass(frozen=True)
+class Lost:
+    """A fold: the point there, the way in which the gaps are lost, and the direction along it."""
+
+    point: Point
+    way: Way
+    direction: float
+
+
 class Equilibria:
     """The quasi-static gaps of a system, compiled when first needed."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, program: Program) -> None:
         self.system = system
+        self.program = program
         self.states = [state.name for state in system.states]
         self.items = system.equilibria
 
@@ -185,33 +198,82 @@ class Equilibria:
 
     @cached_property
     def _folds(self) -> list[tuple[Function, Function] | None]:
-        """Tangent of the transitions that are folds; and with it how it falls, and the stiffness."""
+        """Tangent of the transitions that are folds; and with it how it falls, the warming, and the stiffness."""
         return [self._compiled_fold(item.fold) if item.fold else None for item in self.system.transitions]
 
     def _compiled_fold(self, fold: Fold) -> tuple[Function, Function]:
         inputs, expand = self.system.inputs, self.system.expand
-        entries = [*fold.falls, *(entry for row in fold.stiffness for entry in row)]
+        entries = [*fold.falls, *fold.warming, *(entry for row in fold.stiffness for entry in row)]
         return compile_function(inputs, [expand(fold.tangent)]), compile_function(inputs, [*map(expand, entries)])
 
-    def at_fold(self, index: int, point: Point) -> tuple[Point, Way, float] | None:
-        """The point with its gaps at the fold itself, the way in which they are lost, and the direction along it.
+    def at_fold(self, index: int, point: Point) -> Lost | None:
+        """The fold itself, from a point close to it; None where it is out of reach.
 
-        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. None where the
-        fold is out of reach.
+        Equilibrium is lost like a square root in time, so that a run ends a little before the fold.
         """
         found = self._folds[index]
         assert found is not None
         tangent, shape = found
         values = np.atleast_1d(shape(point.inputs()))
         n = len(self.items)
-        way, weights = self._lost_way(point, values[n:].reshape(n, n))
-        direction = float(np.sign(values[:n] @ weights))
+        falls, warming, stiffness = values[:n], values[n : 2 * n], values[2 * n :].reshape(n, n)
+        way, weights = self._lost_way(point, stiffness)
+        direction = float(np.sign(falls @ weights))
+        there = replace(way, moves=way.moves + self._warms * (warming @ weights))
 
         def ahead(gaps: Sequence[float] | Array) -> Array:
-            return np.asarray(tangent(self._rows(point, way, gaps))).reshape(-1)
+            return np.asarray(tangent(self._rows(point, there, gaps))).reshape(-1)
 
-        at = self._moved(point, way, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
-        return None if at is None else (at, way, direction)
+        at = self._moved(point, there, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
+        return None if at is None else Lost(at, way, direction)
+
+    @cached_property
+    def _approaches(self) -> list[Function | None]:
+        """Tangent of the transitions that are folds, how fast it changes, and how each balance does by itself."""
+        return [self._compiled_approach(item.fold) if item.fold else None for item in self.system.transitions]
+
+    def _compiled_approach(self, fold: Fold) -> Function:
+        system, t = self.system, self.system.t
+        tangent = system.expand(fold.tangent)
+        moves = sum((derivative(tangent, s.symbol) * s.dot for s in system.states), derivative(tangent, t))
+        alone = [derivative(system.expand(row), t) for row in system.rows.values()]
+        return compile_function(system.inputs, [tangent, moves, *alone])
+
+    def in_time(self, index: int, point: Point, end: float) -> Point:
+        """A point close to a fold at the time of the fold, where that is before the end; else as it is."""
+        left = self._time_left(index, point)
+        return replace(point, t=point.t + left) if left < min(SOON * point.t, end - point.t) else point
+
+    def _time_left(self, index: int, point: Point) -> float:
+        """Time [s] to a fold that is close: there the square of the tangent stiffness falls in proportion to time."""
+        approach = self._approaches[index]
+        if approach is None:
+            return 0.0
+        alone = approach(point.inputs())[2:]
+        tangent, change, *_ = approach(replace(point, ydot=self._rates(point, alone)).inputs())
+        return float(-tangent / (2 * change)) if tangent > 0 > change else 0.0
+
+    def _rates(self, point: Point, alone: Array) -> Array:
+        """Rates of all states, those of algebraic ones from how their balances change."""
+        program = self.program
+        inputs = program.filled(replace(point, ydot=np.zeros_like(point.y)).inputs())
+        by_state, by_rate = program.derivatives(inputs)
+        balances = np.asarray(by_rate.any(axis=1))
+        matrix = np.where(balances[:, None], by_rate, by_state)
+        # What is algebraic in a balance that has rates follows these without delay, and no gap follows it.
+        matrix[balances & program.algebraic_mask] = np.eye(len(matrix))[balances & program.algebraic_mask]
+        change = np.where(balances, program.residual(inputs), alone)
+        change[balances & program.algebraic_mask] = 0.0
+        try:
+            return np.asarray(np.linalg.solve(matrix, -change))
+        except np.linalg.LinAlgError:
+            return np.zeros_like(point.y)
+
+    @cached_property
+    def _warms(self) -> Array:
+        """One for the temperature of the interface."""
+        nodes = {item.fold.node for item in self.system.transitions if item.fold}
+        return np.array([float(name in nodes) for name in self.states])
 
     def _lost_way(self, point: Point, A: Array) -> tuple[Way, Array]:
         """The way that costs no traction: the gaps by which the stiffness is singular."""
@@ -228,7 +290,7 @@ class Equilibria:
         """The fold that is so close to a point that time cannot tell them apart."""
         for index, item in enumerate(self.system.transitions):
             found = self.at_fold(index, point) if item.fold else None
-            if found is not None and self._is_close(point, found[0], DRIFT * rtol):
+            if found is not None and self._is_close(point, found.point, DRIFT * rtol):
                 return index
         return None
 
@@ -236,11 +298,7 @@ class Equilibria:
         sizes, left = np.abs(self._balance(point.inputs())[1::2]), np.abs(self._balance(fold.inputs())[::2])
         return bool(np.all(left <= tolerance * sizes))
 
-    def let_go(self, index: int, point: Point, parameters: Array, heat: Heat) -> tuple[Point, Point | None]:
-        """The point at a fold, and where the gaps come to rest from there with the parameters that hold then."""
-        found = self.at_fold(index, point)
-        if found is None:
-            return point, self.settle(replace(point, parameters=parameters), heat)
-        at, way, direction = found
-        landed = self.march(replace(at, parameters=parameters), way, direction, heat)
-        return at, self.settle(landed, heat) if landed is not None and len(self.items) > 1 else landed
+    def let_go(self, lost: Lost, parameters: Array, heat: Heat) -> Point | None:
+        """Where the gaps come to rest from a fold, with the parameters that hold then."""
+        landed = self.march(replace(lost.point, parameters=parameters), lost.way, lost.direction, heat)
+        return self.settle(landed, heat) if landed is not None and len(self.items) > 1 else landed

@@ -135,7 +135,7 @@ class Hybrid:
             if index is None:
                 self.status = part.status
                 return None
-            jumped = self._jump(index, point)
+            jumped = self._jump(index, self.jumper.equilibria.in_time(index, point, end))
             if jumped is None:
                 return None
             point = jumped
@@ -315,7 +315,7 @@ class Hybrid:
         """Time since the transition before, or the start; the length of the stretch between is sharper than t."""
         before = self.jumps[-1].t if self.jumps else float(self.problem.segments[0])
         part = self.parts[-1] if self.parts else None
-        return part.result.t if part is not None and part.start.t == before and part.end == t else t - before
+        return part.result.t + (t - part.end) if part is not None and part.start.t == before else t - before
 
     # -- one result -----------------------------------------------------------------------------------------------
 

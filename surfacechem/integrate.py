@@ -165,7 +165,7 @@ class Model:
             chains=[Chain(*chain) for chain in system.chains],
             groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
         )
-        self.jumper = Jumper(system) if system.in_stretches else None
+        self.jumper = Jumper(system, self.program) if system.in_stretches else None
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
@@ -234,7 +234,7 @@ class Model:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.system.equilibria:
             parameters = table[0].copy()
-            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system)
+            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
             settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError("there is no gap at which the tractions are in equilibrium at the start.")

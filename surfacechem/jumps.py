@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile import Function, compile_function
+from surfacechem.compile import Function, Program, compile_function
 from surfacechem.equilibria import Equilibria, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Account, System
@@ -83,10 +83,10 @@ def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
 class Jumper:
     """The jumps of a system, compiled when the first one happens."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, program: Program) -> None:
         self.system = system
         self.states = [state.name for state in system.states]
-        self.equilibria = Equilibria(system)
+        self.equilibria = Equilibria(system, program)
         mode_symbols = {mode.symbol for mode in system.modes}
         kept = [p.symbol in mode_symbols or p.path == HELD for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
@@ -153,6 +153,8 @@ class Jumper:
         far the integration may have carried it.
         """
         item = self.system.transitions[index]
+        lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
+        before = lost.point if lost is not None else before
         values = self._maps[index](before.inputs())
         n = len(before.y)
         parameters = before.parameters.copy()
@@ -168,8 +170,8 @@ class Jumper:
             def heat(rows: Array) -> Array:
                 return self._temperatures(rows, item.sinks, energy)[0]
 
-            if item.fold is not None:
-                before, after = self.equilibria.let_go(index, before, parameters, heat)
+            if lost is not None:
+                after = self.equilibria.let_go(lost, parameters, heat)
             else:
                 after = self._kept(item, self.equilibria.settle(start, heat), parameters, max(noise, drift))
         heated = self._heated(after, item.sinks, energy) if after is not None else None

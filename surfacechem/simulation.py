@@ -55,6 +55,7 @@ class Simulation:
         self.case = case
         self._sweep_models: dict[str, Model] = {}
         self._finer: dict[int, Simulation] = {}
+        self._tightened: dict[float | None, Simulation] = {}
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -81,28 +82,38 @@ class Simulation:
         check_way(error)
         settings = run or self.case.run
         values = self._values(changes or {})
-        chosen, trajectory, errors = self._resolved(settings, values)
+        chosen, trajectory, errors = self._as_accurate(settings)._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
             trajectory, estimate = choice.verified(trajectory)
         case = chosen.case
         exact = (case.reference.name, case.reference.options) if case.reference else None
+        found = (
+            accuracy(trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory), estimate)
+            if len(trajectory.result.times)
+            else None
+        )
         return Solution(
             trajectory,
             title=case.title,
             source=case.source,
             case=case.text,
             mechanism=case.mechanism_text or "",
-            accuracy=accuracy(
-                trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory), estimate
-            )
-            if len(trajectory.result.times)
-            else None,
+            accuracy=found,
             changes=values,
             case_run=case.run,
             error_from=error,
-            notes=spatial.missed(case.scene, errors),
+            notes=spatial.missed(case.scene, errors, found),
         )
+
+    def _as_accurate(self, run: Run) -> Simulation:
+        """The same with cells as accurate as the run is asked to be, where an accuracy chooses them."""
+        scene = spatial.tightened(self.case.scene, run.accuracy)
+        if scene is self.case.scene:
+            return self
+        if run.accuracy not in self._tightened:
+            self._tightened[run.accuracy] = Simulation(replace(self.case, scene=scene))
+        return self._tightened[run.accuracy]
 
     def _resolved(
         self, settings: Run, values: Mapping[str, float], before: float = math.inf
@@ -164,7 +175,7 @@ class Simulation:
         from surfacechem import sweeping
 
         if spatial.wanted(self.case.scene) is not None:
-            chosen = self._resolved(self.case.run, self._values(changes or {}))[0]
+            chosen = self._as_accurate(self.case.run)._resolved(self.case.run, self._values(changes or {}))[0]
             if chosen is not self:
                 return chosen.sweep_plan(plan, changes, threads)
         key = plan.until[0] if plan.until else ""

@@ -16,6 +16,7 @@ from surfacechem.accuracy import FLOOR, relative_error
 from surfacechem.integrate import Trajectory
 from surfacechem.profiles import profile_values
 from surfacechem.scene import MOST_CELLS, Body, Conduction, Scene
+from surfacechem.solution import WITHIN, Accuracy
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,30 @@ def wanted(scene: Scene) -> float | None:
     """The accuracy that cells are chosen by, the tighter of two; None where the scene gives their number."""
     given = [body.conduction.accuracy for body in scene.bodies if body.conduction is not None]
     return min((accuracy for accuracy in given if accuracy is not None), default=None)
+
+
+def tightened(scene: Scene, accuracy: float | None) -> Scene:
+    """The scene with cells as accurate as the run is asked to be, where an accuracy chooses them; itself where they
+    are.
+    """
+    least = wanted(scene)
+    if accuracy is None or least is None or least <= accuracy:
+        return scene
+
+    def changed(body: Body) -> Body:
+        law = body.conduction
+        if law is None or law.accuracy is None:
+            return body
+        return replace(body, conduction=replace(law, accuracy=accuracy))
+
+    first, second = scene.bodies
+    return replace(scene, bodies=(changed(first), changed(second)))
+
+
+def fixed(scene: Scene) -> list[str]:
+    """Names of the bodies whose number of cells is given."""
+    laws = ((body.name, body.conduction) for body in scene.bodies)
+    return [name for name, law in laws if law is not None and law.cells and law.accuracy is None]
 
 
 def halved(scene: Scene) -> Scene:
@@ -97,15 +122,22 @@ def _most(scene: Scene) -> int:
     return max(cells, default=0)
 
 
-def missed(scene: Scene, errors: Mapping[str, float]) -> tuple[str, ...]:
-    """Words for an accuracy that the most cells do not reach."""
+def missed(scene: Scene, errors: Mapping[str, float], found: Accuracy | None = None) -> tuple[str, ...]:
+    """Words for an accuracy that the most cells do not reach, or that a given number of cells does not."""
     accuracy, error = wanted(scene), _largest(errors)
-    if accuracy is None or error <= accuracy:
+    if accuracy is not None and not error <= accuracy:
+        text = (
+            f"the accuracy {accuracy:g} of the cells is not reached with {_most(scene)} of them: the error is about "
+            f"{error:.2g}. Ask for less, let outputs begin later, narrow the cells at the contact by `grading`, or "
+            "give the other body more."
+        )
+        return (text,)
+    names = fixed(scene)
+    if not names or found is None or found.asked is None or found.error <= WITHIN * found.asked:
         return ()
     text = (
-        f"the accuracy {accuracy:g} of the cells is not reached with {_most(scene)} of them: the error is about "
-        f"{error:.2g}. Ask for less, let outputs begin later, narrow the cells at the contact by `grading`, or give "
-        "the other body more."
+        f"a tolerance does not reduce the error of cells, whose number is given for {' and '.join(names)}: let "
+        f"`cells: {{accuracy: {found.asked:g}}}` choose it, or give more"
     )
     return (text,)
 

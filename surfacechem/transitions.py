@@ -44,6 +44,10 @@ class Fold:
     """How fast the stiffness falls along each gap; it tells which way they run."""
     stiffness: tuple[tuple[Expression, ...], ...]
     """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
+    warming: tuple[Expression, ...]
+    """Rise of the interface temperature along each gap without heat from outside [K/m]."""
+    node: str
+    """The state that is this temperature, if any is."""
 
 
 @dataclass(frozen=True)

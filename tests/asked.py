@@ -70,6 +70,10 @@ def of_table(name: str, accuracy: float) -> Achieved:
 # -- shipped cases --------------------------------------------------------------------------------------------------
 
 
+CELLS = {"case sudden-contact": 1e-5}
+"""Cases whose bodies are divided into cells, and the least accuracy for which that is quick."""
+
+
 @cache
 def simulation(name: str) -> Simulation:
     return surfacechem.load(name)
@@ -199,3 +203,8 @@ EXACT: dict[str, Callable[[float], Achieved]] = {
     **{name: partial(of_motion, name) for name in MOTION},
 }
 """Every exact solution by name: what an accuracy that is asked for gives."""
+
+
+def exact(accuracy: float) -> list[str]:
+    """Names of those that are asked for an accuracy."""
+    return [name for name in EXACT if accuracy >= CELLS.get(name, 0.0)]

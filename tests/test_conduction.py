@@ -91,7 +91,11 @@ def test_the_contact_goes_to_the_temperature_of_the_effusivities_at_once():
     )  # fmt: skip
     e_1, e_2 = np.sqrt(0.2 * 2530 / 2e-3), np.sqrt(1.0 * 4000 / 2e-3)
     assert exact.contact == pytest.approx((e_1 * 353.15 + e_2 * 293.15) / (e_1 + e_2), rel=1e-14)
-    early = ["run.until=60 ms", "run.first=10 ms"]
+    early = [
+        "run.until=60 ms",
+        "run.first=10 ms",
+        *(f"bodies.{name}.conduction.cells=80" for name in ("epoxy", "glass")),
+    ]
     run = surfacechem.run("sudden-contact", [*early, "reference=sudden-contact"])
     assert run.accuracy.source == "exact solution sudden-contact"
     assert abs(run.dataset["T"][1:] - exact.contact).max() < 2e-3

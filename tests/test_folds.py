@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies
+from mpmath import mp, mpf
+from scenes import SITES, bodies, perfect_contact, varying
 from scipy.optimize import brentq, fsolve
 from scipy.special import lambertw
 
@@ -13,6 +14,7 @@ from surfacechem.audit import audit
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.factors import Power
 from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.scene import Interface, Mounting, Scene
@@ -68,6 +70,52 @@ def test_a_stiff_spring_follows_the_whole_zone_in_shear():
     trajectory = solve(loading, tangential=Mounting(k=0.45 * STIFF))
     assert snaps(trajectory) == []
     assert trajectory.status == "finished"
+
+
+def opened(k, C):
+    """Fold of a zone of strength T_0/T that a spring opens without heat: load, gap, temperature; and the rest after
+    it: gap, temperature. The entropy C T/T_0 - a/T^2 stays at the fold, the energy after it."""
+    t_0, T_0, g_0 = mpf(10) ** 6 * mp.e, mpf(300), mpf(10) ** -7
+
+    def zone(x):
+        return t_0 * T_0 * g_0 * (1 + x) * mp.exp(-x) / C
+
+    start = T_0 - zone(0) / T_0
+
+    def warm(x):
+        return mp.findroot(lambda u: (u - start / T_0) * u**2 - zone(x) / T_0**2, 1) * T_0
+
+    def force(x, T):
+        return t_0 * T_0 / T * x * mp.exp(-x)
+
+    def load(x):
+        return x * g_0 + force(x, warm(x)) / k
+
+    x = mp.findroot(lambda x: mp.diff(load, x, h=mpf(10) ** -12), (1.2, 1.3), tol=1e-25)
+    w = load(x)
+
+    def energy(x, T):
+        return C * T**2 / (2 * T_0) - 2 * C * zone(x) / T + k * (w - x * g_0) ** 2 / 2
+
+    def unbalanced(y, u):
+        return (force(y, u * T_0) / k / w + y * g_0 / w - 1, energy(y, u * T_0) / energy(x, warm(x)) - 1)
+
+    y, u = mp.findroot(unbalanced, (w / g_0, 1))
+    return [float(value) for value in (w, x * g_0, warm(x), y * g_0, u * T_0)]
+
+
+@pytest.mark.parametrize(("k", "C"), [(1e12, 2.0), (1e12, 0.02), (2.5e12, 0.01)])
+def test_moment_and_state_of_a_fold_are_those_of_the_fold_itself(k, C):
+    """The zone cools as it opens; a run ends a little before the fold, by the root of what time resolves."""
+    with mp.workdps(40):
+        w, g, T, apart, hot = opened(mpf(k), mpf(C))
+    zone = ExponentialCohesiveZone(t_max=varying(1e6, Power(exponent=-1.0)), g_0=1e-7, E_n=1e16)
+    scene = perfect_contact([zone], C_1=C / 2, C_2=C / 2, loading={"w_n": Ramp(rate=1e-6)}, normal=Mounting(k=k))
+    trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1.5 * w / 1e-6], rtol=1e-13))
+    (snap,) = snaps(trajectory)
+    assert snap.t == pytest.approx(w / 1e-6, rel=5e-15)
+    assert snap.before.y == pytest.approx([g, T], rel=5e-15)
+    assert snap.after.y == pytest.approx([apart, hot], rel=1e-13)
 
 
 def gradient(z, w_n, w_t, k_t):

@@ -38,13 +38,14 @@ def folds(build: Build) -> None:
         return
     whole = determinant(A)
     falls = tuple(-_along(whole, e) for e in build.equilibria)
+    warming = tuple(_rise(build, e) for e in build.equilibria)
     build.transitions.append(
         Transition(
             "snap",
             tangent - FOLD,
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
             settles=True,
-            fold=Fold(tangent, falls, relative),
+            fold=Fold(tangent, falls, relative, warming, str(_temperature(build))),
         )
     )
 
@@ -65,12 +66,23 @@ def _stiffness(build: Build, i: Equilibrium, j: Equilibrium) -> Expression:
 
 def _thermal(build: Build, residual: Expression, j: Equilibrium) -> Expression:
     """What the temperature adds that follows a gap without heat from outside."""
+    T = _temperature(build)
+    return derivative(residual, T) * _rise(build, j) if T is not None and depends(residual, T) else symengine.Integer(0)
+
+
+def _temperature(build: Build) -> Expression | None:
+    """The temperature of the interface where it follows the gaps."""
     node = build.node_of.get("interface")
-    if node is None or node.prescribed or not depends(residual, node.T):
-        return symengine.Integer(0)
-    coupling = derivative(_along(build.psi, j), node.T)
+    return None if node is None or node.prescribed else node.T
+
+
+def _rise(build: Build, e: Equilibrium) -> Expression:
+    """Rise of the interface temperature along a gap without heat from outside [K/m]."""
+    T = _temperature(build)
+    coupling = symengine.Integer(0) if T is None else derivative(_along(build.psi, e), T)
     if coupling == 0:
         return symengine.Integer(0)
+    node = build.node_of["interface"]
     capacity = node.capacity()
     if capacity == 0:
         raise InputError(
@@ -78,7 +90,7 @@ def _thermal(build: Build, residual: Expression, j: Equilibrium) -> Expression:
             "one, or mount the bodies with a damper or a mass.",
             Place(path="interface.temperature"),
         )
-    return derivative(residual, node.T) * node.T * coupling / capacity
+    return T * coupling / capacity
 
 
 def _size(build: Build, e: Equilibrium, own: Expression) -> Expression:

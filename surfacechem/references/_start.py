@@ -50,7 +50,7 @@ class Start:
     def find(self, name: str) -> float | None:
         """The value of a parameter of an exact solution, or None."""
         for rule in (RULES.get(name), lambda start: start._plain(name)):
-            with suppress(KeyError):
+            with suppress(KeyError, ZeroDivisionError):  # nothing forms where all is bonded: no rate tells a time
                 if rule is not None:
                     return float(rule(self))
         return None
@@ -180,6 +180,8 @@ RULES: dict[str, Callable[[Start], float]] = {
     "a": lambda s: -s.ramp("g_n"),
     "g_i": lambda s: s.initial["g_n"] if "g_n" in s.initial else s.named["g_n"],
     "mu": lambda s: s.at(".mu"),
+    "mu_b": lambda s: s.at(".mu_b") * s.parameters["T_0"] / s.temperature(),
+    "mu_ub": lambda s: s.at(".mu_ub") * s.parameters["T_0"] / s.temperature(),
     "mu_k": lambda s: s.at(".mu"),
     "t_k": lambda s: s.sliding(),
     "t_s": lambda s: s.sticking(),

@@ -26,11 +26,20 @@ Array = NDArray[np.float64]
 Solution = Callable[[Array], dict[str, Array]]
 """Exact values under the names of the scene, at any times."""
 
-MISMATCH = 1e-4
-"""Largest part of an equation by which a solution may miss it; differences in time are good to 1e-6 or better."""
+MISMATCH = 1e-6
+"""Largest part of an equation by which a solution may miss it; differences in time are good to 1e-7 or better."""
+
+SAME, NOTHING = 1e-9, 1e-12
+"""Relative difference of numbers that are the same, and the part of a scale that counts as nothing."""
+
+ROUNDING = 8 * float(np.finfo(float).eps)
+"""Last digits of a difference."""
 
 PROBES = 7
-"""Times at which the equations are tested."""
+"""Times at which the equations are tested; as many stretches between events, where there are so many."""
+
+EDGE = 0.01
+"""Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
 
 def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
@@ -47,17 +56,23 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
 
 
 def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> Reference:
-    """The reference with the parameters of the scene; ``options`` go first."""
+    """The reference with the parameters of the scene, and with ``options`` for those that the scene does not tell.
+
+    InputError where an option is not what the scene has, as after a change of the scene alone.
+    """
     values = dict(options)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if item.name not in values:
-            found = start.find(item.name)
-            if found is not None:
-                values[item.name] = found
-            elif item.default is dataclasses.MISSING:
-                text = item.metadata["spec"].text
-                raise InputError(f"it needs {item.name} ({text}), which the scene has not.")
+        found, spec = start.find(item.name), item.metadata["spec"]
+        if found is None and item.name not in values and item.default is dataclasses.MISSING:
+            raise InputError(f"it needs {item.name} ({spec.text}), which the scene has not.")
+        if found is not None and not _same(values.setdefault(item.name, found), found, 0.0):
+            ours, theirs = (f"{value:.9g} {spec.unit}" for value in (found, values[item.name]))
+            raise InputError(f"it is given for {item.name} = {theirs}; the scene has {ours}.")
     return kind(**values)
+
+
+def _same(a: float, b: float, scale: float) -> bool:
+    return abs(a - b) <= max(SAME * max(abs(a), abs(b)), NOTHING * scale)
 
 
 def _solution(reference: Reference, start: Start, t: Array) -> dict[str, Array]:
@@ -91,8 +106,8 @@ def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
     for j, state in enumerate(run.model.system.states):
         if state.name in exact:
             start, ours = exact[state.name][0], run.result.outputs[0, j]
-            if abs(start - ours) > MISMATCH * max(abs(ours), state.scale):
-                raise InputError(f"it starts from {state.name} = {start:.6g}, the scene from {ours:.6g}.")
+            if not _same(start, ours, state.scale):
+                raise InputError(f"it starts from {state.name} = {start:.9g}, the scene from {ours:.9g}.")
 
 
 def _check(solution: Solution, run: Trajectory) -> None:
@@ -100,12 +115,16 @@ def _check(solution: Solution, run: Trajectory) -> None:
     if len(run.result.times) < 2:
         return  # the run ended at its start
     probes, since = _probes(run)
-    y, ydot = _along(solution, run, probes, since)
+    y, ydot, rounding = _along(solution, run, probes, since)
+    _check_given(solution(probes), run, run.model.evaluate(run.result, probes, y, ydot), probes)
     problem, program = run.result.problem, run.model.program
     segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
     inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
     misses = program.residual(inputs)
-    terms = program.derivatives(inputs)[1] * ydot[:, None, :]
+    by_rate = program.derivatives(inputs)[1]
+    terms = by_rate * ydot[:, None, :]
+    known = (np.abs(by_rate) * rounding[:, None, :]).sum(axis=2)
+    misses -= np.clip(misses, -known, known)
     sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
     # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)
@@ -113,7 +132,18 @@ def _check(solution: Solution, run: Trajectory) -> None:
     if parts.max() > MISMATCH:
         j, row = np.unravel_index(parts.argmax(), parts.shape)
         equation = list(run.model.system.rows)[row]
-        raise InputError(f"at t = {probes[j]:.3g} s it misses the equation of {equation} by {parts.max():.2%}.")
+        raise InputError(f"at t = {probes[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
+
+
+def _check_given(exact: Mapping[str, Array], run: Trajectory, named: Array, t: Array) -> None:
+    """Refuse a solution under another load."""
+    given = {role.variable for role in run.model.system.roles if role.role == "prescribed"}
+    for j, item in enumerate(run.model.system.outputs):
+        if item.name in given and item.name in exact:
+            theirs, ours = exact[item.name], named[:, j]
+            largest = float(np.max(np.abs(ours)))
+            for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME * largest))[:1]:
+                raise InputError(f"at t = {t[k]:.3g} s its {item.name} is {theirs[k]:.6g}, the scene's {ours[k]:.6g}.")
 
 
 def _probes(run: Trajectory) -> tuple[Array, Array]:
@@ -122,15 +152,19 @@ def _probes(run: Trajectory) -> tuple[Array, Array]:
     edges = edges[edges <= run.result.times[-1]]
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
-    chosen = np.unique(np.linspace(0, len(edges) - 2, PROBES).astype(int))
-    parts = np.linspace(0.1, 0.9, max(2, PROBES // len(chosen)))
+    spread = np.linspace(0, len(edges) - 2, PROBES).astype(int)
+    chosen = np.union1d(spread, np.arange(min(PROBES, len(edges) - 1)))
+    parts = np.linspace(EDGE, 1 - EDGE, max(2, PROBES // len(chosen)))
     starts, lengths = edges[chosen], np.diff(edges)[chosen]
     since = np.multiply.outer(lengths, parts)
     return np.ravel(starts[:, None] + since), np.ravel(since)
 
 
-def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple[Array, Array]:
-    """Exact states and their rates, by central differences; InputError where the solution leaves a state open."""
+def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple[Array, Array, Array]:
+    """Exact states, their rates by central differences, and how far these are rounding.
+
+    InputError where the solution leaves a state open.
+    """
     step = 1e-4 * since
     exact = solution(np.concatenate([t - 2 * step, t - step, t, t + step, t + 2 * step]))
     names = [state.name for state in run.model.system.states]
@@ -139,4 +173,4 @@ def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple
         raise InputError(f"it says nothing of {', '.join(missing)}.")
     values = np.array([exact[name] for name in names]).reshape(len(names), 5, len(t))
     slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
-    return values[:, 2].T, slope.T
+    return values[:, 2].T, slope.T, (ROUNDING * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T

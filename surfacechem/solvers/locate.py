@@ -237,6 +237,7 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
     closest = np.inf
     store_polynomial(w, h, 0.0)
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    nudge = 0.0
     for attempt in range(12):
         if not _step_onto(w, size) < worst:
             return 0.0
@@ -244,7 +245,7 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
         value = w.margin[M_NOW, m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
-        if crossed and (abs(change) <= resolution or value == 0.0 or attempt >= 6):
+        if crossed and (abs(change) <= resolution or value == 0.0 or nudge > 0.0 or attempt >= 6):
             return size
         if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
             # Where it came closest it is zero, or the polynomial was too coarse to tell.
@@ -252,8 +253,9 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
             return best if touches else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
-        if not crossed and abs(change) <= resolution:
-            change = resolution * 2.0**attempt
+        # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
+        nudge = max(2.0 * nudge, resolution) if not crossed and abs(change) <= resolution else 0.0
+        change = nudge if nudge > 0.0 else change
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
     return size
 
