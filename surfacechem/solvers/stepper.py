@@ -16,6 +16,7 @@ from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
 _SOURCES = (
     "contract",
     "native",
+    "combining",
     "lu",
     "chains",
     "noise",
