@@ -139,6 +139,7 @@ def advance(
             return MAX_STEPS, h, 0.0, h
         if stop[0] != 0:
             return STOPPED, h, 0.0, h
+        predict(w, h)
         outcome = _prepare(w, h, not failed)
         if outcome == NONFINITE:
             return outcome, h, 0.0, h
@@ -148,7 +149,6 @@ def advance(
                 return SINGULAR, h, 0.0, h
             h *= 0.37
             continue
-        predict(w, h)
         outcome = solve_stages(w, h)
         if outcome == CONVERGED:
             norm = estimate_error(w, h)

@@ -147,7 +147,6 @@ def _differentiate_midway(w: Any, h: float) -> None:
     """
     known, sizes = w.vector[COLUMNS], w.vector[RHS]
     _row_sizes(w, known)
-    predict(w, h)
     set_stage(w, w.count[MEMBER] + 1, h)
     _differentiate(w)
     _row_sizes(w, sizes)
@@ -157,7 +156,9 @@ def _differentiate_midway(w: Any, h: float) -> None:
 
 @compiled
 def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
-    """Evaluate G_y and G_ydot midway through the step where that can be foreseen, else at its start."""
+    """Evaluate G_y and G_ydot midway through the step where the first guess of its stages foresees that, else at its
+    start.
+    """
     _differentiate_at_start(w)
     if foresee and w.clock[OFFSET] == 1.0 and 0.0 < h <= FORESEEN * w.clock[H_LAST]:
         _differentiate_midway(w, h)

@@ -91,10 +91,10 @@ class _Loaded:
 
 def run_batch() -> Any:
     """The compiled loop over a batch of runs, or of states to be made consistent."""
-    with _LOCK:
-        if _Loaded.kernel is None:
-            _Loaded.kernel = _compiled()
-        return _Loaded.kernel
+    if _Loaded.kernel is None:
+        with _LOCK:
+            _Loaded.kernel = _Loaded.kernel or _compiled()
+    return _Loaded.kernel
 
 
 def load_briefly() -> None:
