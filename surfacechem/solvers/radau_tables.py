@@ -260,11 +260,17 @@ def _scan_table(nodes: NDArray[np.float64], points: NDArray[np.float64]) -> NDAr
     """Value and rate at the points of the polynomial through (0, 0), (c_j, z_j) per unit z_j, and, behind these, of
     the shape of its error.
     """
-    basis = [np.poly1d(np.append(np.delete(nodes, j), 0.0), r=True) for j in range(len(nodes))]
-    shapes = [p / p(c) for p, c in zip(basis, nodes, strict=True)]
-    shapes.append(np.poly1d(np.append(_defect(nodes)[::-1], 0.0)))
-    values = [[p(points) for p in shapes], [p.deriv()(points) for p in shapes]]
-    return np.pad(np.swapaxes(values, 1, 2), ((0, 0), (0, 0), (0, 8 - len(shapes))))
+    table = np.zeros((2, SCAN_POINTS, 8))
+    for j, c in enumerate(nodes):
+        others = np.append(np.delete(nodes, j), 0.0)
+        # As products: sums of powers would lose digits, and the end of the step is a node.
+        parts = (points[:, None] - others) / (c - others)
+        table[0, :, j] = parts.prod(axis=1)
+        for i, other in enumerate(others):
+            table[1, :, j] += np.delete(parts, i, axis=1).prod(axis=1) / (c - other)
+    table[0, :, len(nodes)] = np.polyval(np.append(_defect(nodes)[::-1], 0.0), points)
+    table[1, :, len(nodes)] = (1.0 - points[:, None] / nodes).prod(axis=1)
+    return table
 
 
 def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
