@@ -134,10 +134,10 @@ def _row_sizes(w: Any, sizes: Any) -> None:
 @compiled
 def _stiffer(w: Any, known: Any, sizes: Any) -> bool:
     """Whether the derivatives are far larger than known, or not finite."""
+    found = False
     for i in range(w.jacobian.shape[1]):
-        if not sizes[i] <= STIFFER * known[i]:
-            return True
-    return False
+        found = found or not sizes[i] <= STIFFER * known[i]
+    return found
 
 
 @compiled
