@@ -108,9 +108,7 @@ class Problem:
             self.atol.shape == (n,),
             "atol has shape {0.atol.shape}; it needs one entry for each of {0.program.n} states.",
         )
-        require(
-            segments >= 1 and _increase(self.segments), "segments must be increasing breakpoints, at least two."
-        )
+        require(segments >= 1 and _increase(self.segments), "segments must be increasing breakpoints, at least two.")
         require(
             self.parameters.shape == (segments, self.program.n_parameters),
             "parameters have shape {0.parameters.shape}; one vector of {0.program.n_parameters} a segment is needed.",

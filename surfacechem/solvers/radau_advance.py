@@ -17,8 +17,10 @@ from surfacechem.solvers.native import (
     LEDGER,
     MEMBER,
     OFFSET,
+    PIVOT,
     REJECTED,
     RTOL,
+    SCALE,
     STEPS,
     TAU,
     THETA,
@@ -113,6 +115,7 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
         w.count[FRESH] = CURRENT
         w.clock[H_JACOBIAN] = h
     w.clock[H_FACTORED] = 0.0
+    copy(w.vector[SCALE], w.vector[PIVOT])
     if not factor_newton(w, h):
         return SINGULAR
     w.clock[H_FACTORED] = h

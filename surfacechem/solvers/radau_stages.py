@@ -26,6 +26,7 @@ from surfacechem.solvers.native import (
     LAST_MEMBER,
     MEMBER,
     OFFSET,
+    PIVOT,
     RESIDUAL,
     RESIDUALS,
     RHS,
@@ -183,7 +184,7 @@ def factor_newton(w: Any, h: float) -> bool:
             real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
     if chained and not fold_shifted(w, GAMMA[k] / h, real, w.real_border, w.real_bands):
         return False
-    if not factor(real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
+    if not factor(real, w.order[0], w.vector[PIVOT], w.vector[DELTA], 0.0):
         return False
     for pair in range(k + 1):
         shift = PAIR_VALUES[k, pair] / h
@@ -192,7 +193,7 @@ def factor_newton(w: Any, h: float) -> bool:
                 pairs[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
         if chained and not fold_shifted(w, shift, pairs[pair], w.complex_border[pair], w.complex_bands[pair]):
             return False
-        if not factor(pairs[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
+        if not factor(pairs[pair], w.order[1 + pair], w.vector[PIVOT], w.vector[DELTA], 0.0):
             return False
     return True
 
