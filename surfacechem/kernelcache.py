@@ -129,7 +129,8 @@ def _loops_kept() -> Iterator[None]:
     """Loops over a handful of states or stages as they stand: four at a time there is more to decide than to do."""
     from numba.core import llvm_bindings
 
-    module: Any = llvm_bindings.llvm
+    bindings: Any = llvm_bindings
+    module = bindings.llvm
     usual = module.create_pass_builder
 
     def without_unrolling(machine: Any, options: Any) -> Any:
