@@ -125,6 +125,26 @@ def _unfinished(parts: Collection[str]) -> Iterator[None]:
 
 
 @contextmanager
+def _loops_kept() -> Iterator[None]:
+    """Loops over a handful of states or stages as they stand: four at a time there is more to decide than to do."""
+    from numba.core import llvm_bindings
+
+    bindings: Any = llvm_bindings
+    module = bindings.llvm
+    usual = module.create_pass_builder
+
+    def without_unrolling(machine: Any, options: Any) -> Any:
+        options.loop_unrolling = False
+        return usual(machine, options)
+
+    module.create_pass_builder = without_unrolling
+    try:
+        yield
+    finally:
+        module.create_pass_builder = usual
+
+
+@contextmanager
 def _compared_at_once() -> Iterator[None]:
     """Numba finds what it has compiled by the flags it did so with, and lists all of them at every look; here only
     where those that are set differ. The result is the same, a tenth of the time is not needed.
@@ -158,7 +178,7 @@ def _compile(function: Callable[..., None], signature: Any, folder: Path | None,
 
     if folder is not None:
         _writable(folder)
-    with global_compiler_lock, _settings(folder), _unfinished(parts), _compared_at_once():
+    with global_compiler_lock, _settings(folder), _unfinished(parts), _loops_kept(), _compared_at_once():
         return numba.njit(signature, cache=folder is not None, nogil=True, error_model="numpy")(function)
 
 

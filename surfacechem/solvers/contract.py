@@ -102,29 +102,35 @@ class Problem:
 
     def __post_init__(self) -> None:
         n, segments = self.program.n, len(self.segments) - 1
-        _require(self.y0.shape == (n,), f"y0 has shape {self.y0.shape}; the program has {n} states.")
-        _require(
-            self.atol.shape == (n,), f"atol has shape {self.atol.shape}; it needs one entry for each of {n} states."
+        require = self._require
+        require(self.y0.shape == (n,), "y0 has shape {0.y0.shape}; the program has {0.program.n} states.")
+        require(
+            self.atol.shape == (n,),
+            "atol has shape {0.atol.shape}; it needs one entry for each of {0.program.n} states.",
         )
-        _require(
-            segments >= 1 and bool(np.all(np.diff(self.segments) > 0)),
-            "segments must be increasing breakpoints, at least two.",
+        require(segments >= 1 and _increase(self.segments), "segments must be increasing breakpoints, at least two.")
+        require(
+            self.parameters.shape == (segments, self.program.n_parameters),
+            "parameters have shape {0.parameters.shape}; one vector of {0.program.n_parameters} a segment is needed.",
         )
-        shape = (segments, self.program.n_parameters)
-        _require(self.parameters.shape == shape, f"parameters have shape {self.parameters.shape}; {shape} is needed.")
-        _require(bool(np.all(np.diff(self.times) > 0)), "output times must increase strictly.")
+        require(_increase(self.times), "output times must increase strictly.")
         inside = len(self.times) == 0 or (self.times[0] >= self.segments[0] and self.times[-1] <= self.segments[-1])
-        _require(inside, "output times must lie within the segments.")
-        _require(len(self.margins) == self.program.n_margins, f"{self.program.n_margins} margins need as many kinds.")
-        _require(
-            0.0 < self.rtol < 1.0 and bool(np.all(self.atol >= 0.0)),
+        require(inside, "output times must lie within the segments.")
+        require(len(self.margins) == self.program.n_margins, "{0.program.n_margins} margins need as many kinds.")
+        require(
+            0.0 < self.rtol < 1.0 and bool((self.atol >= 0.0).all()),
             "rtol must lie in (0, 1) and atol must not be negative.",
         )
 
+    def _require(self, condition: bool, message: str) -> None:
+        """Raise ValueError; the message is made up only then, as a run may be brief."""
+        if not condition:
+            raise ValueError(message.format(self))
 
-def _require(condition: bool, message: str) -> None:
-    if not condition:
-        raise ValueError(message)
+
+def _increase(times: Array) -> bool:
+    """Whether each is beyond the one before."""
+    return len(times) < 2 or bool((times[1:] > times[:-1]).all())
 
 
 class Counters(NamedTuple):

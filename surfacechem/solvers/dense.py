@@ -6,18 +6,22 @@ which is the error estimate, fixes its leading error term; adding that term gain
 
 from typing import Any
 
+from surfacechem.solvers.combining import combine
 from surfacechem.solvers.native import (
+    BASE,
     CORRECTION,
     ERROR,
     LEDGER,
     MEMBER,
     Q_CORRECTION,
     Q_TRIAL,
+    TAU,
     TRIAL,
     TRIAL_DOT,
     Q,
     Y,
     compiled,
+    copy,
     evaluate,
 )
 from surfacechem.solvers.radau_stages import divide, nested, set_stage, stage_count
@@ -27,6 +31,9 @@ from surfacechem.solvers.radau_tables import (
     GAMMA,
     NEWTON_NODES,
     PROBE_SHAPE,
+    SCAN_RATES,
+    SCAN_VALUES,
+    SCANNED,
     START_RATE,
 )
 
@@ -86,6 +93,28 @@ def interpolate_rate(w: Any, h: float, x: float) -> None:
             value = value * (x - NEWTON_NODES[k, i]) + row[i]
         w.vector[TRIAL, m] = w.vector[Y, m] + value * x
         w.vector[TRIAL_DOT, m] = (slope * x + value) / h
+
+
+@compiled
+def scan_step(w: Any) -> None:
+    """Change of the state since the start, and its rate times the step, at all points where margins are examined."""
+    k, n = w.count[MEMBER], w.algebraic.shape[0]
+    s = stage_count(k)
+    copy(w.vector[CORRECTION], w.z[s])  # a row that is free
+    points, terms, z = 4 * k + 9, s + 1, w.z.ctypes.data
+    combine(SCAN_VALUES[k].ctypes.data, 8, points, terms, z, n, w.scanned.ctypes.data)
+    combine(SCAN_RATES[k].ctypes.data, 8, points, terms, z, n, w.scanned_rates.ctypes.data)
+
+
+@compiled
+def put_scanned(w: Any, h: float, i: int) -> None:
+    """Inputs at a point where margins are examined."""
+    n, rate = w.algebraic.shape[0], 1.0 / h
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + SCANNED[w.count[MEMBER], i] * h)
+    inputs, y, change, slope = w.inputs, w.vector[Y], w.scanned[i], w.scanned_rates[i]
+    for m in range(n):
+        inputs[1 + m] = y[m] + change[m]
+        inputs[1 + n + m] = slope[m] * rate
 
 
 @compiled

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solvers.dense import interpolate_rate, keep_polynomial
+from surfacechem.solvers.dense import interpolate_rate, keep_polynomial, put_scanned, scan_step
 from surfacechem.solvers.native import (
     BASE,
     H_FACTORED,
@@ -34,10 +34,8 @@ from surfacechem.solvers.native import (
 from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
+from surfacechem.solvers.radau_tables import EDGE, SCANNED
 from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, noise, update_sides
-
-EDGE = 1e-6
-"""The slopes at both ends of a step are seen at this distance."""
 
 ALIKE = 1e3
 """Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
@@ -109,6 +107,7 @@ def _dips(w: Any, h: float, kinds: Any, m: int, a: float, b: float, c: float) ->
     values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
     if not _may_reach(a, b, c, values[0], values[1], values[2]):
         return False
+    keep_polynomial(w)
     x = _reaches(w, h, m, a, b, c, is_limit(kinds, m))
     w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
     return x > 0.0
@@ -154,15 +153,15 @@ def _scan(w: Any, h: float, kinds: Any) -> float:
     """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
     there.
     """
-    points = 4 * w.count[MEMBER] + 7
+    scan_step(w)
     earlier, before = 0.0, 0.0
-    for i in range(points + 2):
-        x = EDGE if i == 0 else min(i / points, 1.0)
-        if i == points:
-            x = 1.0 - EDGE
-        _margin_inside(w, h, x, M_NOW)
+    for i in range(4 * w.count[MEMBER] + 9):
+        x = SCANNED[w.count[MEMBER], i]
+        put_scanned(w, h, i)
+        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
         found = _mark(w, h, kinds, earlier, before, x)
         if found > 0.0:
+            keep_polynomial(w)
             _mark_dips(w, h, kinds, before, x)
         if found != 0.0:
             return found
@@ -245,7 +244,9 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
         value = w.margin[M_NOW, m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
-        if crossed and (abs(change) <= resolution or value == 0.0 or nudge > 0.0 or attempt >= 6):
+        # What is left after a few attempts is the rounding of the margin itself.
+        still = abs(change) <= resolution * (1 + attempt)
+        if crossed and (still or value == 0.0 or nudge > 0.0 or attempt >= 6):
             return size
         if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
             # Where it came closest it is zero, or the polynomial was too coarse to tell.
@@ -292,7 +293,6 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
     repeated, AT_START if a limit is passed at the start.
     """
-    keep_polynomial(w)
     end = _scan(w, h, kinds)
     if end <= 0.0:
         return h if end == 0.0 else AT_START

@@ -77,11 +77,16 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
 def solve(a: Any, order: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution; entries of x beyond the matrix are left alone."""
     n = a.shape[0]
+    # Sums in a local name: in x each term would wait until the one before it is stored.
     for k in range(n):
-        x[k], x[order[k]] = x[order[k]], x[k]
+        p = order[k]
+        total = x[p]
+        x[p] = x[k]
         for j in range(k):
-            x[k] -= a[k, j] * x[j]
+            total -= a[k, j] * x[j]
+        x[k] = total
     for k in range(n - 1, -1, -1):
+        total = x[k]
         for j in range(k + 1, n):
-            x[k] -= a[k, j] * x[j]
-        x[k] *= a[k, k]
+            total -= a[k, j] * x[j]
+        x[k] = total * a[k, k]

@@ -16,6 +16,9 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numba.np.arrayobj import populate_array
 
+from surfacechem.solvers.combining import ROWS
+from surfacechem.solvers.radau_tables import SCAN_POINTS
+
 _njit: Any = numba.njit
 _intrinsic: Any = intrinsic
 _borrowed: Any = impl_ret_borrowed
@@ -39,16 +42,19 @@ FUNCTIONS = 4
 functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
 constant."""
 
-ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE = np.arange(13)
-"""Rows of the vectors of length n."""
+ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE, PIVOT = np.arange(14)
+"""Rows of the vectors of length n; PIVOT is SCALE as it was when the Newton matrices were factored."""
 Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.arange(8)
 """Rows of the vectors of length n_ledger."""
 M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = np.arange(9)
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero."""
-BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN = np.arange(11)
+(
+    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
+) = np.arange(12)  # fmt: skip
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
-t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian."""
+t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; GUESSED is by how much the first guess
+of the stages was wrong, in units of the tolerance."""
 STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
 MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
@@ -70,6 +76,8 @@ class Work(NamedTuple):
     z: Any
     z_last: Any
     g: Any
+    slopes: Any
+    parts: Any
     pairs: Any
     jacobian: Any
     border_derivatives: Any
@@ -82,6 +90,8 @@ class Work(NamedTuple):
     complex_bands: Any
     order: Any
     z_polynomial: Any
+    scanned: Any
+    scanned_rates: Any
     ledger: Any
     q_stage: Any
     rates: Any
@@ -252,12 +262,14 @@ def lay_out(
         chains,
         groups,
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
-        _take(cursor, (H_JACOBIAN + 1,), np.float64),
+        _take(cursor, (GUESSED + 1,), np.float64),
         _take(cursor, (REFUSED + 1,), np.int64),
-        _take(cursor, (NOISE + 1, n), np.float64),
-        _take(cursor, (7, n), np.float64),
-        _take(cursor, (7, n), np.float64),
-        _take(cursor, (7, n), np.float64),
+        _take(cursor, (PIVOT + 1, n), np.float64),
+        _take(cursor, (ROWS, n), np.float64),
+        _take(cursor, (ROWS, n), np.float64),
+        _take(cursor, (ROWS, n), np.float64),
+        _take(cursor, (ROWS, n), np.float64),
+        _take(cursor, (ROWS, n), np.float64),
         _take(cursor, (3, n), np.complex128),
         _take(cursor, (2, core, core), np.float64),
         _take(cursor, (2, core, links), np.float64),
@@ -270,6 +282,8 @@ def lay_out(
         _take(cursor, (3, cells, 3), np.complex128),
         _take(cursor, (4, core), np.int64),
         _take(cursor, (n, 9), np.float64),
+        _take(cursor, (SCAN_POINTS + 3, n), np.float64),
+        _take(cursor, (SCAN_POINTS + 3, n), np.float64),
         _take(cursor, (Q_NUDGED + 1, n_ledger), np.float64),
         _take(cursor, (7, n_ledger), np.float64),
         _take(cursor, (8, n_ledger), np.float64),

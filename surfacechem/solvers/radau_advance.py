@@ -17,8 +17,10 @@ from surfacechem.solvers.native import (
     LEDGER,
     MEMBER,
     OFFSET,
+    PIVOT,
     REJECTED,
     RTOL,
+    SCALE,
     STEPS,
     TAU,
     THETA,
@@ -46,6 +48,7 @@ from surfacechem.solvers.radau_stages import (
 from surfacechem.solvers.radau_step import (
     TINIEST,
     choose_member,
+    convergent_size,
     estimate_again,
     estimate_error,
     next_size,
@@ -101,17 +104,18 @@ def restart(w: Any) -> int:
 
 
 @compiled
-def _prepare(w: Any, h: float) -> int:
+def _prepare(w: Any, h: float, foresee: bool) -> int:
     """Newton matrices for this step size, kept where they still serve."""
     if w.clock[H_FACTORED] == h:
         return GOOD
     outgrown = w.clock[THETA] >= 1e-3 or h > LASTS * w.clock[H_JACOBIAN]
     if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and outgrown):
-        if not differentiate_system(w):
+        if not differentiate_system(w, h, foresee):
             return NONFINITE
         w.count[FRESH] = CURRENT
         w.clock[H_JACOBIAN] = h
     w.clock[H_FACTORED] = 0.0
+    copy(w.vector[SCALE], w.vector[PIVOT])
     if not factor_newton(w, h):
         return SINGULAR
     w.clock[H_FACTORED] = h
@@ -130,7 +134,7 @@ def advance(
 ) -> tuple[int, float, float, float]:
     """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
     repeated = w.clock[H_LAST] == 0.0
-    singular = 0
+    singular, failed = 0, False
     while True:
         if too_small(w, h):
             return STEP_UNDERFLOW, h, 0.0, h
@@ -138,7 +142,8 @@ def advance(
             return MAX_STEPS, h, 0.0, h
         if stop[0] != 0:
             return STOPPED, h, 0.0, h
-        outcome = _prepare(w, h)
+        predict(w, h)
+        outcome = _prepare(w, h, not failed)
         if outcome == NONFINITE:
             return outcome, h, 0.0, h
         if outcome == SINGULAR:
@@ -147,22 +152,25 @@ def advance(
                 return SINGULAR, h, 0.0, h
             h *= 0.37
             continue
-        predict(w, h)
         outcome = solve_stages(w, h)
         if outcome == CONVERGED:
             norm = estimate_error(w, h)
             if norm >= 1.0 and repeated:
                 norm = min(norm, estimate_again(w))
             if norm < 1.0:
-                return GOOD, h, norm, next_size(w, h, norm, size_last, norm_last)
+                proposed = next_size(w, h, norm, size_last, norm_last)
+                return GOOD, h, norm, min(h, proposed) if failed else proposed
             smaller = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
         else:
             smaller = h * (0.1 if outcome == NOT_FINITE else 0.4)
+            failed = True
         w.count[REJECTED] += 1
         if outcome != CONVERGED and w.count[FRESH] == OLD:
             w.count[FRESH] = INVALID
             w.clock[H_FACTORED] = 0.0
             continue
+        if outcome != CONVERGED:
+            w.count[FRESH] = INVALID
         choose_member(w, SLOW_REJECTED)
         w.clock[H_FACTORED] = 0.0
         repeated = True
@@ -205,6 +213,7 @@ def accept(w: Any, h: float) -> None:
 @compiled
 def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
+    proposed = min(proposed, convergent_size(w, h))
     if choose_member(w, SLOW):
         w.clock[H_FACTORED] = 0.0
     elif w.clock[THETA] < 1e-3 and h <= proposed <= 1.2 * h:

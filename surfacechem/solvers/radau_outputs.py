@@ -12,6 +12,7 @@ from surfacechem.solvers.native import (
     BASE,
     CONTRACTION,
     ERROR,
+    GUESSED,
     LEDGER,
     MEMBER,
     NOISE,
@@ -125,7 +126,8 @@ def _write(w: Any, row: Any) -> None:
 @compiled
 def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
     """Each output by a step of its own; leaves the main step as it was."""
-    theta, contraction, tries = w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES]
+    theta, contraction, guessed = w.clock[THETA], w.clock[CONTRACTION], w.clock[GUESSED]
+    tries = w.count[TRIES]
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
         size = (times[i] - w.clock[BASE]) - w.clock[TAU]
@@ -134,7 +136,8 @@ def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: 
         _write(w, outputs[i])
     _recall_step(w, h)
     factor_newton(w, h)
-    w.clock[THETA], w.clock[CONTRACTION], w.count[TRIES] = theta, contraction, tries
+    w.clock[THETA], w.clock[CONTRACTION], w.clock[GUESSED] = theta, contraction, guessed
+    w.count[TRIES] = tries
 
 
 @compiled

@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solvers.chains import fold_shifted, solve_complex, solve_real
+from surfacechem.solvers.combining import combine
 from surfacechem.solvers.lu import factor
 from surfacechem.solvers.native import (
     BASE,
+    COLUMNS,
     CONTRACTION,
     DELTA,
     FACTORIZATIONS,
+    GUESSED,
     H_LAST,
     ITERATIONS,
     JACOBIAN,
@@ -23,8 +26,10 @@ from surfacechem.solvers.native import (
     LAST_MEMBER,
     MEMBER,
     OFFSET,
+    PIVOT,
     RESIDUAL,
     RESIDUALS,
+    RHS,
     ROUNDING,
     RTOL,
     SCALE,
@@ -43,16 +48,14 @@ from surfacechem.solvers.native import (
 )
 from surfacechem.solvers.noise import correction_is_noise
 from surfacechem.solvers.radau_tables import (
+    FROM_PARTS,
     GAMMA,
     INVERSE,
     INVERSE_GAPS,
     NEWTON_NODES,
     NODES,
-    PAIR_COLUMNS,
-    PAIR_ROWS,
     PAIR_VALUES,
-    REAL_COLUMN,
-    REAL_ROW,
+    TO_PARTS,
 )
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
@@ -65,6 +68,12 @@ makes the corrections small before the residual is.
 
 COARSE = 3e-6
 """Tolerance above which one correction is not believed: a layer thinner than that may hide behind its Jacobian."""
+
+FORESEEN = 1.5
+"""The longest step, in units of the one before, whose middle is foreseen well enough to differentiate there."""
+
+STIFFER = 3.0
+"""How much larger than at the start of the step the foreseen derivatives may be."""
 
 SLOWEST_KNOWN = 0.02
 """Contraction never assumed better than this: a component that converges at once hides a slower one behind its first
@@ -100,12 +109,60 @@ def nested(k: int, top: int, x: float, row: Any) -> float:
 
 
 @compiled
-def differentiate_system(w: Any) -> bool:
-    """Evaluate G_y and G_ydot at the start of the step."""
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    set_inputs(w, w.vector[Y], w.vector[YDOT])
+def _differentiate(w: Any) -> None:
+    """Evaluate G_y and G_ydot at the inputs."""
     evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
     w.count[JACOBIANS] += 1
+
+
+@compiled
+def _differentiate_at_start(w: Any) -> None:
+    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
+    set_inputs(w, w.vector[Y], w.vector[YDOT])
+    _differentiate(w)
+
+
+@compiled
+def _row_sizes(w: Any, sizes: Any) -> None:
+    """Size of the equations of the core by their derivatives and the typical sizes of the states."""
+    for i in range(w.jacobian.shape[1]):
+        total = 0.0
+        for j in range(w.jacobian.shape[1]):
+            total += abs(w.jacobian[0, i, j]) * w.vector[SCALE, j]
+        sizes[i] = total
+
+
+@compiled
+def _stiffer(w: Any, known: Any, sizes: Any) -> bool:
+    """Whether the derivatives are far larger than known, or not finite."""
+    found = False
+    for i in range(w.jacobian.shape[1]):
+        found = found or not sizes[i] <= STIFFER * known[i]
+    return found
+
+
+@compiled
+def _differentiate_midway(w: Any, h: float) -> None:
+    """Evaluate G_y and G_ydot at the middle of the step as it is foreseen; at its start where the equations would be
+    far stiffer: a step through states that are foreseen wrongly must not pass for one that has converged.
+    """
+    known, sizes = w.vector[COLUMNS], w.vector[RHS]
+    _row_sizes(w, known)
+    set_stage(w, w.count[MEMBER] + 1, h)
+    _differentiate(w)
+    _row_sizes(w, sizes)
+    if _stiffer(w, known, sizes):
+        _differentiate_at_start(w)
+
+
+@compiled
+def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
+    """Evaluate G_y and G_ydot midway through the step where the first guess of its stages foresees that, else at its
+    start.
+    """
+    _differentiate_at_start(w)
+    if foresee and w.clock[OFFSET] == 1.0 and 0.0 < h <= FORESEEN * w.clock[H_LAST]:
+        _differentiate_midway(w, h)
     for part in range(2):
         for i in range(w.jacobian.shape[1]):
             if not finite(w.jacobian[part, i]):
@@ -127,7 +184,7 @@ def factor_newton(w: Any, h: float) -> bool:
             real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
     if chained and not fold_shifted(w, GAMMA[k] / h, real, w.real_border, w.real_bands):
         return False
-    if not factor(real, w.order[0], w.vector[SCALE], w.vector[DELTA], 0.0):
+    if not factor(real, w.order[0], w.vector[PIVOT], w.vector[DELTA], 0.0):
         return False
     for pair in range(k + 1):
         shift = PAIR_VALUES[k, pair] / h
@@ -136,7 +193,7 @@ def factor_newton(w: Any, h: float) -> bool:
                 pairs[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
         if chained and not fold_shifted(w, shift, pairs[pair], w.complex_border[pair], w.complex_bands[pair]):
             return False
-        if not factor(pairs[pair], w.order[1 + pair], w.vector[SCALE], w.vector[DELTA], 0.0):
+        if not factor(pairs[pair], w.order[1 + pair], w.vector[PIVOT], w.vector[DELTA], 0.0):
             return False
     return True
 
@@ -159,18 +216,24 @@ def predict(w: Any, h: float) -> None:
 
 
 @compiled
+def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
+    """Inputs of stage i from its slope."""
+    n = w.algebraic.shape[0]
+    # Local names spare the loops a look at the workspace after each store.
+    inputs, z, y, slopes = w.inputs, w.z[i], w.vector[Y], w.slopes[i]
+    inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[w.count[MEMBER], i] * h)
+    for m in range(n):
+        inputs[1 + m] = y[m] + z[m]
+        inputs[1 + n + m] = slopes[m] * rate
+
+
+@compiled
 def set_stage(w: Any, i: int, h: float) -> None:
     """Inputs of stage i."""
     k, n = w.count[MEMBER], w.algebraic.shape[0]
-    # Local names spare the loops a look at the workspace after each store.
-    inputs, z, y = w.inputs, w.z, w.vector[Y]
-    inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[k, i] * h)
-    for m in range(n):
-        slope = 0.0
-        for j in range(stage_count(k)):
-            slope += INVERSE[k, i, j] * z[j, m]
-        inputs[1 + m] = y[m] + z[i, m]
-        inputs[1 + n + m] = slope / h
+    address = w.slopes[i].ctypes.data
+    combine(INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, n, address)
+    _put_stage(w, i, h, 1.0 / h)
 
 
 @compiled
@@ -187,15 +250,14 @@ def end_of_step(w: Any, h: float, y: int, ydot: int, q: int) -> None:
 
 
 @compiled
-def _stage_residuals(w: Any, h: float) -> bool:
-    s = stage_count(w.count[MEMBER])
+def _stage_residuals(w: Any, h: float) -> None:
+    k, rate = w.count[MEMBER], 1.0 / h
+    s = stage_count(k)
     w.count[RESIDUALS] += s
+    combine(INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.algebraic.shape[0], w.slopes.ctypes.data)
     for i in range(s):
-        set_stage(w, i, h)
+        _put_stage(w, i, h, rate)
         evaluate(w, RESIDUAL, w.g[i].ctypes.data)
-        if not finite(w.g[i]):
-            return False
-    return True
 
 
 @compiled
@@ -204,33 +266,28 @@ def _correct(w: Any) -> float:
     k, n = w.count[MEMBER], w.algebraic.shape[0]
     s = stage_count(k)
     # Local names spare the loops a look at the workspace after each store.
-    real, pairs, g, z, weight = w.vector[DELTA], w.pairs, w.g, w.z, w.vector[WEIGHT]
-    for m in range(n):
-        total = 0.0
-        for i in range(s):
-            total -= REAL_ROW[k, i] * g[i, m]
-        real[m] = total
-    solve_real(w, real)
+    parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.vector[WEIGHT]
+    combine(TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
+    solve_real(w, parts[0])
     for pair in range(k + 1):
         for m in range(n):
-            value = 0.0j
-            for i in range(s):
-                value -= PAIR_ROWS[k, pair, i] * g[i, m]
-            pairs[pair, m] = value
+            pairs[pair, m] = complex(parts[1 + 2 * pair, m], parts[2 + 2 * pair, m])
         solve_complex(w, pair, pairs[pair])
-    norm = 0.0
-    for i in range(s):
         for m in range(n):
-            change = REAL_COLUMN[k, i] * real[m]
-            for pair in range(k + 1):
-                column, value = PAIR_COLUMNS[k, i, pair], pairs[pair, m]
-                change += column.real * value.real - column.imag * value.imag
+            parts[1 + 2 * pair, m], parts[2 + 2 * pair, m] = pairs[pair, m].real, pairs[pair, m].imag
+    combine(FROM_PARTS[k].ctypes.data, 7, s, s, parts.ctypes.data, n, g.ctypes.data)
+    norm = 0.0
+    for m in range(n):
+        largest = 0.0
+        for i in range(s):
+            change = g[i, m]
             z[i, m] += change
-            g[i, m] = change
-            size = abs(change) / weight[m]
             # Not max(): a NaN must reach the caller.
-            if not size <= norm:
-                norm = size
+            if abs(change) > largest or change != change:
+                largest = abs(change)
+        size = largest / weight[m]
+        if size > norm or size != size:
+            norm = size
     return norm
 
 
@@ -245,18 +302,20 @@ def solve_stages(w: Any, h: float) -> int:
     norm_last, rate_last = 0.0, 0.0
     w.clock[THETA] = 0.0
     for iteration in range(limit):
-        if not _stage_residuals(w, h):
-            return NOT_FINITE
+        _stage_residuals(w, h)
         norm = _correct(w)
         w.count[ITERATIONS] += 1
         w.count[TRIES] = iteration + 1
         if not norm < np.inf:
             return NOT_FINITE
-        if iteration > 0:
+        if iteration == 0:
+            w.clock[GUESSED] = norm
+        else:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
             if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > TIGHT:
+                w.clock[GUESSED] = 0.0
                 return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
             w.clock[THETA] = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)

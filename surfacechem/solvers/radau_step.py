@@ -17,6 +17,7 @@ from surfacechem.solvers.native import (
     CALM,
     DELTA,
     ERROR,
+    GUESSED,
     LOOSE,
     MEMBER,
     NOISE,
@@ -48,6 +49,9 @@ SHRINK = 0.1
 TINIEST = 1e-290
 MAGNIFIED = 10.0
 """Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
+CONTRACTING = 0.05
+"""Contraction of Newton's method aimed at: where it limits the step, a failure costs more than a smaller step."""
+LEAST_CONVERGENT = 0.5
 NOISY = 0.05
 """Error assumed where the estimate is noise, so that the step grows slowly."""
 
@@ -68,7 +72,7 @@ def set_weights(w: Any) -> None:
 @compiled
 def preferred_member(rtol: float) -> int:
     """Low order for loose tolerances, high order for tight ones."""
-    if rtol > 3e-5:
+    if rtol > 2e-5:
         return 0
     return 1 if rtol > 3e-12 else 2
 
@@ -145,6 +149,15 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     if h_last > 0.0 and norm < 1.0:
         factor = min(factor, factor * h / h_last * (norm_last / max(norm, 1e-12)) ** exponent)
     return h * min(GROWTH, max(SHRINK, factor))
+
+
+@compiled
+def convergent_size(w: Any, h: float) -> float:
+    """Step size at which Newton's method will contract as it should, if its contraction is like the square of the
+    step size; any where the first guess was good or rounding ended the iteration: then the contraction tells nothing.
+    """
+    theta = w.clock[THETA] if w.clock[GUESSED] > 1.0 else 0.0
+    return h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / theta)) if theta > 0.0 else np.inf
 
 
 @compiled

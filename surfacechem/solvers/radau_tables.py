@@ -15,6 +15,11 @@ from numpy.typing import NDArray
 
 STAGES = (3, 5, 7)
 
+EDGE = 1e-6
+"""The slopes of margins at both ends of a step are seen at this distance."""
+SCAN_POINTS = 17
+"""Points of a step of the highest order at which margins are examined."""
+
 
 def _padded(shape: tuple[int, ...], *members: tuple[Any, ...]) -> NDArray[Any]:
     """Stack the three tables, each s by s, s by p, ... in its own size, into one zero-padded array."""
@@ -244,6 +249,30 @@ def _probe_shape(nodes: NDArray[np.float64], x: float) -> NDArray[np.float64]:
     return np.asarray((product / product(x)).integ().coeffs[::-1][1:])
 
 
+def _scanned(k: int) -> NDArray[np.float64]:
+    """Fractions of the step, from its start, just inside its end, to its end; more points for higher orders."""
+    last = 4 * k + 7
+    inside = [EDGE, *(np.arange(1, last) / last), 1.0 - EDGE, 1.0]
+    return np.pad(inside, (0, SCAN_POINTS - len(inside)), constant_values=1.0)
+
+
+def _scan_table(nodes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Value and rate at the points of the polynomial through (0, 0), (c_j, z_j) per unit z_j, and, behind these, of
+    the shape of its error.
+    """
+    table = np.zeros((2, SCAN_POINTS, 8))
+    for j, c in enumerate(nodes):
+        others = np.append(np.delete(nodes, j), 0.0)
+        # As products: sums of powers would lose digits, and the end of the step is a node.
+        parts = (points[:, None] - others) / (c - others)
+        table[0, :, j] = parts.prod(axis=1)
+        for i, other in enumerate(others):
+            table[1, :, j] += np.delete(parts, i, axis=1).prod(axis=1) / (c - other)
+    table[0, :, len(nodes)] = np.polyval(np.append(_defect(nodes)[::-1], 0.0), points)
+    table[1, :, len(nodes)] = (1.0 - points[:, None] / nodes).prod(axis=1)
+    return table
+
+
 def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     """1 / (c_i - c_{i-level}) for divided differences of each level; level 0 divides by c_i."""
     table = np.zeros((7, 7))
@@ -253,6 +282,16 @@ def _inverse_gaps(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     return table
 
 
+def _real_rows() -> NDArray[np.float64]:
+    """T^-1 and T as real tables: a row, or a column, of the real eigenvector, then two of each pair."""
+    rows, columns = np.zeros((3, 7, 7)), np.zeros((3, 7, 7))
+    rows[:, 0], rows[:, 1::2], rows[:, 2::2] = REAL_ROW, PAIR_ROWS.real, PAIR_ROWS.imag
+    columns[:, :, 0], columns[:, :, 1::2], columns[:, :, 2::2] = REAL_COLUMN, PAIR_COLUMNS.real, -PAIR_COLUMNS.imag
+    return np.stack([-rows, columns])
+
+
+TO_PARTS, FROM_PARTS = _real_rows()
+"""From residuals to the right-hand sides of the decoupled systems, and from their solutions to the stages."""
 _members = [NODES[k, :s] for k, s in enumerate(STAGES)]
 START_RATE = np.array([np.pad(-_lagrange(c) * np.prod(-c), (0, 7 - len(c))) for c in _members])
 """Value at 0 of the Lagrange polynomials on c_1, ..., c_s: extrapolates stage rates to the start of the step."""
@@ -269,3 +308,8 @@ PROBE_RATE = np.array([_probe_rate(c, x) for c, x in zip(_members, PROBE, strict
 """Extrapolates the rates of the stages and of the start (last) to the probe."""
 PROBE_SHAPE = np.array([_newton(c, _probe_shape(c, x)) for c, x in zip(_members, PROBE, strict=True)])
 """Shape of a quadrature's error, per unit defect of its rate at the probe, in Newton's form."""
+SCANNED = np.array([_scanned(k) for k in range(len(STAGES))])
+"""Points of a step at which margins are examined."""
+_scans = np.array([_scan_table(c, x) for c, x in zip(_members, SCANNED, strict=True)])
+SCAN_VALUES, SCAN_RATES = np.ascontiguousarray(_scans[:, 0]), np.ascontiguousarray(_scans[:, 1])
+"""State and rate at these points from the stages and, behind them, the correction of the polynomial."""

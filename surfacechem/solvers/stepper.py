@@ -16,6 +16,7 @@ from surfacechem.kernelcache import compile_kernel, is_filled, kernel_folder
 _SOURCES = (
     "contract",
     "native",
+    "combining",
     "lu",
     "chains",
     "noise",
@@ -91,10 +92,10 @@ class _Loaded:
 
 def run_batch() -> Any:
     """The compiled loop over a batch of runs, or of states to be made consistent."""
-    with _LOCK:
-        if _Loaded.kernel is None:
-            _Loaded.kernel = _compiled()
-        return _Loaded.kernel
+    if _Loaded.kernel is None:
+        with _LOCK:
+            _Loaded.kernel = _Loaded.kernel or _compiled()
+    return _Loaded.kernel
 
 
 def load_briefly() -> None:
