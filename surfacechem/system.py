@@ -289,10 +289,12 @@ class System:
     def local(self, expressions: Sequence[Expression]) -> list[Expression]:
         """Expanded expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
-        shift = {self.t: self.t + start} | {
-            self.parameters[j].symbol: self.parameters[j].symbol + start for j in self.origins
-        }
-        return [symengine.sympify(self.expand(item)).subs(shift) for item in expressions]
+        origins = [self.parameters[j].symbol for j in self.origins]
+        # What counts from an origin does so in either time; shifted both ways it would be rounded to digits of t.
+        lapses = {self.t - origin: symengine.Dummy() for origin in origins}
+        shift = {symbol: symbol + start for symbol in (self.t, *origins)}
+        back = {dummy: lapse for lapse, dummy in lapses.items()}
+        return [symengine.sympify(self.expand(item)).subs(lapses).subs(shift).subs(back) for item in expressions]
 
     @cached_property
     def origins(self) -> list[int]:

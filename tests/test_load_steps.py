@@ -7,7 +7,7 @@ from scenes import bodies
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
 from surfacechem.integrate import Model, Run
-from surfacechem.laws.contact import NormalStiffness, TangentialStiffness
+from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.laws.rate_and_state import RateAndStateAging
@@ -78,3 +78,16 @@ def test_what_creeps_is_carried_along():
     np.testing.assert_allclose(held(trajectory, "v"), 2e-6 * np.sinh(drive) * np.exp(-strength), rtol=1e-11)
     assert audit(trajectory).findings == ()
     assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize("begin", [0.0, 14.584101652239939, 36.0])
+def test_a_late_pulse_is_as_sharp_as_an_early_one(begin):
+    """One digit of the time is up to a millionth of the pulse; in a time of its own nothing is lost in it."""
+    times = begin + np.array([0.0, 1e-9, 2e-9])
+    pulse = Table(times=times.tolist(), values=[0.0, -1e9, 0.0])
+    trajectory = solved(
+        Interface("T", [Penalty(E_n=1e15)]), {"w_n": Hold(level=0.0), "F_n": pulse}, {"normal": Mounting(k=1e9)}
+    )
+    books = audit(trajectory)
+    assert books.energy_scale == pytest.approx(0.5 * 1e18 / 1e15, rel=1e-5)
+    assert books.energy_error < 1e-11

@@ -122,7 +122,7 @@ def test_random_scenes(seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [1019, 2011, 7012, 8028, 11002, 11028, 14017, 18006, 20005, 22021, 25001, 25022, 29005, 32022, 34015]
+    "seed", [1019, 2011, 7012, 8028, 11002, 11028, 14017, 18006, 20005, 20037, 22021, 25001, 25022, 29005, 32022, 34015]
 )
 def test_scenes_that_once_ended_untruly(seed):
     check(seed)
