@@ -25,8 +25,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 EXPLAINED = Path(__file__).with_name("mutation_survivors.toml")
-ASSEMBLY = ("equations", "exchange", "force", "gap", "mounting", "slip", "totals")
-BALANCES = ["surfacechem/balances.py", *(f"surfacechem/assembly/{name}.py" for name in ASSEMBLY)]
+MODULES = ("surfacechem/balances.py", "surfacechem/assembly/*.py", "surfacechem/laws/*.py")
 SIGNS = ("ReplaceBinaryOperator_Add_Sub", "ReplaceBinaryOperator_Sub_Add", "ReplaceUnaryOperator_Delete_USub")
 FACTORS = ("ReplaceBinaryOperator_Mul_Div", "ReplaceBinaryOperator_Div_Mul")
 LONGEST = 600
@@ -38,6 +37,7 @@ OF_BALANCES = [
     ["tables", "tables_bonds", "tables_mechanics"],
     ["paces", "events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
+    ["folds", "breaking", "bounds", "pulled", "media", "first_trials", "instants", "reactor", "evaluated"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],
@@ -183,15 +183,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--factors", action="store_true", help="mutate * and / too")
     parser.add_argument("--jobs", type=int, default=2, help="mutants at a time")
-    parser.add_argument("modules", nargs="*", help="files instead of all balances and laws")
+    parser.add_argument("modules", nargs="*", help="files instead of all balances, assembly and laws")
     choice = parser.parse_args()
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
     prepare()
-    paths = choice.modules or [
-        *BALANCES,
-        *(f"surfacechem/laws/{p.name}" for p in Path("surfacechem/laws").glob("*.py")),
-    ]
+    paths = choice.modules or [str(path) for pattern in MODULES for path in Path().glob(pattern)]
     every = [m for path in sorted(paths) for m in mutants(path, SIGNS + FACTORS * choice.factors)]
     why, start, bad = explained(), time.perf_counter(), 0
     with ThreadPoolExecutor(choice.jobs) as pool:
