@@ -150,6 +150,8 @@ def advance(
             singular += 1
             if singular > 12:
                 return SINGULAR, h, 0.0, h
+            w.count[FRESH] = INVALID
+            failed = True
             h *= 0.37
             continue
         outcome = solve_stages(w, h)

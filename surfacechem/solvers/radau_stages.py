@@ -124,11 +124,13 @@ def _differentiate_at_start(w: Any) -> None:
 
 @compiled
 def _row_sizes(w: Any, sizes: Any) -> None:
-    """Size of the equations of the core by their derivatives and the typical sizes of the states."""
+    """Size of the equations of the core by their derivatives and the typical sizes of the states; NaN where they or
+    those by the rates are not finite.
+    """
     for i in range(w.jacobian.shape[1]):
         total = 0.0
         for j in range(w.jacobian.shape[1]):
-            total += abs(w.jacobian[0, i, j]) * w.vector[SCALE, j]
+            total += abs(w.jacobian[0, i, j]) * w.vector[SCALE, j] + 0.0 * w.jacobian[1, i, j]
         sizes[i] = total
 
 
