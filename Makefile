@@ -54,7 +54,7 @@ coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 
-mutation: $(TOOLS)  ## a sign of each balance and law is changed, and a test has to fail
+mutation: $(TOOLS)  ## each sign of balances, assembly and laws is changed, and a test has to fail
 	$(BIN)/pip install --quiet --editable '.[mutation]'
 	$(BIN)/python tests/mutation.py
 

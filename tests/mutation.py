@@ -1,4 +1,4 @@
-"""Mutation test: one sign of a balance or of a law is changed, and a test has to fail.
+"""Mutation test: one sign of a balance, of the assembly or of a law is changed, and a test has to fail.
 
     python tests/mutation.py [--factors] [--jobs N] [module ...]
 

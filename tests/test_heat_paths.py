@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scenes
 import tables
-from scenes import bodies, path
+from scenes import bodies, path, varying
 
 from surfacechem.achieved import computed
 from surfacechem.assembly import assemble
@@ -24,6 +24,7 @@ from surfacechem.laws.contact_conductance import (
     PressureConductance,
     PressureTable,
 )
+from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.gap_conductance import GapConductance, GapTable, GasGap
 from surfacechem.laws.heat import Conductance, Radiation
@@ -253,6 +254,14 @@ def test_a_table_that_refuses_to_be_extrapolated_ends_the_run():
     assert trajectory.status == "stopped"
     assert trajectory.result.t == pytest.approx(3.0, rel=1e-6)
     assert "p left the range of the law pressure-table, 0 to 3e+06" in trajectory.reason
+
+
+def test_the_ends_of_a_range_belong_to_it():
+    """A pressure at the end of a table, and an emissivity of one that varies with the bonds, all of which are there."""
+    table = PressureTable(between=ENDS, extrapolation="refuse", **PRESSURES)
+    black = Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=varying(1.0, Proportional(of="phi")))
+    trajectory = solved(direct([table, black], {"p": Hold(level=3e6), "phi": Hold(level=1.0)}), 0.0, 2.0)
+    assert trajectory.status == "finished"
 
 
 def test_a_correlation_outside_its_range_says_so():

@@ -1,6 +1,7 @@
 """Loads that are easy to miss, and limits in which two models must agree."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from surfacechem.integrate import Model, Run
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity, NormalStiffness
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.kinetics import ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.scene import Body, Interface, Scene
@@ -176,3 +177,14 @@ def test_fluxes_between_unequal_bodies_follow_the_exact_identity():
     T_1, T_2, q_m, q_t = (final(trajectory, name) for name in ("T_1", "T_2", "q_m", "q_t"))
     h = 1 / (1 / h_1 + 1 / h_2)
     assert q_t == pytest.approx(h * (T_2 - T_1) + (h_1 - h_2) / (h_1 + h_2) * q_m, rel=1e-9)
+
+
+def test_a_pressure_may_grow_from_nothing():
+    """C (T^2 - T_0^2) / 2 T_0 = mu_k p t v / 2, for a law that ends below p = 0."""
+    friction = Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3)
+    loading = {"p": Ramp(start=0.0, rate=1e4), "v": Hold(level=1.0)}
+    pair = bodies("T", "T", C_1=50.0, C_2=50.0)
+    scene = Scene(pair, Interface("T", frictions=[friction]), loading=loading, T_0=300.0, initial={"T": 300.0})
+    trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1.0]))
+    assert trajectory.status == "finished"
+    assert trajectory.result.y[0] == pytest.approx(math.sqrt(300.0**2 + 2 * 300.0 * 2000.0 / 100.0), rel=1e-10)
