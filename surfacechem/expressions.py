@@ -190,9 +190,24 @@ def _half(x: Expression, exponent: Expression) -> Expression:
     return -0.5 * expm1(-2 * x) * exp(x + exponent)
 
 
+def norm(x: Expression, y: Expression) -> Expression:
+    """Length of a vector; its derivatives are zero where it has none.
+
+    >>> norm(3.0, 4.0), norm(0.0, 0.0)
+    (5.0, 0.0)
+    """
+    square = x**2 + y**2
+    return where(square > 0, sqrt(square), 0) if is_symbolic(square) else math.hypot(x, y)
+
+
 def sin(x: Expression) -> Expression:
     """Sine of an angle in radians."""
     return _engine(x).sin(x)
+
+
+def cos(x: Expression) -> Expression:
+    """Cosine of an angle in radians."""
+    return _engine(x).cos(x)
 
 
 def sign(x: Expression) -> Expression:

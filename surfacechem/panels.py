@@ -34,7 +34,7 @@ KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K", r"(?!.*_exact$).*"),
     ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|.*_exact$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
     ("Gap", "m", r"g_(?!.*_exact$)\w*"),
-    ("Displacement", "m", r"u_t"),
+    ("Displacement", "m", r"u_t2?"),
     ("Velocity", "m s-1", r"(?!.*_exact$)\w+"),
     ("Traction", "Pa", r"(?!.*_exact$|.*_nominal$).*"),
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_exact$|.*_nominal$)\w+"),

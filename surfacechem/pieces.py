@@ -52,3 +52,5 @@ def start_modes(system: System, parameters: Array, values: Mapping[str, float]) 
         if mode.start is not None:
             start = float(system.expand(mode.start).subs(initial))
             parameters[:, symbols.index(mode.symbol)] = start
+        if mode.given is not None:
+            parameters[:, symbols.index(mode.symbol)] = mode.given(values)

@@ -220,5 +220,7 @@ class Scene:
     """How the normal gap is held, where it moves by a balance."""
     tangential: Mounting | None = None
     """How the tangential displacement is held, where it moves by a balance."""
+    transverse: Mounting | None = None
+    """How the displacement across it is held, where not as ``tangential``; the mass is the same."""
     programme: Sequence[Stage] = ()
     """Stages of the loading, one after the other."""

@@ -175,7 +175,11 @@ def _neighbours() -> Schema:
 
 def _mechanics() -> Schema:
     mounting = _object({name: _parameter(spec) for name, spec in Mounting.specs()})
-    texts = {"normal": "how the normal gap is held", "tangential": "how the tangential displacement is held"}
+    texts = {
+        "normal": "how the normal gap is held",
+        "tangential": "how the tangential displacement is held",
+        "transverse": "how the displacement across it is held, where not alike; its mass is that of tangential",
+    }
     return _object({name: {**mounting, "description": text} for name, text in texts.items()})
 
 

@@ -41,7 +41,14 @@ LOST_HEAT = 1e-9
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
 
-DATASET_NAMES = {"Q_1": "Q_ext_1", "Q_2": "Q_ext_2", "Q_c": "Q_ext_c", "W_n": "work_n", "W_t": "work_t"}
+DATASET_NAMES = {
+    "Q_1": "Q_ext_1",
+    "Q_2": "Q_ext_2",
+    "Q_c": "Q_ext_c",
+    "W_n": "work_n",
+    "W_t": "work_t",
+    "W_t2": "work_t2",
+}
 """Names that differ in the dataset, where no two may be the same but for their case."""
 
 

@@ -71,7 +71,9 @@ class BodyEnergy(Law):
 class Friction(Law):
     """Tangential traction [Pa] while sliding, with the sign of sliding; dissipates traction * v >= 0.
 
-    A law that jumps at v = 0 reads ``direction``, the sign of v, and states as ``limit`` what it can bear at rest.
+    A law that jumps at v = 0 reads ``direction``, the sign of v, and states as ``limit`` what it can bear at rest. In
+    the plane ``direction`` and ``direction_2`` are the components of the unit vector of sliding, and a law without
+    ``transverse`` resists along it, by its traction at the speed of sliding.
     """
 
     contract = "friction"
@@ -91,7 +93,9 @@ class Friction(Law):
     driven: ClassVar[Callable[..., Expression]]
     """Traction by that number [Pa]."""
     transverse: ClassVar[Callable[..., Expression]]
-    """Traction across v, along the interface [Pa]; absent where a law has none."""
+    """Traction across v, along the interface [Pa]; absent where a law is the same in all directions."""
+    transverse_limit: ClassVar[Callable[..., Expression]]
+    """What sticking bears across v alone [Pa], half an axis of an ellipse; absent where a law has no ``transverse``."""
     evolution: ClassVar[Callable[..., Mapping[str, Expression]]]
     """Rates of the law's own variables [1/s]; absent where it has none."""
 

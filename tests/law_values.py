@@ -39,7 +39,7 @@ MORE_UNITS = {
     "N_c": "1/m^2",
     "x": "K",
 }
-SIGNED = {"v", "v_2", "v_n", "v_t", "g_n", "g_t", "u_t", "f", "mu", "t_n", "dmu_dphi", "direction"}
+SIGNED = {"v", "v_2", "v_n", "v_t", "g_n", "g_t", "u_t", "f", "mu", "t_n", "dmu_dphi", "direction", "direction_2"}
 AT = {"times": 1.0, "pressures": 1e5, "gaps": 1e-9}
 LISTS = {name: (0.0, 0.8 * size, 1.6 * size) for name, size in AT.items()}
 LISTS |= dict.fromkeys(("values", "conductances"), (1.0, 2.5, 0.5))

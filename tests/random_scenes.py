@@ -1,5 +1,6 @@
 """Random scenes from one seed: laws drawn from all there are, ways to hold the gap, loads, programmes, temperatures."""
 
+from dataclasses import replace
 from functools import cache
 
 from random_laws import T_0, Dice
@@ -17,7 +18,8 @@ from surfacechem.substances import Property
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Potential, RateLaw, Varying, reads
 
 MEDIUM = ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m", "p_m", "d_m", "f_m")
-OWN = {"T_from", "T_to", "mu", "dmu_dphi", "ln_theta", "bonded", "softening", "direction", "sticking", "v_n"}
+OWN = {"T_from", "T_to", "mu", "dmu_dphi", "ln_theta", "bonded", "softening", "direction", "direction_2", "sticking"}
+OWN |= {"v_n"}
 OWN |= {"T_c", "T_0", "N_c", "n_c", "n_1", "n_2", *MEDIUM}
 """What a scene gives without being asked for it."""
 
@@ -50,6 +52,8 @@ class Composer:
 
     def __init__(self, seed: int) -> None:
         self.dice = Dice(seed)
+        self.aside = Dice(seed)
+        self.aside.random.seed(f"across {seed}")
         self.potentials: list[Law] = []
         self.frictions: list[Law] = []
         self.reactions: list[Law] = []
@@ -104,6 +108,7 @@ class Composer:
         self._prescribed()
         programme = self._programme()
         self._start()
+        mounts |= self._across(mounts)
         sites, medium = self.mechanism.sites if self.mechanism else self.sites, self._medium()
         laws_of = {"limits": self.limits, "partition": dice.random.random(), "medium": medium}
         reading = (self.potentials, self.frictions, self.reactions)
@@ -268,9 +273,27 @@ class Composer:
             self.loading["u_t"] = dice.history(dice.near(dice.length))
         return found
 
+    def _across(self, mounts: dict[str, Mounting]) -> dict[str, Mounting]:
+        """Now and then what moves along the interface moves across it, too; by dice of its own."""
+        dice = self.aside
+        bound = "g_t" in self.asked() or any(law.internal for law in self.frictions)
+        if self.slip not in ("moving", "dead") or bound or dice.chance(0.4):
+            return {}
+        dry = [law for law in laws(Friction).values() if hasattr(law, "transverse_limit")]
+        if any("p" in asked(law) for law in self.frictions) and dice.chance(0.5):
+            self.frictions = [dice.law(dice.pick(*dry))]
+        if self.slip == "dead":
+            self.loading["F_t2"] = dice.history(dice.near(dice.traction, 1.5))
+            return {}
+        self.loading["w_t2"] = dice.history(dice.near(dice.length))
+        if mounts["tangential"].m and dice.chance(0.5):
+            self.initial |= {v: dice.signed(dice.near(dice.length / dice.end)) for v in ("v", "v_2")}
+        return {"transverse": replace(self._mounting(), m=0.0)} if dice.chance(0.2) else {}
+
     def _prescribed(self) -> None:
         """What is read and has no role yet; heat and area stretch now and then."""
         dice, needs = self.dice, self.asked()
+        needs |= {"v", "v_2"} if "direction_2" in needs else set()
         sizes = {"v": dice.length / dice.end, "v_2": dice.length / dice.end, "g_t": dice.length, "g_n": dice.length}
         positive = self._needs_open_gap()
         moves = {"moving", "dead", "rigid"}

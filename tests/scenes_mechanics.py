@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from scenes import SITES, bodies, path, varying
 
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
+from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
@@ -215,6 +216,47 @@ def bonding_slider() -> Scene:
 ELASTIC = TangentialStiffness(E_t=varying(1e12, LinearInTemperature(slope=-1e-3)))
 
 
+ACROSS = {"w_t2": Ramp(start=-2e-6, rate=5e-4)}
+
+
+def plane_slider() -> Scene:
+    """A mass on springs along and across, on friction that differs in the two directions."""
+    friction = AnisotropicCoulomb(mu_1=varying(0.2, Power(exponent=-1.0)), mu_2=0.5)
+    return _slider(
+        Mounting(k=1e8, m=10.0, c_b=200.0, c_g=100.0, beta_1=0.7),
+        [friction, Viscous(eta=1e-3)],
+        loading={"g_n": Hold(level=1e-6)} | ACROSS,
+        initial={"v": 2e-3, "v_2": -1e-3},
+        transverse=Mounting(k=3e8, c_b=50.0),
+    )
+
+
+def plane_damped_slider() -> Scene:
+    """Springs and dampers along and across, under a traction too."""
+    return _slider(Mounting(k=1e12, c_b=1e7, c_g=1e6), [Coulomb(mu=0.4, mu_s=0.6)], loading=PULL | ACROSS)
+
+
+def plane_bonding_slider() -> Scene:
+    """A mass that breaks bonds as it slides in the plane."""
+    return _slider(
+        Mounting(k=1e8, m=10.0),
+        [BondedCoulomb(mu=0.3, mu_b=0.7, mu_ub=0.4), Stribeck(mu_s=0.1, mu_k=0.05, v_s=1e-3)],
+        [BondEnergy(K_0=10.0)],
+        interface={"reactions": [LinearAffinity(c_r=1e16)], "sites": SITES},
+        loading={"F_t2": Hold(level=2e3)} | ACROSS,
+        initial={"phi": 0.2, "v": 2e-3},
+    )
+
+
+def plane_film() -> Scene:
+    """A film that resists differently along and across, beside a damper."""
+    loading = {"g_n": Hold(level=1e-6), "w_t": Ramp(rate=1e-3)} | ACROSS
+    film = AnisotropicViscous(eta_1=varying(0.05, Exponential(beta=0.01)), eta_2=0.1)
+    interface = Interface(None, [], [film], partition=0.3)
+    initial = APART | {"u_t2": 1e-6}
+    return Scene(bodies(), interface, (), loading, T_0=300.0, initial=initial, tangential=Mounting(k=1e10, c_b=10.0))
+
+
 def elastic_inertial_slider() -> Scene:
     """Elastic sticking on a mass."""
     return _slider(Mounting(k=1e8, m=10.0, c_b=50.0), [Coulomb(mu=0.4, mu_s=0.6)], [ELASTIC], initial={"v_t": 1e-3})
@@ -323,6 +365,10 @@ ALL = [
     Moving(film_slider),
     Moving(stribeck_slider, SLIDING),
     Moving(bonding_slider, SLIDING),
+    Moving(plane_slider, SLIDING[:2]),
+    Moving(plane_damped_slider, SLIDING[:2]),
+    Moving(plane_bonding_slider, SLIDING[:2]),
+    Moving(plane_film),
     Moving(elastic_inertial_slider, SLIDING),
     Moving(elastic_damped_slider, SLIDING),
     Moving(elastic_quasi_static_slider, SLIDING),

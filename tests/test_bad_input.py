@@ -90,7 +90,7 @@ MISTAKES = [
     (
         "loading: {v:",
         "loading: {w:",
-        "17: loading: unknown key 'w'. Known: F_n, F_t, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v, v_2,",
+        "17: loading: unknown key 'w'. Known: F_n, F_t, F_t2, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v,",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),

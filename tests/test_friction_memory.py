@@ -169,12 +169,3 @@ def test_a_soft_mounting_tears_the_interface_open():
     jump = debonded(trajectory)[-1]
     assert jump.released == pytest.approx(0.5 * 1e6**2 * (1 / 1e13 + 1 / 1e14), rel=1e-9)
     assert jump.verdict == "admissible"
-
-
-def test_two_directions_need_both_velocities():
-    interface = Interface("T", frictions=[AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)])
-    loading = {"p": Hold(level=1.0), "w_t": Hold(level=0.0), "v_2": Hold(level=1.0)}
-    mount = Mounting(k=1e6, m=1.0)
-    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial={"T": 300.0}, tangential=mount)
-    with pytest.raises(InputError, match="resists in two directions"):
-        assemble(scene)

@@ -14,6 +14,7 @@ CASES = {
     "debonding": 1e-12,
     "debonding-cooling": 1e-12,
     "coulomb-stop": 1e-8,
+    "anisotropic-slide": 1e-7,
     "stick-slip": 1e-7,
     "stick-slip-debonding": 1e-7,
     "stick-slip-rebonding": 1e-7,

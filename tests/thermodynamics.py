@@ -63,7 +63,7 @@ def start_point(system: System, seed: int, modes: Mapping[str, float] | None = N
         )
         point[state.symbol] = mpmath.mpf(min(inside, 0.95) if state.scale == 1.0 else inside)
         point[state.dot] = mpmath.mpf(0)
-        if state.name == "v" and "slip" in (modes or {}):
+        if state.name in ("v", "speed") and "slip" in (modes or {}):
             point[state.symbol] *= mpmath.mpf(modes["slip"])
     return point
 

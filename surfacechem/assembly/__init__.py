@@ -21,8 +21,8 @@ from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
-from surfacechem.assembly.slip import tangential_gap, tangential_motion
 from surfacechem.assembly.softening import softening_mode
+from surfacechem.assembly.tangential import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
 from surfacechem.assembly.touch import touch

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import symengine
@@ -111,11 +111,12 @@ class Build(Draft):
         words: Mapping[float, str],
         start: Expression | None = None,
         waits: Mapping[float, str] | None = None,
+        given: Callable[[Mapping[str, float]], float] | None = None,
     ) -> Any:
         """A discrete variable; its symbol is a parameter that only transitions change."""
         spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in words.items()))
         symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
-        self.modes.append(Mode(name, symbol, initial, words, start, waits or {}))
+        self.modes.append(Mode(name, symbol, initial, words, start, given, waits or {}))
         return symbol
 
     @property

@@ -43,15 +43,16 @@ class Motion:
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)
     """Rates of the variables that a programme moves."""
-    slip: Any = None
-    """What determines the tangential motion, where it moves by a balance."""
-    slides_by: Any = None
-    """The variable that the balance of tangential tractions determines, where sliding has no inertia."""
+    slips: tuple[Any, ...] = ()
+    """What determines the tangential motion in each direction in which it moves by a balance."""
+    slides_by: dict[str, Any] = field(default_factory=dict)
+    """The variables that the balances of tangential tractions determine, where sliding has no inertia, by velocity."""
     creeping: Any = None
     """The friction law whose traction is the variable of sliding, where that is not the velocity."""
-    sliding_tractions: list[Expression] = field(default_factory=list)
-    stick_limit: Expression | None = None
-    """Tangential traction that sticking can bear."""
+    sliding_tractions: dict[str, Expression] = field(default_factory=dict)
+    """Traction that resists sliding along each direction, by axis."""
+    stick_limits: dict[str, Expression] = field(default_factory=dict)
+    """Tangential traction that sticking can bear along each direction, by axis."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
 

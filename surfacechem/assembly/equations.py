@@ -9,6 +9,7 @@ import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.folds import determinant
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
@@ -182,12 +183,17 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
-    """Slope of a balance of heat with temperature as a sliding velocity that has no inertia follows it."""
-    v = build.motion.slides_by
-    if v is None or not depends(heat, v):
-        return derivative(heat, T)
-    tractions = build.expanded(build.rows[str(v)])
-    return derivative(heat, T) - derivative(heat, v) * derivative(tractions, T) / derivative(tractions, v)
+    """Slope of a balance of heat with temperature as a motion that has no inertia follows it."""
+    following, slope = list(build.motion.slides_by.values()), derivative(heat, T)
+    if not any(depends(heat, x) for x in following):
+        return slope
+    tractions = [build.expanded(build.rows[str(x)]) for x in following]
+    A = [[derivative(row, x) for x in following] for row in tractions]
+    moved = [derivative(row, T) for row in tractions]
+    for j, x in enumerate(following):
+        turned = [[*row[:j], change, *row[j + 1 :]] for row, change in zip(A, moved, strict=True)]
+        slope -= derivative(heat, x) * determinant(turned) / determinant(A)
+    return slope
 
 
 def _recovered_heat(build: Build, node: Node, rates: Mapping[Any, Expression]) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 import symengine
 
 from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.memory import memory
-from surfacechem.assembly.slip import stick_limit
+from surfacechem.assembly.mounting import ACROSS, Direction
+from surfacechem.assembly.resistance import resist, resistance, stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, positive
@@ -25,19 +26,21 @@ def friction(build: Build) -> None:
         bound = build.bound(law)
         memory(build, law, bound)
         pressed = _pressed(build, law)
-        formula = bound.driven if law is build.motion.creeping else bound.statement
-        traction = build.variables.call(bound, formula, pressed)
+        resisted = resistance(build, law, bound, pressed)
         build.law_margins(law, {}, met=pressed)
-        traction = build.name(Quantity(f"t_{label}", "Pa", f"tangential traction of {law.title}"), traction)
-        v = build.variables.get("v", law)
-        power = build.stretch * traction * v + _across(build, law, bound, label, pressed)
+        power = symengine.Integer(0)
+        for d, traction in resisted.items():
+            across = " across v" if d is ACROSS else ""
+            quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
+            nominal = build.stretch * build.name(quantity, traction)
+            power += nominal * build.variables.get(d.velocity, law)
+            resist(build, d, nominal)
         build.frictions.add(label)
         build.dissipation[label] = power
-        if build.motion.slip is None:
+        if not build.motion.slips:
             build.supply(f"W_{label}", f"work done against {law.title}", power, None)
-            _reversal(build)
+            _reversal(build, resisted)
         else:
-            build.motion.sliding_tractions.append(build.stretch * traction)
             stick_limit(build, law, bound, pressed)
 
 
@@ -48,25 +51,11 @@ def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
     return {"p": positive(build.variables.get("p", law))}
 
 
-def _across(build: Build, law: Friction, bound: Friction, label: str, pressed: dict[str, Expression]) -> Expression:
-    """Power of the traction across v, where the law has one."""
-    if not hasattr(bound, "transverse"):
-        return symengine.Integer(0)
-    if build.motion.slip is not None:
-        raise InputError(
-            f"{law.name()} resists in two directions, but a mounting moves the interface in one: across it there is no "
-            "displacement, and no limit of sticking that both share. Prescribe `v` and `v_2` under `loading`, or give "
-            "the law of the direction that moves: `coulomb` or `viscous`.",
-            law.place,
-        )
-    traction = build.variables.call(bound, bound.transverse, pressed)
-    quantity = Quantity(f"t_2_{label}", "Pa", f"tangential traction of {law.title} across v")
-    return build.stretch * build.name(quantity, traction) * build.variables.get("v_2", law)
-
-
-def _reversal(build: Build) -> None:
-    if build.slope_of("v") != 0 and not any(margin.name == "v" for margin in build.margins):
-        build.margins.append(Margin("v", symengine.Symbol("v"), "sliding reverses", terminal=False))
+def _reversal(build: Build, directions: Collection[Direction]) -> None:
+    for v in (d.velocity for d in directions):
+        if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
+            reason = "sliding reverses" if len(directions) == 1 else f"{v} changes its sign"
+            build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
 
 
 def heat_paths(build: Build) -> None:

@@ -95,7 +95,7 @@ def _rise(build: Build, e: Equilibrium) -> Expression:
 
 def _size(build: Build, e: Equilibrium, own: Expression) -> Expression:
     """What the stiffness of a gap is compared with [Pa/m]."""
-    far = build.motion.far_fields.get(e.state[-1])
+    far = build.motion.far_fields.get(e.state.partition("_")[2])
     if far is not None and far.k != 0:
         return far.k + absolute(far.k - own)
     g = absolute(symengine.Symbol(e.state))

@@ -32,8 +32,10 @@ LOADABLE = (
     "Q_c",
     "w_n",
     "w_t",
+    "w_t2",
     "F_n",
     "F_t",
+    "F_t2",
     "u_t",
 )
 """Variables that a case may prescribe, beside the temperatures."""

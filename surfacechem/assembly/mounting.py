@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import symengine
 
@@ -18,7 +18,29 @@ from surfacechem.terms import Law, Varying, reads
 LENGTH = 1e-6
 """Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
 
-AXES = {"n": "normal gap", "t": "tangential displacement"}
+AXES = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
+KEYS = {"n": "normal", "t": "tangential", "t2": "transverse"}
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction along the interface: the names of what moves along it."""
+
+    axis: str
+    velocity: str
+    cosine: str
+    """Component of the direction of sliding."""
+    traction: str
+    total: str
+    text: str
+
+    @property
+    def displacement(self) -> str:
+        return f"u_{self.axis}"
+
+
+ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
+ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
 
 
 @dataclass(frozen=True)
@@ -28,10 +50,12 @@ class Held:
     law: Mounting
     axis: str
     by: str
+    beside: Held | None = None
+    """The mounting whose mass this one has, and all else where it is given for both."""
 
     @property
     def inertial(self) -> bool:
-        return self.law.m > 0
+        return self.beside.inertial if self.beside else self.law.m > 0
 
     @property
     def damped(self) -> bool:
@@ -45,7 +69,7 @@ class Held:
 def held(build: Build, axis: str) -> Held | None:
     """The mounting of a direction; a far-field traction alone is a dead load."""
     scene = build.scene
-    law = scene.normal if axis == "n" else scene.tangential
+    law: Mounting | None = getattr(scene, KEYS[axis])
     if law is not None:
         if not (law.k or law.m or law.c_b or law.c_g or pulled(build, axis)):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
@@ -55,9 +79,25 @@ def held(build: Build, axis: str) -> Held | None:
     return None
 
 
+def held_across(build: Build, along: Held) -> Held | None:
+    """The mounting across a tangential one where the scene moves there: its own, else the same."""
+    law = build.scene.transverse
+    if law is not None:
+        if law.m:
+            raise InputError("a mass is the same in every direction. Give `m` under `tangential`.", law.place)
+        return Held(law, "t2", law.path, along)
+    given = any(_driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
+    if given or any(hasattr(friction, "transverse") for friction in build.interface.frictions):
+        return Held(along.law, "t2", along.by, along)
+    return None
+
+
 def pulled(build: Build, axis: str) -> bool:
     """Whether a history or the programme gives a far-field traction."""
-    name = f"F_{axis}"
+    return _driven(build, f"F_{axis}")
+
+
+def _driven(build: Build, name: str) -> bool:
     return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
 
 
@@ -152,9 +192,7 @@ def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
 def far_field(build: Build, mount: Held) -> FarField:
     """The mounting with symbols for its parameters; made once."""
     if mount.axis not in build.motion.far_fields:
-        law = build.variables.bind(
-            mount.law, f"mechanics.{'normal' if mount.axis == 'n' else 'tangential'}", f"_{mount.axis}"
-        )
+        law = _bound(build, mount)
         w, F = f"w_{mount.axis}", f"F_{mount.axis}"
         given = build.variables.has(w)
         needed = law.k != 0 or law.c_b != 0
@@ -166,3 +204,14 @@ def far_field(build: Build, mount: Held) -> FarField:
         )
     far: FarField = build.motion.far_fields[mount.axis]
     return far
+
+
+def _bound(build: Build, mount: Held) -> Mounting | FarField:
+    """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
+    if mount.beside is None:
+        return build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+    first = far_field(build, mount.beside)
+    if mount.law is mount.beside.law:
+        return first
+    law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+    return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)

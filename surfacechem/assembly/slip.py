@@ -1,4 +1,4 @@
-"""The tangential motion: exact or elastic sticking, sliding, and what passes from one to the other.
+"""Tangential motion in one direction: exact or elastic sticking, sliding, and what passes from one to the other.
 
 Exact sticking holds the displacement; elastic sticking lets the elastic gap take it up. Sliding is inertial, resisted
 by something that depends on its rate, or rate-independent, in which case the traction itself determines it.
@@ -6,8 +6,6 @@ by something that depends on its rate, or rate-independent, in which case the tr
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import symengine
@@ -15,83 +13,49 @@ import symengine
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.creep import creeping_law, driven_sliding
-from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
-from surfacechem.errors import InputError, Place
+from surfacechem.assembly.kinds import PLACE, Kind
+from surfacechem.assembly.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
-from surfacechem.terms import Friction, reads
 from surfacechem.transitions import Equilibrium, Transition
 
 NONE = symengine.Integer(0)
-PLACE = Place(path="mechanics.tangential")
 CREEP = 1e-25
 """Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
+UNSTABLE = (
+    "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
+    "resists; a mass or a viscous resistance would give one"
+)
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What determines the tangential motion of a scene."""
-
-    mount: Held | None
-    """None where the displacement is prescribed."""
-    elastic: bool
-    """Whether sticking is elastic: the free energy depends on the elastic gap."""
-    sticks: bool
-    """Whether some friction has a limit below which nothing slides."""
-    rate_dependent: bool
-    """Whether what resists sliding depends on its velocity."""
-    slides: bool
-    """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
-
-    @property
-    def inertial(self) -> bool:
-        return self.mount is not None and self.mount.inertial
-
-
-def _kind(build: Build) -> Kind | None:
-    mount = held(build, "t")
-    elastic = read_by_potentials(build, "g_t") and "g_t" not in build.scene.loading
-    if mount is None and not (elastic and "u_t" in build.scene.loading):
-        return None
-    laws = build.interface.frictions
-    rate_dependent = any("v" in reads(law.statement) for law in laws)
-    if not elastic and mount is not None:
-        rate_dependent = rate_dependent or mount.damped
-    sticks = any(law.has_limit for law in laws)
-    return Kind(mount, elastic, sticks, rate_dependent, bool(laws) or not elastic)
-
-
-def tangential_gap(build: Build) -> None:
-    """States and modes of the tangential motion."""
-    build.motion.slip = kind = _kind(build)
-    if kind is None:
-        if build.variables.has("v"):
-            build.variables.define("direction", lambda: sign(build.variables.get("v", "the friction")), "internal", "v")
-        return
+def states(build: Build, kind: Kind) -> None:
+    """States and modes of the motion in one direction."""
     if kind.sticks:
         _modes(build, kind)
     if kind.mount is not None:
         _displacement(build, kind)
     if kind.elastic:
         _elastic_gap(build, kind)
+    v = kind.d.velocity
     if kind.rate_dependent and not (kind.inertial and not kind.elastic):
-        _sliding(build)
+        _sliding(build, v)
         if not kind.elastic:
-            build.motion.gap_rates["u_t"] = symengine.Symbol("v")
+            build.motion.gap_rates[kind.d.displacement] = symengine.Symbol(v)
     elif not kind.inertial or kind.elastic:
-        build.variables.define("v", partial(_sliding_velocity, build, kind), "derived", "what does not stick")
+        build.variables.define(v, partial(_sliding_velocity, build, kind), "derived", "what does not stick")
 
 
-def _sliding(build: Build) -> None:
+def _sliding(build: Build, v: str) -> None:
     """A velocity without inertia, by itself or by what drives it."""
-    law = creeping_law(build)
+    law = creeping_law(build) if len(build.motion.slips) == 1 else None
     if law is not None:
-        build.motion.slides_by = driven_sliding(build, law)
+        build.motion.slides_by[v] = driven_sliding(build, law)
         return
-    symbol = build.motion.slides_by = _state(build, "v", algebraic=True)
-    build.variables.define("v", lambda: symbol, "algebraic", "balance of the tangential tractions")
+    symbol = build.motion.slides_by[v] = evolve(build, v, algebraic=True)
+    build.variables.define(v, lambda: symbol, "algebraic", "balance of the tangential tractions")
 
 
 def _modes(build: Build, kind: Kind) -> None:
@@ -101,27 +65,29 @@ def _modes(build: Build, kind: Kind) -> None:
     build.variables.define("sticking", lambda: 1 - slip**2, "mode", "sticks or slides")
 
 
-def _state(build: Build, name: str, *, algebraic: bool = False) -> Expression:
+def evolve(build: Build, name: str, *, algebraic: bool = False, scale: float = LENGTH) -> Expression:
+    """A new state of the motion."""
     symbol, dot = symengine.symbols(f"{name} d{name}_dt")
     start = build.scene.initial.get(name, 0.0)
     creeps = name == "v" and any(law.internal for law in build.interface.frictions)
     finest = CREEP if creeps else None
-    build.states.append(State(VARIABLES[name], symbol, dot, start, LENGTH, algebraic, finest=finest))
+    build.states.append(State(VARIABLES[name], symbol, dot, start, scale, algebraic, finest=finest))
     return symbol
 
 
 def _displacement(build: Build, kind: Kind) -> None:
-    u = _state(build, "u_t")
-    build.variables.define("u_t", lambda: u, "evolved", "mechanics.tangential")
-    build.motion.gap_rates["u_t"] = symengine.Symbol("du_t_dt")
+    name = kind.d.displacement
+    place, rates = f"mechanics.{KEYS[kind.d.axis]}", build.motion.gap_rates
+    u = evolve(build, name)
+    build.variables.define(name, lambda: u, "evolved", place)
+    rates[name] = symengine.Symbol(f"d{name}_dt")
     if kind.inertial:
-        name = "v_t" if kind.elastic else "v"
-        velocity = _state(build, name)
-        build.variables.define(name, lambda: velocity, "evolved", "mechanics.tangential")
-        build.motion.gap_rates["u_t"] = velocity
+        v = kind.own_velocity
+        velocity = rates[name] = evolve(build, v)
+        build.variables.define(v, lambda: velocity, "evolved", place)
     elif kind.elastic and kind.mount is not None and kind.mount.damped:
-        build.motion.gap_rates["u_t"] = symengine.Symbol("v_t")
-        build.variables.define("v_t", partial(_yielding, build, kind.mount), "derived", "mechanics.tangential")
+        rates[name] = symengine.Symbol("v_t")
+        build.variables.define("v_t", partial(_yielding, build, kind.mount), "derived", place)
 
 
 def _yielding(build: Build, mount: Held) -> Expression:
@@ -133,7 +99,7 @@ def _yielding(build: Build, mount: Held) -> Expression:
 
 
 def _elastic_gap(build: Build, kind: Kind) -> None:
-    g = _state(build, "g_t")
+    g = evolve(build, "g_t")
     build.variables.define("g_t", lambda: g, "evolved", "elastic sticking")
     build.motion.gap_rates["g_t"] = symengine.Symbol("dg_t_dt")
     if kind.mount is None:
@@ -145,78 +111,77 @@ def _elastic_gap(build: Build, kind: Kind) -> None:
 def _sliding_velocity(build: Build, kind: Kind) -> Expression:
     if not kind.slides:
         return NONE
-    rate = build.motion.gap_rates["u_t"]
+    rate = build.motion.gap_rates[kind.d.displacement]
     if build.variables.has("v_t"):
         build.variables.get("v_t", "sliding")
     if kind.elastic:
         rate = rate - build.motion.gap_rates["g_t"]
     slip = build.variables.get("direction", "sliding")
-    return build.name(VARIABLES["v"], slip**2 * rate)
+    return build.name(VARIABLES[kind.d.velocity], slip**2 * rate)
 
 
-def tangential_motion(build: Build) -> None:
-    """Balance of the tangential tractions, and the transitions between sticking and sliding."""
-    kind = build.motion.slip
-    if kind is None:
-        return
+def motion(build: Build, kind: Kind) -> None:
+    """Balance of the tractions in one direction, and the transitions between sticking and sliding."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
         build.variables.get("v_t", "the mechanics")
-    v, rate = build.variables.get("v", "the friction"), build.motion.gap_rates["u_t"]
-    t_f = sum(build.motion.sliding_tractions, NONE)
+    d, u = kind.d, symengine.Symbol(kind.d.displacement)
+    v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
+    t_f = build.motion.sliding_tractions.get(d.axis, NONE)
     t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
     carried = t_e if t_e is not None else t_f
-    needed = t_e if t_e is not None else far.force(symengine.Symbol("u_t"), NONE)  # type: ignore[union-attr]
+    needed = t_e if t_e is not None else far.force(u, NONE)  # type: ignore[union-attr]
     slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(kind.slides)
     if far is not None:
-        far.book(build, symengine.Symbol("u_t"), rate)
+        far.book(build, u, rate)
         _balance(build, kind, far, slides, t_f, carried)
     else:
         build.supply("W_t", "work of the far field on the tangential displacement", carried * rate, None)
     if kind.elastic:
         _elastic_rows(build, kind, slides, t_f, t_e, v)
-    _name_traction(build, slides, carried, needed)
+    name_traction(build, d, slides, carried, needed)
     if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
         _transitions(build, kind, needed, v)
 
 
-def _name_traction(build: Build, slides: Expression, carried: Expression, needed: Expression) -> None:
+def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:
+    """The traction of the friction while sliding, else what holds the interface."""
     traction = slides * carried + (1 - slides) * needed
-    build.areal(Quantity("t_t", "Pa", "tangential traction on body 1", "t_t"), traction)
+    build.areal(Quantity(d.total, "Pa", f"{d.text} on body 1", d.total), traction)
 
 
 def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: Expression, carried: Expression) -> None:
     """Row of the displacement, and of its velocity where that is a variable of its own."""
-    u, du = symengine.symbols("u_t du_t_dt")
-    rate = build.motion.gap_rates["u_t"]
+    name = kind.d.displacement
+    u, du = symengine.symbols(f"{name} d{name}_dt")
+    rate = build.motion.gap_rates[name]
     if kind.inertial:
-        name = "v_t" if kind.elastic else "v"
         moves = symengine.Integer(1) if kind.elastic else slides
-        build.rows["u_t"] = du - rate
-        dv = symengine.Symbol(f"d{name}_dt")
-        build.rows[name] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
+        build.rows[name] = du - rate
+        dv = symengine.Symbol(f"d{kind.own_velocity}_dt")
+        build.rows[kind.own_velocity] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
     elif kind.elastic:
         follows = symengine.Integer(1) if kind.rate_dependent else 1 - slides
         _elastic_balance(build, far, u, du, carried, follows)
     elif kind.rate_dependent:
-        v = symengine.Symbol("v")
-        build.rows["u_t"] = du - v
+        v = symengine.Symbol(kind.d.velocity)
+        build.rows[name] = du - v
         driving = far.force(u, v) - t_f - far.c_g * v
-        _sliding_row(build, slides, driving)
+        _sliding_row(build, kind, slides, driving)
     else:
         driving = far.force(u, NONE) - t_f
         if far.k == 0:
-            _held_by_friction(build, driving, du)
+            _held_by_friction(build, name, driving)
             return
-        build.rows["u_t"] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
+        build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
-        build.equilibria.append(Equilibrium("u_t", slides * driving, size, active=slides))
+        build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides))
 
 
-def _held_by_friction(build: Build, driving: Expression, du: Expression) -> None:
+def _held_by_friction(build: Build, name: str, driving: Expression) -> None:
     """Under a dead load alone an interface that sticks does not move, and nothing holds one that slides."""
-    build.rows["u_t"] = du
-    limit = build.motion.stick_limit
+    build.rows[name] = symengine.Symbol(f"d{name}_dt")
+    limit = build.motion.stick_limits.get("t")
     if limit is None:
         raise InputError(
             "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper.", PLACE
@@ -246,7 +211,7 @@ def _elastic_rows(
     if kind.rate_dependent:
         build.rows["g_t"] = dg - (rate - v)
         driving = t_e - t_f
-        _sliding_row(build, slides, driving)
+        _sliding_row(build, kind, slides, driving)
         return
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
@@ -262,9 +227,9 @@ def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
         build.margins.append(Margin("tangential stiffness", margin, reason))
 
 
-def _sliding_row(build: Build, slides: Expression, driving: Expression) -> None:
+def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expression) -> None:
     """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it."""
-    v = build.motion.slides_by
+    v = build.motion.slides_by[kind.d.velocity]
     build.rows[str(v)] = slides * driving + (1 - slides) * v
     slope = -derivative(build.expanded(driving), v)
     if slope == 0:
@@ -273,17 +238,12 @@ def _sliding_row(build: Build, slides: Expression, driving: Expression) -> None:
             "mass or a damper.",
             PLACE,
         )
-    reason = (
-        "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
-        "resists; a mass or a viscous resistance would give one"
-    )
-    build.margins.append(Margin("stable v", where(slides > 0, slope, 1), reason))
+    build.margins.append(Margin(f"stable {v}", where(slides > 0, slope, 1), UNSTABLE))
 
 
 def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
-    limit = build.motion.stick_limit
-    assert limit is not None
+    limit = build.motion.stick_limits["t"]
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = broken(build, breaking) if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
@@ -301,16 +261,3 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     # What nothing rubs on has nothing to stop at: its velocity may fade to rounding without an end.
     stops = where(slip**2 > 0, where(limit > 0, slip * v, 1), 1)
     build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop))
-
-
-def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
-    """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
-    if build.motion.slip is None or not build.motion.slip.sticks:
-        return
-    at_rest = {**own, "v": NONE, "direction": symengine.Integer(1)}
-    kinetic = build.variables.call(bound, bound.statement, at_rest)
-    if law.has_limit:
-        static = build.variables.call(bound, bound.limit, at_rest)
-        kinetic = static if static == kinetic else where(static > kinetic, static, kinetic)
-    kinetic = build.stretch * kinetic
-    build.motion.stick_limit = kinetic if build.motion.stick_limit is None else build.motion.stick_limit + kinetic

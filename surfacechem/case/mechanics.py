@@ -12,12 +12,12 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Mounting, Stage
 from surfacechem.terms import Spec
 
-MECHANICS_KEYS = ("normal", "tangential")
+MECHANICS_KEYS = ("normal", "tangential", "transverse")
 STIFFNESS_KEYS = ("stiffness", "E", "H")
 STAGE_KEYS = ("for", "until")
 WAYS = ("rises-to", "falls-to")
 
-MOVING = ("g_n", "v_n", "u_t", "v_t", "v", "g_t", "w_n", "w_t", "F_n", "F_t", "p")
+MOVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "p")
 """Variables beside temperatures and bonds that may evolve, and then have an initial value."""
 
 STIFFNESS = Spec("Pa/m", "stiffness of the body", above=0)
@@ -27,8 +27,8 @@ HEIGHT = Spec("m", "height", above=0)
 
 def read_mountings(
     tree: Tree | None, bodies: Mapping[str, Mapping[str, Tree]], units: Mapping[str, str]
-) -> tuple[Mounting | None, Mounting | None]:
-    """Mountings of the normal gap and of the tangential displacement; stiff bodies in series hold the normal gap."""
+) -> dict[str, Mounting]:
+    """Mountings by direction, as the fields of a scene; stiff bodies in series hold the normal gap."""
     fields = mapping(tree, MECHANICS_KEYS)
     found = {name: build(Mounting, child, units) for name, child in fields.items()}
     k = _series(bodies)
@@ -37,7 +37,7 @@ def read_mountings(
         if normal is not None and normal.k:
             raise fields["normal"].error("the stiffness has two roles: give `k` here or a stiffness to the bodies.")
         found["normal"] = replace(normal, k=k) if normal is not None else Mounting(k=k)
-    return found.get("normal"), found.get("tangential")
+    return found
 
 
 def _series(bodies: Mapping[str, Mapping[str, Tree]]) -> float | None:

@@ -76,7 +76,7 @@ class SceneReader:
         interface, loading = self._interface(), self._loading()
         surroundings = self._surroundings()
         bodies = {name: self._body_fields(tree) for name, tree in self.bodies.items()}
-        normal, tangential = read_mountings(self.top.get("mechanics"), bodies, self.units)
+        mountings = read_mountings(self.top.get("mechanics"), bodies, self.units)
         return Scene(
             bodies=(first, second),
             interface=interface,
@@ -84,10 +84,9 @@ class SceneReader:
             loading=loading,
             surroundings=surroundings,
             T_0=self._reference_temperature(),
-            initial=self._initial(interface, loading, (first, second), moves=bool(normal or tangential)),
-            normal=normal,
-            tangential=tangential,
+            initial=self._initial(interface, loading, (first, second), moves=bool(mountings)),
             programme=read_programme(self.top.get("programme"), self.units),
+            **mountings,
         )
 
     # -- bodies and temperatures ----------------------------------------------------------------------------------
@@ -284,7 +283,7 @@ class SceneReader:
         ]
         if interface.limits or any("phi" in reaction.stoichiometry() for reaction in interface.reactions):
             evolving += ["phi", "ln_phi"]
-        if moves or "programme" in self.top or {"F_n", "F_t", "u_t"} & set(loading):
+        if moves or "programme" in self.top or {"F_n", "F_t", "F_t2", "u_t"} & set(loading):
             evolving += [name for name in MOVING if name not in loading]
         evolving += [name for law in interface.frictions for name in law.internal.values()]
         tree = self.top.get("initial")

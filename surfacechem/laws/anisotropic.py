@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, sqrt, where
+from surfacechem.expressions import Expression
 from surfacechem.terms import Friction, parameter
 
 
 class AnisotropicCoulomb(Friction):
     r"""Dry friction with a coefficient for each of two directions along the interface.
 
-    .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}
+    .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}, \quad
+        \Big(\frac{t_t}{\mu_1 p}\Big)^2 + \Big(\frac{t_2}{\mu_2 p}\Big)^2 \le 1 \text{ while sticking}
 
-    The traction is not along the slip unless the coefficients are equal. Source: Sauer, Duong & Mandadapu (2021),
-    eq. e:dry_fric with a tensor of coefficients. Any velocities; p >= 0. Dissipates :math:`t_t v + t_2 v_2 \ge 0`.
+    The traction is not along the slip unless the coefficients are equal, when this is `coulomb` in the plane. Source:
+    Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients. Any velocities; p >= 0. Dissipates
+    :math:`t_t v + t_2 v_2 \ge 0`.
 
     >>> law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)
-    >>> law.traction(p=1e5, v=3.0, v_2=4.0), law.transverse(p=1e5, v=3.0, v_2=4.0)
+    >>> law.traction(p=1e5, direction=0.6), law.transverse(p=1e5, direction_2=0.8)
     (18000.0, 48000.0)
     """
 
@@ -24,13 +26,21 @@ class AnisotropicCoulomb(Friction):
     mu_1: float = parameter("1", "friction coefficient along v", at_least=0)
     mu_2: float = parameter("1", "friction coefficient along v_2", at_least=0)
 
-    def traction(self, p: Expression, v: Expression, v_2: Expression) -> Expression:
+    def traction(self, p: Expression, direction: Expression) -> Expression:
         """Tangential traction along v [Pa]."""
-        return self.mu_1 * p * v * _inverse_speed(v, v_2)
+        return self.mu_1 * p * direction
 
-    def transverse(self, p: Expression, v: Expression, v_2: Expression) -> Expression:
+    def transverse(self, p: Expression, direction_2: Expression) -> Expression:
         """Tangential traction along v_2 [Pa]."""
-        return self.mu_2 * p * v_2 * _inverse_speed(v, v_2)
+        return self.mu_2 * p * direction_2
+
+    def limit(self, p: Expression) -> Expression:
+        """Largest traction along v [Pa] that sticking bears."""
+        return self.mu_1 * p
+
+    def transverse_limit(self, p: Expression) -> Expression:
+        """Largest traction along v_2 [Pa] that sticking bears."""
+        return self.mu_2 * p
 
 
 class AnisotropicViscous(Friction):
@@ -58,8 +68,3 @@ class AnisotropicViscous(Friction):
     def transverse(self, g_n: Expression, v_2: Expression) -> Expression:
         """Tangential traction along v_2 [Pa]."""
         return self.eta_2 * v_2 / g_n
-
-
-def _inverse_speed(v: Expression, v_2: Expression) -> Expression:
-    square = v**2 + v_2**2
-    return 1 / sqrt(where(square > 0, square, 1 + 0 * square))

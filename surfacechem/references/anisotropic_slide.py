@@ -1,0 +1,106 @@
+"""A free slider that direction-dependent dry friction brings to rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.references._energy import QuadraticEnergy
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+NEWTON = 100
+"""Steps to the velocity at a time; each but the first few doubles the digits."""
+
+DIGITS = 4e-16
+
+
+class AnisotropicSlide(Reference):
+    r"""A free mass slides on dry friction with a coefficient along each axis, and turns towards the smoother one.
+
+    .. math:: \frac{v_2}{v_{2i}} = \Big(\frac v{v_i}\Big)^r, \quad r = \frac{\mu_2}{\mu_1} \ge 1, \quad
+        t_{stop} - t = \frac m{\mu_1 p} I_1(v), \quad u_{stop} - u = \frac m{\mu_1 p} I_2(v)
+
+    .. math:: I_k(v) = \int_0^v x^{k-1} \sqrt{1 + c^2 x^{2 (r - 1)}}\,dx, \quad c = v_{2i} / v_i^r,
+
+    which is a hypergeometric function; across, :math:`c\,I_{1+r}` stands for :math:`I_2`. All kinetic energy becomes
+    heat. Quadratic energies, perfect thermal contact. Any t >= 0: the velocity is exactly zero from `stop_time` on.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients, with Newton's law: the
+    quotient of its components separates.
+
+    >>> slider = AnisotropicSlide(m=5.0, mu_1=0.2, mu_2=0.4, p=3e4, v_i=1.2, v_2_i=1.6, C=100.0, T_0=300.0, T_i=300.0)
+    >>> round(slider.stop_time, 15), float(slider.solution(0.01)["v_2"])
+    (0.001245312941584, 0.0)
+    """
+
+    name: ClassVar[str] = "anisotropic-slide"
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    mu_1: float = parameter("1", "friction coefficient along v", above=0)
+    mu_2: float = parameter("1", "friction coefficient along v_2, at least mu_1", above=0)
+    p: float = parameter("Pa", "contact pressure", above=0)
+    v_i: float = parameter("m/s", "initial velocity", above=0)
+    v_2_i: float = parameter("m/s", "initial velocity across it")
+    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
+    T_0: float = parameter("K", "reference temperature", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+
+    @cached_property
+    def ratio(self) -> float:
+        """Friction coefficient across over that along."""
+        return self.mu_2 / self.mu_1
+
+    @property
+    def stop_time(self) -> float:
+        """Time [s] from which on the mass rests."""
+        return float(self._integral(1.0, np.array(1.0)) * self.v_i / self.deceleration)
+
+    @property
+    def deceleration(self) -> float:
+        """Deceleration along the first axis [m/s^2]."""
+        return self.mu_1 * self.p / self.m
+
+    def _integral(self, k: float, x: Array) -> Array:
+        """I_k of the velocity relative to the initial one."""
+        from scipy.special import hyp2f1
+
+        z, e = (self.v_2_i / self.v_i) ** 2, 2 * (self.ratio - 1)
+        if e == 0:
+            return np.asarray(x**k / k * math.sqrt(1 + z))
+        return np.asarray(x**k / k * hyp2f1(-0.5, k / e, 1 + k / e, -z * x**e))
+
+    def _velocity(self, t: Array) -> Array:
+        """Velocity along the first axis relative to the initial one, by Newton's method from above."""
+        z, left = (self.v_2_i / self.v_i) ** 2, np.maximum(self.stop_time - t, 0) * self.deceleration / self.v_i
+        x = np.ones_like(left)
+        for _ in range(NEWTON):
+            slope = np.sqrt(1 + z * x ** (2 * (self.ratio - 1)))
+            change = (self._integral(1.0, x) - left) / slope
+            x = np.where(left > 0, np.maximum(x - change, 0), 0)
+            if np.all(np.abs(change) <= DIGITS * x):
+                break
+        return x
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        x, whole = self._velocity(t), np.array(1.0)
+        v, v_2 = self.v_i * x, self.v_2_i * x**self.ratio
+        path, across = (self._integral(k, whole) - self._integral(k, x) for k in (2.0, 1.0 + self.ratio))
+        speed, start = np.hypot(v, v_2), math.hypot(self.v_i, self.v_2_i)
+        heat = 0.5 * self.m * (start**2 - speed**2)
+        slope = self.v_2_i / self.v_i
+        turn = np.arctan(slope * x ** (self.ratio - 1)) - math.atan(slope)
+        return {
+            "v": v,
+            "v_2": v_2,
+            "speed": speed,
+            "turn": np.where(x > 0, turn, 0.0),
+            "u_t": path * self.v_i**2 / self.deceleration,
+            "u_t2": across * self.v_i * self.v_2_i / self.deceleration,
+            "heat": heat,
+            "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
+        }
