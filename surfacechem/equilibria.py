@@ -13,7 +13,7 @@ from surfacechem.compile import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.marching import march, zero_ahead
 from surfacechem.system import System
-from surfacechem.transitions import SIDE, Equilibrium, Fold
+from surfacechem.transitions import SIDE, SLIP, Equilibrium, Fold
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -180,6 +180,29 @@ class Equilibria:
         values = self._balance(point.inputs())
         return bool(np.any(np.abs(values[::2]) > DRIFT * rtol * values[1::2]))
 
+    # -- sliding --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def slip(self) -> int | None:
+        """Column of the mode of sliding, where it is one of gaps in equilibrium."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        return paths.index(SLIP) if any(e.slides for e in self.items) else None
+
+    def with_slip(self, point: Point, slip: float) -> Point:
+        """The point with another mode of sliding."""
+        parameters = point.parameters.copy()
+        if self.slip is not None:
+            parameters[self.slip] = slip
+        return replace(point, parameters=parameters)
+
+    def is_pushed_back(self, point: Point, rtol: float) -> bool:
+        """Whether the tractions would pull what slides back, beyond the drift of an integration."""
+        j, sign = next((j, e.slides) for j, e in enumerate(self.items) if e.slides)
+        residual, slope = self._tangents(point.inputs())[2 * j : 2 * j + 2]
+        size = self._balance(point.inputs())[2 * j + 1]
+        # Where nothing elastic holds it, it cannot stick.
+        return bool(slope < 0 and point.parameters[self.slip] * sign * residual < -DRIFT * rtol * size)
+
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
         if not self.items:
@@ -226,6 +249,15 @@ class Equilibria:
 
         at = self._moved(point, there, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
         return None if at is None else Lost(at, way, direction)
+
+    def held_at(self, index: int, lost: Lost) -> Lost:
+        """The same fold where sticking holds what slides."""
+        found = self._folds[index]
+        assert found is not None
+        point, n = self.with_slip(lost.point, 0.0), len(self.items)
+        values = np.atleast_1d(found[1](point.inputs()))
+        way, weights = self._lost_way(point, values[2 * n :].reshape(n, n))
+        return Lost(point, way, float(np.sign(values[:n] @ weights)))
 
     @cached_property
     def _approaches(self) -> list[Function | None]:

@@ -20,7 +20,7 @@ from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
 from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined
 from surfacechem.system import START, System
-from surfacechem.transitions import HELD, LOAD_STEP
+from surfacechem.transitions import HELD, LOAD_STEP, SLIP
 
 Array = NDArray[np.float64]
 
@@ -242,7 +242,7 @@ class Hybrid:
         name = self.jumps[-1].transition.name
         if name in HOLDABLE:
             if name == "stop":
-                point.parameters[columns["mode.slip"]] = 0.0
+                point.parameters[columns[SLIP]] = 0.0
             point.parameters[columns[HELD]] = point.t + max(self.hold * self._piece(point.t), MOMENT * point.t)
             self.hold, self.calm = 10 * self.hold, len(self.jumps)
         return True
@@ -300,7 +300,7 @@ class Hybrid:
         """Carry out a transition and book it; None where the run ends with it."""
         largest = float(self.largest[self.first + index])
         drift = DRIFT * self.problem.rtol * largest
-        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift)
+        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift, self.problem.rtol)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
-from surfacechem.equilibria import Equilibria, Point
+from surfacechem.equilibria import Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Account, System
 from surfacechem.transitions import HELD, Transition
@@ -148,9 +148,11 @@ class Jumper:
     def _sink_functions(self) -> dict[str, Function]:
         return {}
 
-    def make(self, index: int, before: Point, since: float, noise: float = 0.0, drift: float = 0.0) -> Jump:
+    def make(
+        self, index: int, before: Point, since: float, noise: float = 0.0, drift: float = 0.0, rtol: float = 0.0
+    ) -> Jump:
         """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
-        far the integration may have carried it.
+        far the integration may have carried it at the tolerance ``rtol``.
         """
         item = self.system.transitions[index]
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
@@ -170,10 +172,8 @@ class Jumper:
             def heat(rows: Array) -> Array:
                 return self._temperatures(rows, item.sinks, energy)[0]
 
-            if lost is not None:
-                after = self.equilibria.let_go(lost, parameters, heat)
-            else:
-                after = self._kept(item, self.equilibria.settle(start, heat), parameters, max(noise, drift))
+            after = self._rested(index, start, lost, heat, rtol)
+            after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             obstacle = NO_REST if after is None else NO_HEAT
@@ -185,11 +185,30 @@ class Jumper:
             noise,
         )
 
+    def _rested(self, index: int, start: Point, lost: Lost | None, heat: Heat, rtol: float) -> Point | None:
+        """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
+        found = self.equilibria
+        slip = 0.0 if found.slip is None else start.parameters[found.slip]
+        if slip:
+            stuck = None if lost is None else found.held_at(index, lost)
+            trial = self._found(found.with_slip(start, 0.0), stuck, heat)
+            if trial is not None:
+                onward = found.with_slip(trial, slip)
+                return trial if found.is_pushed_back(onward, rtol) else found.settle(onward, heat)
+        return self._found(start, lost, heat)
+
+    def _found(self, start: Point, lost: Lost | None, heat: Heat) -> Point | None:
+        if lost is None:
+            return self.equilibria.settle(start, heat)
+        return self.equilibria.let_go(lost, start.parameters, heat)
+
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""
         if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > small:
             return after
-        return replace(after, parameters=parameters)
+        slip = self.equilibria.slip
+        kept = replace(after, parameters=parameters)
+        return kept if slip is None else self.equilibria.with_slip(kept, after.parameters[slip])
 
     def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""

@@ -11,6 +11,9 @@ from surfacechem.expressions import Expression
 SIDE = "mode.side"
 """Path of the mode that says on which side of touch the gap is."""
 
+SLIP = "mode.slip"
+"""Path of the mode that says whether the interface sticks or slides, and in which direction."""
+
 HELD = "run.held_until"
 """Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
 
@@ -89,6 +92,8 @@ class Equilibrium:
     """Gaps that move with it, and how far: elastic sticking follows the displacement."""
     active: Expression = 1
     """Zero in modes in which it is held."""
+    slides: int = 0
+    """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
 
 
 @dataclass(frozen=True)
