@@ -32,6 +32,9 @@ DIGITS = 64 * float(np.finfo(float).eps)
 SOON = 1e-9
 """Part of the time of a fold within which nothing but the gaps changes."""
 
+BALANCED = 1e-12
+"""Tractions out of balance that count as none, relative to their parts."""
+
 POLISH = 3
 DRIFTED = 1e-3
 """Largest relative drift of a gap from its equilibrium that is corrected without a search."""
@@ -175,10 +178,12 @@ class Equilibria:
                 return moved
         return None
 
-    def pushed(self, point: Point, rtol: float) -> bool:
-        """Whether tractions are out of balance by more than the drift of an integration."""
-        values = self._balance(point.inputs())
-        return bool(np.any(np.abs(values[::2]) > DRIFT * rtol * values[1::2]))
+    def pushed(self, before: Point, point: Point) -> bool:
+        """Whether loads have changed a balance of tractions by more than rounding."""
+        if not self.items:
+            return False
+        last, values = self._balance(before.inputs()), self._balance(point.inputs())
+        return bool(np.any(np.abs(values[::2] - last[::2]) > BALANCED * values[1::2]))
 
     # -- sliding --------------------------------------------------------------------------------------------------
 
@@ -195,13 +200,13 @@ class Equilibria:
             parameters[self.slip] = slip
         return replace(point, parameters=parameters)
 
-    def is_pushed_back(self, point: Point, rtol: float) -> bool:
-        """Whether the tractions would pull what slides back, beyond the drift of an integration."""
+    def is_pushed_back(self, point: Point, drift: float) -> bool:
+        """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance."""
         j, sign = next((j, e.slides) for j, e in enumerate(self.items) if e.slides)
         residual, slope = self._tangents(point.inputs())[2 * j : 2 * j + 2]
         size = self._balance(point.inputs())[2 * j + 1]
         # Where nothing elastic holds it, it cannot stick.
-        return bool(slope < 0 and point.parameters[self.slip] * sign * residual < -DRIFT * rtol * size)
+        return bool(slope < 0 and point.parameters[self.slip] * sign * residual < -drift * size)
 
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""

@@ -33,10 +33,6 @@ class Mode:
     """Until when a value holds, in words, where it is meant to be left."""
 
 
-LOAD_STEP = "load"
-"""Name of the transition that a jump of a far-field traction makes."""
-
-
 @dataclass(frozen=True)
 class Fold:
     """The loss of the equilibrium of the quasi-static gaps."""
@@ -75,6 +71,8 @@ class Transition:
     """Whether nothing happens to the interface: a stage of the loading ends."""
     measure: str = ""
     """What its margin measures, where that of other transitions measures the same."""
+    times: tuple[float, ...] = ()
+    """Times [s] at which it happens, where these are given."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
 

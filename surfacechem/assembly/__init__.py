@@ -108,6 +108,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         equilibria=tuple(build.equilibria),
         sinks=taking,
         given=dict(build.motion.given),
+        pulls=dict(build.motion.pulls),
         fit=build.fit() if build.fit else None,
         warnings=(
             *build.interface.remarks,
