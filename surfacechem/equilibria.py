@@ -189,9 +189,9 @@ class Equilibria:
 
     @cached_property
     def slip(self) -> int | None:
-        """Column of the mode of sliding, where it is one of gaps in equilibrium."""
+        """Column of the mode of sliding, where gaps in equilibrium stick or slide."""
         paths = [parameter.path for parameter in self.system.parameters]
-        return paths.index(SLIP) if any(e.slides for e in self.items) else None
+        return paths.index(SLIP) if SLIP in paths and any(e.slides for e in self.items) else None
 
     def with_slip(self, point: Point, slip: float) -> Point:
         """The point with another mode of sliding."""
