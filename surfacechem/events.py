@@ -300,18 +300,16 @@ class Hybrid:
 
     def _jump(self, index: int, point: Point, unloaded: Point | None = None) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
-        largest = float(self.largest[self.first + index])
-        drift = DRIFT * self.problem.rtol * largest
-        balanced = BALANCED if unloaded is not None else DRIFT * self.problem.rtol
-        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift, balanced, unloaded)
+        largest, drift = float(self.largest[self.first + index]), DRIFT * self.problem.rtol
+        balanced, since = drift if unloaded is None else BALANCED, self._since(point.t)
+        jump = self.jumper.make(index, point, since, NOISE * largest, drift * largest, balanced, unloaded)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
             self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
-        self.booked = self.booked + np.array(
-            [booked(jump, account, self.jumper.states) for account in self.system.ledger]
-        )
+        changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
+        self.booked = self.booked + np.array(changes)
         return jump.after
 
     def _since(self, t: float) -> float:

@@ -203,8 +203,8 @@ class Jumper:
 
     def is_loaded(self, before: Point, point: Point) -> bool:
         """Whether a jump of the loads does work or sets anything in motion."""
-        if self.equilibria.pushed(before, point):
-            return True
+        if self.equilibria.pushed(before, point) or not self.system.pulls:
+            return self.equilibria.pushed(before, point)
         (_, *old), (_, *new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (before, point))
         return not np.allclose([old[0], old[2]], [new[0], new[2]], rtol=BALANCED, atol=ATOM)
 
@@ -213,6 +213,8 @@ class Jumper:
         if unloaded is None:
             return self._books(before.inputs()), {}
         books = self._books(unloaded.inputs())
+        if not self.system.pulls:
+            return books, {}
         (k, w, F, g), (_, w_new, F_new, _) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (unloaded, before))
         lift = k * (w_new - w) * ((w_new + w) / 2 - g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)

@@ -14,7 +14,7 @@ from surfacechem.transitions import Transition
 
 
 def load_steps(build: Build) -> None:
-    """The transition that loads make by their jumps, where a gap in equilibrium or the energy of a spring feels them."""
+    """The transition that loads make by their jumps, where a gap in equilibrium or a spring feels them."""
     springs = [k * (w - g) ** 2 / 2 for k, w, _, g in build.motion.pulls.values()]
     felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
     steps = {name: load for name, load in build.loads.items() if load.jumps() and felt & _histories(build, name)}
@@ -25,9 +25,7 @@ def load_steps(build: Build) -> None:
     # What moves along the interface alone rubs on it; a gap that opens leaves the bodies swinging.
     sinks = "joint" if any(e.state == "g_n" for e in build.equilibria) else "local"
     never = symengine.Integer(1)
-    build.transitions.append(
-        Transition("load", never, reason, _closing(build), settles=True, sinks=sinks, times=times)
-    )
+    build.transitions.append(Transition("load", never, reason, _closing(build), settles=True, sinks=sinks, times=times))
 
 
 def _histories(build: Build, name: str) -> set[Expression]:
