@@ -13,7 +13,7 @@ from surfacechem.compile import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.marching import march, zero_ahead
 from surfacechem.system import System
-from surfacechem.transitions import SIDE, Equilibrium, Fold
+from surfacechem.transitions import SIDE, SLIP, Equilibrium, Fold
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -31,6 +31,9 @@ DIGITS = 64 * float(np.finfo(float).eps)
 
 SOON = 1e-9
 """Part of the time of a fold within which nothing but the gaps changes."""
+
+BALANCED = 1e-12
+"""Tractions out of balance that count as none, relative to their parts."""
 
 POLISH = 3
 DRIFTED = 1e-3
@@ -175,10 +178,35 @@ class Equilibria:
                 return moved
         return None
 
-    def pushed(self, point: Point, rtol: float) -> bool:
-        """Whether tractions are out of balance by more than the drift of an integration."""
-        values = self._balance(point.inputs())
-        return bool(np.any(np.abs(values[::2]) > DRIFT * rtol * values[1::2]))
+    def pushed(self, before: Point, point: Point) -> bool:
+        """Whether loads have changed a balance of tractions by more than rounding."""
+        if not self.items:
+            return False
+        last, values = self._balance(before.inputs()), self._balance(point.inputs())
+        return bool(np.any(np.abs(values[::2] - last[::2]) > BALANCED * values[1::2]))
+
+    # -- sliding --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def slip(self) -> int | None:
+        """Column of the mode of sliding, where gaps in equilibrium stick or slide."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        return paths.index(SLIP) if SLIP in paths and any(e.slides for e in self.items) else None
+
+    def with_slip(self, point: Point, slip: float) -> Point:
+        """The point with another mode of sliding."""
+        parameters = point.parameters.copy()
+        if self.slip is not None:
+            parameters[self.slip] = slip
+        return replace(point, parameters=parameters)
+
+    def is_pushed_back(self, point: Point, drift: float) -> bool:
+        """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance."""
+        j, sign = next((j, e.slides) for j, e in enumerate(self.items) if e.slides)
+        residual, slope = self._tangents(point.inputs())[2 * j : 2 * j + 2]
+        size = self._balance(point.inputs())[2 * j + 1]
+        # Where nothing elastic holds it, it cannot stick.
+        return bool(slope < 0 and point.parameters[self.slip] * sign * residual < -drift * size)
 
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
@@ -226,6 +254,15 @@ class Equilibria:
 
         at = self._moved(point, there, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
         return None if at is None else Lost(at, way, direction)
+
+    def held_at(self, index: int, lost: Lost) -> Lost:
+        """The same fold where sticking holds what slides."""
+        found = self._folds[index]
+        assert found is not None
+        point, n = self.with_slip(lost.point, 0.0), len(self.items)
+        values = np.atleast_1d(found[1](point.inputs()))
+        way, weights = self._lost_way(point, values[2 * n :].reshape(n, n))
+        return Lost(point, way, float(np.sign(values[:n] @ weights)))
 
     @cached_property
     def _approaches(self) -> list[Function | None]:

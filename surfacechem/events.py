@@ -7,20 +7,20 @@ reaches zero the stretch ends, the jump is made, and the next one starts from th
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.equilibria import DRIFT, Point
+from surfacechem.equilibria import BALANCED, DRIFT, Point
 from surfacechem.jumps import Jump, Jumper, booked
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
 from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined
 from surfacechem.system import START, System
-from surfacechem.transitions import HELD, LOAD_STEP
+from surfacechem.transitions import HELD, SLIP
 
 Array = NDArray[np.float64]
 
@@ -94,25 +94,27 @@ class Hybrid:
         self.exchanged = np.zeros(problem.program.n_ledger)
         if problem.max_seconds is not None:
             self.deadline = time.monotonic() + problem.max_seconds
-        y, modes = problem.y0, problem.parameters[0, self.jumper.mode_columns]
+        ended, y, modes = None, problem.y0, problem.parameters[0, self.jumper.mode_columns]
         for start, end, row in zip(problem.segments, problem.segments[1:], problem.parameters, strict=False):
             parameters = row.copy()
             parameters[self.jumper.mode_columns] = modes
             point = Point(float(start), y, np.zeros(len(y)), parameters)
-            begun = self._begun(point)
+            begun = self._begun(point, ended)
             ended = self._segment(begun, float(end)) if begun is not None else None
             if ended is None:
                 break
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
         return self._merged()
 
-    def _begun(self, point: Point) -> Point | None:
-        """The start of a piece of time, where a traction that jumps there has moved what is in equilibrium with it."""
-        names = [item.name for item in self.system.transitions]
-        equilibria = self.jumper.equilibria
-        if LOAD_STEP in names and equilibria.pushed(point, self.problem.rtol):
-            return self._jump(names.index(LOAD_STEP), point)
-        return equilibria.polished(point)
+    def _begun(self, point: Point, before: Point | None) -> Point | None:
+        """The start of a piece of time, where loads that jump there have moved what is in equilibrium with them."""
+        polished = self.jumper.equilibria.polished
+        steps = [index for index, item in enumerate(self.system.transitions) if point.t in item.times]
+        if not steps or before is None:
+            return polished(point)
+        before = polished(before)
+        point = replace(point, y=before.y)
+        return self._jump(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
 
     def _segment(self, point: Point, end: float) -> Point | None:
         """From a point to the end of its segment; None where the run ends before."""
@@ -242,7 +244,7 @@ class Hybrid:
         name = self.jumps[-1].transition.name
         if name in HOLDABLE:
             if name == "stop":
-                point.parameters[columns["mode.slip"]] = 0.0
+                point.parameters[columns[SLIP]] = 0.0
             point.parameters[columns[HELD]] = point.t + max(self.hold * self._piece(point.t), MOMENT * point.t)
             self.hold, self.calm = 10 * self.hold, len(self.jumps)
         return True
@@ -296,19 +298,18 @@ class Hybrid:
         found = consistent(self.problem.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
         return Point(point.t, found.y, found.ydot, point.parameters)
 
-    def _jump(self, index: int, point: Point) -> Point | None:
+    def _jump(self, index: int, point: Point, unloaded: Point | None = None) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
-        largest = float(self.largest[self.first + index])
-        drift = DRIFT * self.problem.rtol * largest
-        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift)
+        largest, drift = float(self.largest[self.first + index]), DRIFT * self.problem.rtol
+        balanced, since = drift if unloaded is None else BALANCED, self._since(point.t)
+        jump = self.jumper.make(index, point, since, NOISE * largest, drift * largest, balanced, unloaded)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
             self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
-        self.booked = self.booked + np.array(
-            [booked(jump, account, self.jumper.states) for account in self.system.ledger]
-        )
+        changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
+        self.booked = self.booked + np.array(changes)
         return jump.after
 
     def _since(self, t: float) -> float:

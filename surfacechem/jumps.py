@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
-from surfacechem.equilibria import Equilibria, Point
+from surfacechem.equilibria import BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Account, System
 from surfacechem.transitions import HELD, Transition
@@ -33,6 +33,9 @@ DIGITS = 4 * float(np.finfo(float).eps)
 """Last digits of a number."""
 
 NEWTON = 60
+
+ATOM = 1e-20
+"""Gap [m] that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -148,9 +151,19 @@ class Jumper:
     def _sink_functions(self) -> dict[str, Function]:
         return {}
 
-    def make(self, index: int, before: Point, since: float, noise: float = 0.0, drift: float = 0.0) -> Jump:
+    def make(
+        self,
+        index: int,
+        before: Point,
+        since: float,
+        noise: float = 0.0,
+        drift: float = 0.0,
+        balanced: float = BALANCED,
+        unloaded: Point | None = None,
+    ) -> Jump:
         """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
-        far the integration may have carried it.
+        far the integration may have carried it, and ``balanced`` the part of tractions by which it leaves them out of
+        balance. Where loads jump ``unloaded`` is the state under those before.
         """
         item = self.system.transitions[index]
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
@@ -162,7 +175,7 @@ class Jumper:
         start = Point(before.t, values[:n], np.zeros(n), parameters)
         if not np.isfinite(self._books(start.inputs())[0]):
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
-        books = self._books(before.inputs())
+        books, lift = self._opened(before, unloaded)
         energy = float(books[0])
         after: Point | None = start
         if item.settles:
@@ -170,26 +183,69 @@ class Jumper:
             def heat(rows: Array) -> Array:
                 return self._temperatures(rows, item.sinks, energy)[0]
 
-            if lost is not None:
-                after = self.equilibria.let_go(lost, parameters, heat)
-            else:
-                after = self._kept(item, self.equilibria.settle(start, heat), parameters, max(noise, drift))
+            after = self._rested(index, start, lost, heat, balanced)
+            after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
         heated = self._heated(after, item.sinks, energy) if after is not None else None
         if heated is None:
             obstacle = NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
-        return self._judged(
-            Jump(before.t, item, before, final, released, taken, ADMISSIBLE, since, heat_out=out, entropy_out=taken),
-            books,
-            noise,
+        jump = Jump(
+            before.t, item, before, final, released, taken, ADMISSIBLE, since, lift, heat_out=out, entropy_out=taken
         )
+        return self._judged(jump, books, noise)
+
+    @cached_property
+    def _pulls(self) -> Function:
+        """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
+        items = [self.system.expand(item) for pull in self.system.pulls.values() for item in pull]
+        return compile_function(self.system.inputs, items)
+
+    def is_loaded(self, before: Point, point: Point) -> bool:
+        """Whether a jump of the loads does work or sets anything in motion."""
+        if self.equilibria.pushed(before, point) or not self.system.pulls:
+            return self.equilibria.pushed(before, point)
+        (_, *old), (_, *new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (before, point))
+        return not np.allclose([old[0], old[2]], [new[0], new[2]], rtol=BALANCED, atol=ATOM)
+
+    def _opened(self, before: Point, unloaded: Point | None) -> tuple[Array, dict[str, float]]:
+        """The books before a jump, and the work of far-field displacements that jump before anything moves."""
+        if unloaded is None:
+            return self._books(before.inputs()), {}
+        books = self._books(unloaded.inputs())
+        if not self.system.pulls:
+            return books, {}
+        (k, w, F, g), (_, w_new, F_new, _) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (unloaded, before))
+        lift = k * (w_new - w) * ((w_new + w) / 2 - g)
+        books[0] += np.sum(lift) + np.sum((F - F_new) * g)
+        accounts = list(self.system.pulls)
+        books[2:] = [(F_new * g)[accounts.index(name)] for name in self.system.given]
+        return books, dict(zip(accounts, lift.tolist(), strict=True))
+
+    def _rested(self, index: int, start: Point, lost: Lost | None, heat: Heat, balanced: float) -> Point | None:
+        """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
+        found = self.equilibria
+        slip = 0.0 if found.slip is None else start.parameters[found.slip]
+        if slip:
+            stuck = None if lost is None else found.held_at(index, lost)
+            trial = self._found(found.with_slip(start, 0.0), stuck, heat)
+            if trial is not None:
+                onward = found.with_slip(trial, slip)
+                return trial if found.is_pushed_back(onward, balanced) else found.settle(onward, heat)
+        return self._found(start, lost, heat)
+
+    def _found(self, start: Point, lost: Lost | None, heat: Heat) -> Point | None:
+        if lost is None:
+            return self.equilibria.settle(start, heat)
+        return self.equilibria.let_go(lost, start.parameters, heat)
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""
         if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > small:
             return after
-        return replace(after, parameters=parameters)
+        slip = self.equilibria.slip
+        kept = replace(after, parameters=parameters)
+        return kept if slip is None else self.equilibria.with_slip(kept, after.parameters[slip])
 
     def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
@@ -198,7 +254,8 @@ class Jumper:
         gain = after - before + jump.entropy_out
         size = max(abs(before), abs(after), abs(jump.entropy_out))
         known = ROUNDING * size + self._entropy_rounding(jump, noise)
-        work = dict(zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True))
+        done = zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True)
+        work = {**jump.work, **{name: jump.work.get(name, 0.0) + moved for name, moved in done}}
         return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -known else VIOLATES, work=work)
 
     def _entropy_rounding(self, jump: Jump, noise: float) -> float:

@@ -226,6 +226,9 @@ class System:
     """Who takes the energy that a jump releases, by the kind of the jump."""
     given: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps [J/m^2], by the account of their work."""
+    pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
+    """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
+    work."""
     pairs: tuple[Pair, ...] = ()
     paces: tuple[Pace, ...] = ()
     profiles: tuple[Profile, ...] = ()

@@ -193,7 +193,8 @@ class Limit(Law):
     """Traction [Pa] at which the interface gives way at once.
 
     The jump conserves energy. Where it would destroy entropy the run follows ``violation``: refuse, warn or accept.
-    ``release`` says what takes part: 'joint' lets the bodies relax within the jump, 'local' leaves the gap as it is.
+    ``release`` says what takes part: 'joint' lets the bodies relax within the jump; 'local' leaves the gap as it is and
+    lets the interface pay alone, before a gap without inertia follows.
     Bonds of a mechanism break into what the first reaction that breaks them makes of them.
     """
 

@@ -11,6 +11,9 @@ from surfacechem.expressions import Expression
 SIDE = "mode.side"
 """Path of the mode that says on which side of touch the gap is."""
 
+SLIP = "mode.slip"
+"""Path of the mode that says whether the interface sticks or slides, and in which direction."""
+
 HELD = "run.held_until"
 """Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
 
@@ -30,10 +33,6 @@ class Mode:
     """The value at the start as it follows from what a case gives, by path, where it does."""
     waits: Mapping[float, str] = field(default_factory=dict)
     """Until when a value holds, in words, where it is meant to be left."""
-
-
-LOAD_STEP = "load"
-"""Name of the transition that a jump of a far-field traction makes."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +73,8 @@ class Transition:
     """Whether nothing happens to the interface: a stage of the loading ends."""
     measure: str = ""
     """What its margin measures, where that of other transitions measures the same."""
+    times: tuple[float, ...] = ()
+    """Times [s] at which it happens, where these are given."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
 
@@ -91,6 +92,8 @@ class Equilibrium:
     """Gaps that move with it, and how far: elastic sticking follows the displacement."""
     active: Expression = 1
     """Zero in modes in which it is held."""
+    slides: int = 0
+    """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import programme, stage_ends
+from surfacechem.assembly.relaxing import relaxing
 from surfacechem.assembly.softening import softening_mode
 from surfacechem.assembly.tangential import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
@@ -53,6 +54,7 @@ STAGES = (
     friction,
     normal_motion,
     tangential_motion,
+    relaxing,
     folds,
     load_steps,
     heat_paths,
@@ -108,6 +110,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         equilibria=tuple(build.equilibria),
         sinks=taking,
         given=dict(build.motion.given),
+        pulls=dict(build.motion.pulls),
         fit=build.fit() if build.fit else None,
         warnings=(
             *build.interface.remarks,

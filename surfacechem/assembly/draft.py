@@ -39,6 +39,8 @@ class Motion:
     """Elastic and kinetic energies of the bodies [J/m^2]."""
     given: dict[str, Expression] = field(default_factory=dict)
     """Potentials of the far-field tractions [J/m^2], which do work in a jump, by the account of that work."""
+    pulls: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
+    """Stiffness, displacement and traction of the far field, and the gap, by the account of the work."""
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)

@@ -45,11 +45,16 @@ def limits(build: Build) -> None:
         return
     if not build.interface.limits:
         t_n = build.variables.get("t_n", "the rigid interface")
-        margin = where(closed > 0, -t_n, 1)
-        build.transitions.append(Transition("open", margin, "the interface opens", {closed: symengine.Integer(0)}))
+        _opening(build, where(closed > 0, -t_n, 1), closed)
     gap = build.variables.get("g_n", "the rigid interface")
     margin = where(closed > 0, 1, gap)
     build.transitions.append(Transition("touch", margin, "the gap closes", {closed: symengine.Integer(1), **again}))
+
+
+def _opening(build: Build, margin: Expression, closed: Expression) -> None:
+    """A rigid interface without bonds opens under tension."""
+    modes = {closed: symengine.Integer(0)}
+    build.transitions.append(Transition("open", margin, "the interface opens", modes, settles=True))
 
 
 def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
@@ -71,12 +76,16 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
     # Closed again, a rigid interface that has debonded bears pressure only.
     holds = bonded if closed is None else closed
     strength = strength if closed is None else bonded * strength
+    margin, modes = where(holds > 0, strength - t_n, 1), [mode for mode in (bonded, closed) if mode is not None]
+    if closed is not None and law.release == "local":
+        margin, modes = where(holds > 0, where(bonded > 0, strength - t_n, 1), 1), [bonded]
+        _opening(build, where(holds > 0, where(bonded > 0, 1, -t_n), 1), closed)
     build.transitions.append(
         Transition(
             "debond",
-            where(holds > 0, strength - t_n, 1),
+            margin,
             OPEN,
-            {mode: none for mode in (bonded, closed) if mode is not None},
+            dict.fromkeys(modes, none),
             broken(build, law, law.breaks),
             settles=True,
             sinks=law.release,

@@ -1,6 +1,7 @@
-"""Far-field tractions that jump: a gap without inertia or damper moves at once to where the tractions balance again.
+"""Loads that jump: a gap without inertia or damper moves at once to where the tractions balance again.
 
-The traction does its work on the way, and what the bodies do not store of it is heat.
+A far-field displacement that jumps does its work on the spring before the gap moves, a far-field traction does it on
+the way. What is not stored of it is heat.
 """
 
 from __future__ import annotations
@@ -9,25 +10,31 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.expressions import Expression, where
-from surfacechem.transitions import LOAD_STEP, Transition
-
-JUMPING = ("F_n", "F_t")
+from surfacechem.transitions import Transition
 
 
 def load_steps(build: Build) -> None:
-    """The transition that a jump of a traction makes, where a gap in equilibrium feels one."""
-    steps = [name for name in JUMPING if name in build.loads and build.loads[name].jumps()]
-    if not (steps and build.equilibria):
+    """The transition that loads make by their jumps, where a gap in equilibrium or a spring feels them."""
+    springs = [k * (w - g) ** 2 / 2 for k, w, _, g in build.motion.pulls.values()]
+    felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
+    steps = {name: load for name, load in build.loads.items() if load.jumps() and felt & _histories(build, name)}
+    if not steps:
         return
     reason = f"{' or '.join(steps)} jumps"
+    times = tuple(sorted({t for load in steps.values() for t in load.jumps()}))
+    # What moves along the interface alone rubs on it; a gap that opens leaves the bodies swinging.
+    sinks = "joint" if any(e.state == "g_n" for e in build.equilibria) else "local"
     never = symengine.Integer(1)
-    build.transitions.append(Transition(LOAD_STEP, never, reason, _sticking(build), settles=True))
+    build.transitions.append(Transition("load", never, reason, _closing(build), settles=True, sinks=sinks, times=times))
 
 
-def _sticking(build: Build) -> dict[Expression, Expression]:
-    """What slides sticks where the traction falls: it is pushed back, and friction does not push."""
-    slip = next((mode.symbol for mode in build.modes if mode.name == "slip"), None)
-    driving = next((item.residual for item in build.equilibria if item.state == "u_t"), None)
-    if slip is None or driving is None:
-        return {}
-    return {slip: where(slip * driving < 0, symengine.Integer(0), slip)}
+def _histories(build: Build, name: str) -> set[Expression]:
+    return {item.symbol for item in build.parameters.items if item.path.startswith(f"loading.{name}.")}
+
+
+def _closing(build: Build) -> dict[Expression, Expression]:
+    """A rigid interface that the loads press together closes as they jump."""
+    for item in build.transitions:
+        if item.name == "touch" and not item.measure:
+            return {mode: where(item.margin < 0, value, mode) for mode, value in item.modes.items()}
+    return {}

@@ -162,6 +162,7 @@ class FarField:
         power = (self.k * (self.w - g) + self.c_b * bulk) * self.w_dot + self.F * rate
         if power != 0:
             build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
+            build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
         if self.F != 0:
             build.motion.given[f"W_{self.axis}"] = self.F * g
         if self.c_b != 0:
@@ -198,7 +199,8 @@ def far_field(build: Build, mount: Held) -> FarField:
         needed = law.k != 0 or law.c_b != 0
         drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
         force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
-        w_dot = build.rate_of(w) if needed and given else symengine.Integer(0)
+        rate_of = build.rate_of if law.c_b != 0 else build.slope_of  # no damper bears a jump
+        w_dot = rate_of(w) if needed and given else symengine.Integer(0)
         build.motion.far_fields[mount.axis] = FarField(
             mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, drive, w_dot, force
         )

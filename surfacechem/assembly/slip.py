@@ -175,7 +175,7 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
             return
         build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
-        build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides))
+        build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
 
 
 def _held_by_friction(build: Build, name: str, driving: Expression) -> None:
@@ -215,7 +215,8 @@ def _elastic_rows(
         return
     residual = t_f - t_e
     build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
-    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, absolute(t_e) + absolute(t_f), active=slides))
+    size = absolute(t_e) + absolute(t_f)
+    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, size, active=slides, slides=-1))
     _carried(build, slides, derivative(t_e, symengine.Symbol("g_t")))
 
 

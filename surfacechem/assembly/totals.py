@@ -8,6 +8,7 @@ from surfacechem import balances
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.sources import by_channel, by_source
 from surfacechem.balances import Node
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
@@ -120,7 +121,20 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     bodies = _merged([(node, s * part) for b, s in halves for node, part in build.volume(b.name)])
     centre = build.node_of.get("interface")
     stores = centre is not None and (centre.prescribed or balances.second(centre.free_energy, centre.T) != 0)
+    if not stores:
+        _refuse_local(build)
     return {"joint": bodies, "local": _merged([(centre, symengine.Integer(1))]) if centre and stores else bodies}
+
+
+def _refuse_local(build: Build) -> None:
+    """Only an interface that stores heat can pay for what breaks."""
+    for law in build.interface.limits:
+        if law.release == "local":
+            raise InputError(
+                "in a local release the interface pays, but here it has no heat of its own. Give it a temperature and "
+                "a capacity, or use `release: joint`, in which the bodies do.",
+                law.place,
+            )
 
 
 def _jump_accounts(build: Build) -> None:

@@ -156,12 +156,13 @@ class EmbeddedScene:
 
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
-        modes = self.moments.modes if self.moments else None
         run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
         table = self.model.problem(run, self.values).parameters
-        self.evaluation.parameters[:] = table[bisect_right(self.breakpoints, t)]
-        if self.moments and modes is not None:
-            self.moments.keep(modes)
+        parameters = table[bisect_right(self.breakpoints, t)]
+        if self.moments:
+            self.moments.begin_piece(parameters)
+        else:
+            self.evaluation.parameters[:] = parameters
 
     def transitions(self, t: float, x: Array) -> Array:
         """Margins of the transitions; that which reaches zero is due."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from surfacechem.equilibria import Point
@@ -21,6 +23,8 @@ class Moments(Hybrid):
 
     evaluation: Evaluation
     """Present state and parameters of the scene."""
+    loads: Array | None = None
+    """Parameters of the piece of time that has just ended."""
 
     @classmethod
     def of(cls, model: Model, problem: Problem, evaluation: Evaluation) -> Moments | None:
@@ -42,8 +46,10 @@ class Moments(Hybrid):
         """Present modes."""
         return self.evaluation.parameters[self.jumper.mode_columns].copy()
 
-    def keep(self, modes: Array) -> None:
-        """Go on with modes where other parameters have changed."""
+    def begin_piece(self, parameters: Array) -> None:
+        """Go on with the present modes and other parameters."""
+        modes, self.loads = self.modes, self.evaluation.parameters.copy()
+        self.evaluation.parameters[:] = parameters
         self.evaluation.parameters[self.jumper.mode_columns] = modes
 
     def here(self) -> Point:
@@ -66,8 +72,13 @@ class Moments(Hybrid):
 
     def settle(self) -> Array | None:
         """Carry out what is due at the state last put: additions to the ledger; None where the scene ends here."""
-        before = self.booked.copy()
-        point = self._settled(self.here())
+        before, here, loads = self.booked.copy(), self.here(), self.loads
+        begun: Point | None = here
+        if loads is not None:
+            histories = [parameter.load is not None for parameter in self.system.parameters]
+            begun = self._begun(here, replace(here, parameters=np.where(histories, loads, here.parameters)))
+            self.loads = None
+        point = self._settled(begun) if begun is not None else None
         return None if point is None else self._taken(point, before)
 
     def fire(self, index: int) -> Array | None:
