@@ -293,13 +293,14 @@ def test_force_spectroscopy_needs_no_gap():
 
 @pytest.mark.parametrize("rtol", [3e-5, 1e-6, 1e-8, 1e-11])
 @pytest.mark.parametrize("stiffness", [1e-6, 1e-3])
-def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness):
+@pytest.mark.parametrize("rest", [0.0, 1e-4])
+def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness, rest):
     """A surface that arrives through a layer of tethers thousands of times thinner than its way."""
     speed, k_on, T = 1e-4, 3.7, 300.0
-    law = GapAttachment(k_on=k_on, stiffness=stiffness)
+    law = GapAttachment(k_on=k_on, stiffness=stiffness, rest_length=rest)
     pair = Body("lower", Hold(level=T)), Body("upper", Hold(level=T))
     interface = Interface(Hold(level=T), [LinearEnthalpy(H_r=20.0)], (), [law], Sites(1e18, 1e18))
-    loading = {"g_n": Ramp(start=3e-4, rate=-speed)}
+    loading = {"g_n": Ramp(start=rest + 3e-4, rate=-speed)}
     scene = Scene(pair, interface, [], loading, T_0=T, initial={"phi": 0.0})
     trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0), rtol=rtol))
     half = k_on / speed * math.sqrt(math.pi * BOLTZMANN * T / (2 * stiffness))
