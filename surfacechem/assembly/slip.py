@@ -232,6 +232,8 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
     """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it."""
     v = build.motion.slides_by[kind.d.velocity]
     build.rows[str(v)] = slides * driving + (1 - slides) * v
+    if build.motion.creeping is not None and len(build.interface.frictions) == 1 and _is_damped(kind):
+        return  # both friction and damper resist the more, the faster it slides
     slope = -derivative(build.expanded(driving), v)
     if slope == 0:
         raise InputError(
@@ -240,6 +242,10 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
             PLACE,
         )
     build.margins.append(Margin(f"stable {v}", where(slides > 0, slope, 1), UNSTABLE))
+
+
+def _is_damped(kind: Kind) -> bool:
+    return kind.mount is not None and kind.mount.damped and not kind.elastic
 
 
 def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
