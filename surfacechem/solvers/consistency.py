@@ -16,6 +16,7 @@ from surfacechem.solvers.native import (
     DELTA,
     ERROR,
     JACOBIAN,
+    NOISE,
     RESIDUAL,
     RHS,
     TRIAL,
@@ -25,9 +26,12 @@ from surfacechem.solvers.native import (
     finite,
     set_inputs,
 )
+from surfacechem.solvers.noise import spread_noise
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 100
+ROUNDED = 8
+"""Corrections after which one that rounding explains is believed to be nothing else."""
 SMALLEST_PIVOT = 1e-15
 
 
@@ -130,6 +134,17 @@ def _damped(w: Any, delta: Any) -> bool:
 
 
 @compiled
+def _rounds(w: Any, delta: Any) -> bool:
+    """Whether a correction is no larger than what rounding of the equations makes of it."""
+    spread_noise(w, TRIAL, TRIAL_DOT)
+    largest = 0.0
+    for j in range(delta.shape[0]):
+        if w.algebraic[j]:
+            largest = max(largest, abs(delta[j]) - 2.0 * w.vector[NOISE, j])
+    return largest <= 0.0
+
+
+@compiled
 def find_consistent(w: Any) -> int:
     """Make the trial state consistent at the time in the inputs."""
     if not _residual(w):
@@ -139,7 +154,7 @@ def find_consistent(w: Any) -> int:
     for flag in w.algebraic:
         nonlinear = nonlinear or flag
     norm_last = np.inf
-    for _iteration in range(LIMIT):
+    for iteration in range(LIMIT):
         if not _factor(w):
             return SINGULAR_STATE
         norm = _correction(w, delta)
@@ -149,6 +164,8 @@ def find_consistent(w: Any) -> int:
         if not nonlinear or norm <= 1e-15 or norm_last <= 1e-11:
             _shift(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
+        if iteration >= ROUNDED and _rounds(w, delta):
+            return CONSISTENT
         if not _damped(w, delta):
             # At rounding level the corrections cannot fall any more.
             return CONSISTENT if norm <= 1e-9 else NO_STATE

@@ -8,25 +8,67 @@ about to fail, so smooth runs do not pay for it.
 from typing import Any
 
 from surfacechem.solvers.chains import solve_real
-from surfacechem.solvers.native import DELTA, MEMBER, NOISE, SCALE, YDOT, Y, clear, compiled
+from surfacechem.solvers.native import (
+    ATOL,
+    DELTA,
+    H_FACTORED,
+    MEMBER,
+    NOISE,
+    RESIDUAL,
+    RTOL,
+    SCALE,
+    WOBBLE,
+    WOBBLE_BEFORE,
+    WOBBLE_EARLIER,
+    WOBBLE_NOW,
+    YDOT,
+    Y,
+    clear,
+    compiled,
+    copy,
+    evaluate,
+    set_inputs,
+)
 from surfacechem.solvers.radau_tables import GAMMA
 
 ULPS = 4.4e-16
 """Rounding of a term: its own, and that of the sum it enters."""
 
+NEIGHBOURS, NEAR = 6, 1e-3
+"""Times at which equations are compared, and how far they are apart as parts of a step: near enough for any smooth
+equation to be a straight line.
+"""
+
 LARGEST = 1e-6
-"""Noise above this part of a variable would mean a singular matrix, not rounding."""
+"""Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
 
 
 @compiled
-def _row_noise(w: Any, i: int) -> float:
+def _measure_wobble(w: Any, y: int, ydot: int) -> None:
+    """How much the equations differ from smooth ones over neighbouring times: what their loads round to."""
+    t = w.inputs[0]
+    clear(w.vector[WOBBLE])
+    set_inputs(w, w.vector[y], w.vector[ydot])
+    for k in range(NEIGHBOURS):
+        w.inputs[0] = t + k * NEAR * w.clock[H_FACTORED]
+        copy(w.vector[WOBBLE_BEFORE], w.vector[WOBBLE_EARLIER])
+        copy(w.vector[WOBBLE_NOW], w.vector[WOBBLE_BEFORE])
+        evaluate(w, RESIDUAL, w.vector[WOBBLE_NOW].ctypes.data)
+        for i in range(w.algebraic.shape[0] if k > 1 else 0):
+            bend = w.vector[WOBBLE_NOW, i] - 2.0 * w.vector[WOBBLE_BEFORE, i] + w.vector[WOBBLE_EARLIER, i]
+            w.vector[WOBBLE, i] = max(w.vector[WOBBLE, i], abs(bend))
+    w.inputs[0] = t
+
+
+@compiled
+def _row_noise(w: Any, i: int, y: int, ydot: int) -> float:
     """Rounding error of equation i, whose terms are as large as its derivatives times their variables."""
     total = 0.0
     for j in range(w.jacobian.shape[1]):
-        total += abs(w.jacobian[0, i, j] * w.vector[Y, j]) + abs(w.jacobian[1, i, j] * w.vector[YDOT, j])
+        total += abs(w.jacobian[0, i, j] * w.vector[y, j]) + abs(w.jacobian[1, i, j] * w.vector[ydot, j])
     if w.chains.shape[0] > 0:
         total += _border_noise(w, i)
-    return ULPS * total
+    return max(ULPS * total, w.vector[WOBBLE, i])
 
 
 @compiled
@@ -56,25 +98,33 @@ def _chain_noise(w: Any, column: Any) -> None:
 
 
 @compiled
-def find_noise(w: Any) -> None:
-    """Largest change of each variable that rounding errors of the residuals can cause, into NOISE."""
+def spread_noise(w: Any, y: int, ydot: int) -> None:
+    """Change of each variable that rounding errors of the residuals at these states can cause, into NOISE."""
     n = w.algebraic.shape[0]
     column = w.vector[DELTA]
+    _measure_wobble(w, y, ydot)
     for j in range(n):
-        w.vector[NOISE, j] = ULPS * abs(w.vector[Y, j])
+        w.vector[NOISE, j] = ULPS * abs(w.vector[y, j])
     core = w.jacobian.shape[1]
     for i in range(core if w.chains.shape[0] == 0 else core + 1):
         clear(column)
         if i < core:
-            column[i] = _row_noise(w, i)
+            column[i] = _row_noise(w, i, y, ydot)
         else:
             # Heat that enters a chain anywhere raises its temperatures everywhere: nothing cancels in one sum.
             _chain_noise(w, column)
         solve_real(w, column)
         for j in range(n):
             w.vector[NOISE, j] += abs(column[j])
-    for j in range(n):
-        w.vector[NOISE, j] = min(w.vector[NOISE, j], LARGEST * w.vector[SCALE, j])
+
+
+@compiled
+def find_noise(w: Any) -> None:
+    """Largest change of each variable at the start of the step that rounding errors can cause, into NOISE."""
+    spread_noise(w, Y, YDOT)
+    for j in range(w.algebraic.shape[0]):
+        most = max(LARGEST * w.vector[SCALE, j], w.vector[ATOL, j] / w.clock[RTOL])
+        w.vector[NOISE, j] = min(w.vector[NOISE, j], most)
 
 
 @compiled

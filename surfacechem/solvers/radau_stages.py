@@ -317,8 +317,7 @@ def solve_stages(w: Any, h: float) -> int:
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
             if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > TIGHT:
-                w.clock[GUESSED] = 0.0
-                return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
+                break
             w.clock[THETA] = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
         believed = iteration > 0 or w.clock[RTOL] < COARSE
@@ -326,4 +325,5 @@ def solve_stages(w: Any, h: float) -> int:
             w.clock[CONTRACTION] = contraction
             return CONVERGED
         norm_last = max(norm, 1e-300)
-    return DIVERGED
+    w.clock[GUESSED] = 0.0
+    return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
