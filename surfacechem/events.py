@@ -137,7 +137,7 @@ class Hybrid:
             if index is None:
                 self.status = part.status
                 return None
-            jumped = self._jump(index, self.jumper.equilibria.in_time(index, point, end))
+            jumped = self._jump(index, self.jumper.equilibria.in_time(index, point, end), point)
             if jumped is None:
                 return None
             point = jumped
@@ -298,11 +298,11 @@ class Hybrid:
         found = consistent(self.problem.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
         return Point(point.t, found.y, found.ydot, point.parameters)
 
-    def _jump(self, index: int, point: Point, unloaded: Point | None = None) -> Point | None:
+    def _jump(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
         largest, drift = float(self.largest[self.first + index]), DRIFT * self.problem.rtol
-        balanced, since = drift if unloaded is None else BALANCED, self._since(point.t)
-        jump = self.jumper.make(index, point, since, NOISE * largest, drift * largest, balanced, unloaded)
+        balanced = BALANCED if self.system.transitions[index].times else drift
+        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift * largest, balanced, last)
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict

@@ -159,11 +159,11 @@ class Jumper:
         noise: float = 0.0,
         drift: float = 0.0,
         balanced: float = BALANCED,
-        unloaded: Point | None = None,
+        last: Point | None = None,
     ) -> Jump:
         """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
         far the integration may have carried it, and ``balanced`` the part of tractions by which it leaves them out of
-        balance. Where loads jump ``unloaded`` is the state under those before.
+        balance. ``last`` is the state before loads jump, or where the integration ended close to a fold.
         """
         item = self.system.transitions[index]
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
@@ -175,7 +175,7 @@ class Jumper:
         start = Point(before.t, values[:n], np.zeros(n), parameters)
         if not np.isfinite(self._books(start.inputs())[0]):
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
-        books, lift = self._opened(before, unloaded)
+        books, lift = self._opened(item, before, last)
         energy = float(books[0])
         after: Point | None = start
         if item.settles:
@@ -208,14 +208,20 @@ class Jumper:
         (_, *old), (_, *new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (before, point))
         return not np.allclose([old[0], old[2]], [new[0], new[2]], rtol=BALANCED, atol=ATOM)
 
-    def _opened(self, before: Point, unloaded: Point | None) -> tuple[Array, dict[str, float]]:
-        """The books before a jump, and the work of far-field displacements that jump before anything moves."""
-        if unloaded is None:
+    def _opened(self, item: Transition, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
+        """The books before a jump, and the work up to there that the integration has not seen.
+
+        That of far-field displacements that jump before anything moves, and that on the last of the way to a fold.
+        """
+        if last is None or not (item.times or item.fold):
             return self._books(before.inputs()), {}
-        books = self._books(unloaded.inputs())
+        books = self._books((last if item.times else before).inputs())
         if not self.system.pulls:
             return books, {}
-        (k, w, F, g), (_, w_new, F_new, _) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (unloaded, before))
+        (k, w, F, g), (_, w_new, F_new, g_new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (last, before))
+        if item.fold:
+            way = k * (w_new - w) * ((w_new + w) - (g_new + g)) / 2 + (F_new + F) / 2 * (g_new - g)
+            return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
         lift = k * (w_new - w) * ((w_new + w) / 2 - g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)
         accounts = list(self.system.pulls)

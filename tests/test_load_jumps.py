@@ -5,6 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from surfacechem.case import load_text
+from surfacechem.errors import InputError
+from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.simulation import Simulation
 
 OWN, LIBRARY = "radau", "lsoda"
@@ -164,7 +166,7 @@ def test_an_open_rigid_gap_follows_a_jump_or_closes(F):
 
 
 def test_a_damper_bears_no_jump_of_the_displacement():
-    with pytest.raises(Exception, match="w_n stores energy, so it cannot jump"):
+    with pytest.raises(InputError, match="w_n cannot jump"):
         normal(JUMPS, mount="k: 1e12, c_b: 1e12")
 
 
@@ -329,3 +331,25 @@ def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls(h
         assert at(solution, "g_t", t) == pytest.approx(g, rel=1e-9)
     heat = 4e9 / 2 * (held**2 - 0.0625e-3**2)
     assert sum(jump.released for jump in solution.trajectory.jumps) == pytest.approx(heat, rel=1e-9)
+
+
+@pytest.mark.parametrize("loading", [f"{RISES}, {PULLED}", f"{FALLS}, {PULLED}"])
+def test_loads_jump_in_a_reactor_network(loading):
+    case = load_text(SLIDER.format(loading=loading, potential="", static="", outputs=25, solver=OWN))
+    solution = Simulation(case).run(error="balances")
+    interface = InterfaceReactor(case)
+    net = ReactorNet([interface])
+    net.rtol, net.atol = 1e-10, 1e-16
+    net.advance(6.0)
+    ours, theirs = interface.scene.moments.jumps, solution.trajectory.jumps
+    assert [jump.transition.name for jump in ours] == [jump.transition.name for jump in theirs]
+    assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
+    assert interface["u_t"] == pytest.approx(at(solution, "u_t", 6.0), rel=1e-9)
+    assert interface.dataset.attrs["energy_error"] < 1e-6
+
+
+def test_loads_jump_in_a_sweep():
+    case = load_text(SLIDER.format(loading=f"{RISES}, {PULLED}", potential="", static="", outputs=7, solver=OWN))
+    sweep = Simulation(case).sweep({"mechanics.tangential.k": [1e9, 2e9, 1e12]})
+    u = sweep.dataset["u_t"].isel(time=-1).values
+    np.testing.assert_allclose(u, 1.5e-3 - 1e6 / np.array([1e9, 2e9, 1e12]), rtol=1e-11)

@@ -199,8 +199,9 @@ def far_field(build: Build, mount: Held) -> FarField:
         needed = law.k != 0 or law.c_b != 0
         drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
         force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
-        rate_of = build.rate_of if law.c_b != 0 else build.slope_of  # no damper bears a jump
-        w_dot = rate_of(w) if needed and given else symengine.Integer(0)
+        if law.c_b != 0 and given:
+            _refuse_jumps(build, w)
+        w_dot = build.slope_of(w) if needed and given else symengine.Integer(0)
         build.motion.far_fields[mount.axis] = FarField(
             mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, drive, w_dot, force
         )
@@ -217,3 +218,13 @@ def _bound(build: Build, mount: Held) -> Mounting | FarField:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
+
+
+def _refuse_jumps(build: Build, w: str) -> None:
+    load = build.loads.get(w)
+    if load is not None and load.jumps():
+        raise InputError(
+            f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
+            "traction. Give the jump a duration, or leave out the damper.",
+            load.place,
+        )
