@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 
 NO_REST = "no gap follows at which the tractions are in equilibrium; with a mass or a damper it would move on"
+NO_DOMAIN = "no gap follows at which the tractions are in equilibrium and the laws hold"
 NO_HEAT = "it would take more heat than there is"
 NO_ENERGY = "the energy of the interface is not finite after it"
 
@@ -185,9 +186,10 @@ class Jumper:
 
             after = self._rested(index, start, lost, heat, balanced)
             after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
-        heated = self._heated(after, item.sinks, energy) if after is not None else None
+        beyond = self._beyond(item, after)
+        heated = self._heated(after, item.sinks, energy) if after is not None and not beyond else None
         if heated is None:
-            obstacle = NO_REST if after is None else NO_HEAT
+            obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
         jump = Jump(
@@ -238,6 +240,10 @@ class Jumper:
         if lost is None:
             return self.equilibria.settle(start, heat)
         return self.equilibria.let_go(lost, start.parameters, heat)
+
+    def _beyond(self, item: Transition, after: Point | None) -> str:
+        """Why laws end before the gaps come to rest, where they do; what changes at touch leaves them where they are."""
+        return self.equilibria.beyond(after) if after is not None and item.settles and not item.measure else ""
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""

@@ -189,7 +189,7 @@ class Build(Draft):
         for name in law.positive:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} > 0", value, reason))
+            self.margins.append(Margin(f"{name} > 0", value, reason, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
@@ -205,9 +205,9 @@ class Build(Draft):
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
             reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
             if math.isfinite(low):
-                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
+                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
             if math.isfinite(high):
-                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
+                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
 
     def volume(self, body: str) -> list[tuple[Node, Expression]]:
         """The nodes of a body with their parts of its volume; the one at the contact is the first."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import symengine
 
 from surfacechem.assembly.breaking import bonds_left, broken, follows_bonds
@@ -15,22 +17,23 @@ OPEN = "the interface debonds as its tensile strength is reached"
 
 
 def bonded_mode(build: Build) -> None:
-    """Whether the interface is bonded, for the potentials that ask; it is, where nothing limits it."""
-    if build.interface.limits:
-        words = {0.0: "debonded", 1.0: "bonded"}
-        start = _starts_bonded(build)
-        build.variables.define("bonded", lambda: build.mode("bonded", 1.0, words, start), "mode", "interface.limits")
-    else:
-        build.variables.define("bonded", lambda: symengine.Integer(1), "internal", "no limit of the traction")
+    """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
+    by = "interface.limits" if build.interface.limits else "no limit of the traction"
+    build.variables.define("bonded", partial(_bonded, build), "mode", by)
+
+
+def _bonded(build: Build) -> Expression:
+    return build.mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"}, _starts_bonded(build))
 
 
 def _starts_bonded(build: Build) -> Expression | None:
     """An open gap without bonds is not bonded."""
     closed = next((mode.start for mode in build.modes if mode.name == "closed"), None)
-    bonds = bonds_left(build)
-    if closed is not None or bonds is None or "g_n" not in build.motion.gap_rates:
+    if closed is not None or not build.variables.has("g_n"):
         return closed
-    return where(bonds > 0, 1, where(symengine.Symbol("g_n") > 0, 0, 1))
+    start = where(build.variables.get("g_n", "the bonds") > 0, 0, 1)
+    bonds = bonds_left(build)
+    return start if bonds is None else where(bonds > 0, 1, start)
 
 
 def limits(build: Build) -> None:
