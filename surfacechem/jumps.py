@@ -242,7 +242,7 @@ class Jumper:
         return self.equilibria.let_go(lost, start.parameters, heat)
 
     def _beyond(self, item: Transition, after: Point | None) -> str:
-        """Why laws end before the gaps come to rest, where they do; what changes at touch leaves them where they are."""
+        """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
         return self.equilibria.beyond(after) if after is not None and item.settles and not item.measure else ""
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:

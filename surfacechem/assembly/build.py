@@ -126,6 +126,15 @@ class Build(Draft):
         known = next((p.symbol for p in self.parameters.items if p.path == HELD), None)
         return known if known is not None else self.constant("held_until", HELD, spec, 0.0, internal=True)
 
+    def at_start(self, expression: Expression) -> float:
+        """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""
+        values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items}
+        try:
+            found = self.expanded(expression).subs(values)
+            return float(found.subs({x: self.scene.initial.get(str(x), 1.0) for x in found.free_symbols}))
+        except RuntimeError:  # a condition on a number that is undefined
+            return math.nan
+
     def total_derivative(self, expression: Expression) -> Expression:
         """Time derivative of an expression of the states and of prescribed variables."""
         expanded = self.expanded(expression)

@@ -13,11 +13,11 @@ from surfacechem.system import Margin
 OVERLAP, OPENING = -1.0, 1e-15
 """Gaps [m] deep in contact and as good as at touch; a law that bears contact has more pressure at the former."""
 
+LEAST = 1e-3
+"""Pressure [Pa] deep in contact that bears nothing; bonds that have all but gone leave less."""
+
 TOUCHING = 1e-12
 """Overlap [m] that still is touch: far below the size of an atom, far above the rounding of a gap."""
-
-UNIT = 1.0
-"""What stands for a variable without initial value; only a sign depends on it."""
 
 REMEDY = "Give a potential that does, such as `penalty`"
 RIGID = ", or leave out the mass and the damper: contact on a stiffness alone is rigid."
@@ -29,24 +29,20 @@ def closing(build: Build, g: Any) -> None:
     if any(margin.name == "g_n > 0" for margin in build.margins):
         return
     borne = _borne(build, g)
-    bears = _at_start(build, borne) > 0
-    if bears and not borne.free_symbols & {bond.symbol for bond in build.bonding.values()}:
+    without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
+    # A law may have no number there.
+    if not build.at_start(without_bonds) <= LEAST:
         return
     remedy = REMEDY + ("." if g in build.psi.free_symbols else RIGID)
-    if not bears:
+    if build.at_start(borne) <= LEAST:
         build.warnings.append(f"no potential bears the bodies in contact: the run ends if the gap closes. {remedy}")
     gap = g + TOUCHING
-    margin = where(borne > 0, 1, gap) if borne.free_symbols else gap
+    margin = where(borne > LEAST, 1, gap) if borne.free_symbols else gap
     build.margins.append(Margin("g_n >= 0", margin, CLOSED, remedy=remedy, domain=True))
 
 
 def _borne(build: Build, g: Any) -> Expression:
-    """Pressure that the potentials gain from touch to deep in contact [Pa]."""
+    """Pressure that the potentials bear deep in contact [Pa]; none where it is the same as at touch."""
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
-    return t_n.subs({g: OPENING, side: 1}) - t_n.subs({g: OVERLAP, side: -1})
-
-
-def _at_start(build: Build, borne: Expression) -> float:
-    values = {parameter.symbol: parameter.at(0.0) for parameter in build.parameters.items}
-    found = borne.subs(values)
-    return float(found.subs({x: build.scene.initial.get(str(x), UNIT) for x in found.free_symbols}))
+    deep = t_n.subs({g: OVERLAP, side: -1})
+    return symengine.Integer(0) if deep == t_n.subs({g: OPENING, side: 1}) else -deep
