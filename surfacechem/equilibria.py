@@ -107,21 +107,6 @@ class Equilibria:
         return derivative(residual, symbols[e.state]) + sum(others)
 
     @cached_property
-    def _ends(self) -> tuple[Function, list[str]] | None:
-        """What is positive where the laws hold, of all that the gaps move, and why they end there."""
-        gaps = {state.symbol for state in self.system.states if state.name in {e.state for e in self.items}}
-        ends = [(self.system.expand(item.expression), item.reason) for item in self.system.margins if item.domain]
-        moved = {reason: end for end, reason in ends if end.free_symbols & gaps}
-        return (compile_function(self.system.inputs, list(moved.values())), list(moved)) if moved else None
-
-    def beyond(self, point: Point) -> str:
-        """Why the laws do not hold at a point, where the gaps have left their domain."""
-        if self._ends is None:
-            return ""
-        function, reasons = self._ends
-        return next((why for value, why in zip(function(point.inputs()), reasons, strict=True) if not value > 0), "")
-
-    @cached_property
     def _active(self) -> Function:
         """Which gaps are not held."""
         return compile_function(self.system.inputs, [self.system.expand(e.active) for e in self.items])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
+from surfacechem.domains import Domain
 from surfacechem.equilibria import BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Account, System
@@ -243,7 +244,13 @@ class Jumper:
 
     def _beyond(self, item: Transition, after: Point | None) -> str:
         """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
-        return self.equilibria.beyond(after) if after is not None and item.settles and not item.measure else ""
+        if after is None or not item.settles or item.measure:
+            return ""
+        return self._domain.beyond(after.inputs())
+
+    @cached_property
+    def _domain(self) -> Domain:
+        return Domain(self.system)
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""
