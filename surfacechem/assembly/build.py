@@ -128,7 +128,8 @@ class Build(Draft):
 
     def at_start(self, expression: Expression) -> float:
         """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""
-        values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items}
+        values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items} | {self.t: 0.0}
+        values |= {state.symbol: state.initial for state in self.states}
         try:
             found = self.expanded(expression).subs(values)
             return float(found.subs({x: self.scene.initial.get(str(x), 1.0) for x in found.free_symbols}))
