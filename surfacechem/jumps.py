@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
+from surfacechem.domains import Domain
 from surfacechem.equilibria import BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.system import Account, System
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 ADMISSIBLE, VIOLATES, IMPOSSIBLE = "admissible", "destroys entropy", "impossible"
 
 NO_REST = "no gap follows at which the tractions are in equilibrium; with a mass or a damper it would move on"
+NO_DOMAIN = "no gap follows at which the tractions are in equilibrium and the laws hold"
 NO_HEAT = "it would take more heat than there is"
 NO_ENERGY = "the energy of the interface is not finite after it"
 
@@ -185,9 +187,10 @@ class Jumper:
 
             after = self._rested(index, start, lost, heat, balanced)
             after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
-        heated = self._heated(after, item.sinks, energy) if after is not None else None
+        beyond = self._beyond(item, after)
+        heated = self._heated(after, item.sinks, energy) if after is not None and not beyond else None
         if heated is None:
-            obstacle = NO_REST if after is None else NO_HEAT
+            obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
         jump = Jump(
@@ -244,6 +247,16 @@ class Jumper:
         if lost is None:
             return self.equilibria.settle(start, heat)
         return self.equilibria.let_go(lost, start.parameters, heat)
+
+    def _beyond(self, item: Transition, after: Point | None) -> str:
+        """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
+        if after is None or not item.settles or item.measure:
+            return ""
+        return self._domain.beyond(after.inputs())
+
+    @cached_property
+    def _domain(self) -> Domain:
+        return Domain(self.system)
 
     def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""

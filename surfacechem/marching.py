@@ -50,4 +50,6 @@ def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise:
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    return float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))
+    found = float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))
+    # At a pole the sign changes too, but there is no zero.
+    return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found

@@ -138,6 +138,8 @@ class Margin:
     """What to change where it is closed from the start."""
     peak: bool = False
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
+    domain: bool = False
+    """Whether a law ends there, so that no equilibrium lies beyond."""
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,6 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         ("debonding", "loading.w_n={table: {times: [0 s, 9 s], values: [0, 9 um]}}", "it needs w_dot"),
         ("debonding-cooling", "loading.w_n.ramp.start=0.1 um", "its w_n is"),
         ("compliant-debonding", "loading.g_n={table: {times: [0 s, 8 s], values: [0, 8.1 um]}}", "its g_n is"),
-        ("compliant-debonding", "interface.bonding.compliant-debonding.E_b=1.001e15", "it misses the equation of phi"),
         ("compliant-debonding", "reference.g_f=30 um", "it is given for g_f = 3e-05 m; the scene has 2.425e-05 m"),
         ("rate-and-state-slip-law", "reference.v_step=9 um/s", "its v is 9e-06, the scene's 1e-05"),
         ("stick-slip-rebonding", "initial.phi=1e-9", "it starts from phi = 0, the scene from 1e-09"),

@@ -32,6 +32,7 @@ FLOORS = {
     "time": [
         "solvers.*",
         "marching",
+        "domains",
         "equilibria",
         "jumps",
         "stretches",

@@ -126,6 +126,16 @@ class Build(Draft):
         known = next((p.symbol for p in self.parameters.items if p.path == HELD), None)
         return known if known is not None else self.constant("held_until", HELD, spec, 0.0, internal=True)
 
+    def at_start(self, expression: Expression) -> float:
+        """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""
+        values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items} | {self.t: 0.0}
+        values |= {state.symbol: state.initial for state in self.states}
+        try:
+            found = self.expanded(expression).subs(values)
+            return float(found.subs({x: self.scene.initial.get(str(x), 1.0) for x in found.free_symbols}))
+        except RuntimeError:  # a condition on a number that is undefined
+            return math.nan
+
     def total_derivative(self, expression: Expression) -> Expression:
         """Time derivative of an expression of the states and of prescribed variables."""
         expanded = self.expanded(expression)
@@ -189,7 +199,7 @@ class Build(Draft):
         for name in law.positive:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} > 0", value, reason))
+            self.margins.append(Margin(f"{name} > 0", value, reason, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
@@ -205,9 +215,9 @@ class Build(Draft):
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
             reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
             if math.isfinite(low):
-                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason))
+                self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
             if math.isfinite(high):
-                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason))
+                self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
 
     def volume(self, body: str) -> list[tuple[Node, Expression]]:
         """The nodes of a body with their parts of its volume; the one at the contact is the first."""

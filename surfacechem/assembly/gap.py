@@ -8,6 +8,7 @@ import symengine
 
 from surfacechem.assembly.breaking import bonds_left
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.closing import closing
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, where
@@ -103,6 +104,7 @@ def normal_motion(build: Build) -> None:
     t_n = derivative(build.psi, g)
     if not mount.quasi_static:
         build.variables.get("v_n", "the mechanics")
+    closing(build, g)
     far.book(build, g, rate)
     if mount.inertial:
         build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate

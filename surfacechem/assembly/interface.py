@@ -153,6 +153,7 @@ def free_energy(build: Build) -> None:
         build.refuse_foreign(F, _known(build), law)
         build.psi += F
         build.law_ranges(law)
+        build.law_margins(bound, {})
     _sides_of_touch(build)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]

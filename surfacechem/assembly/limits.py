@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import symengine
 
 from surfacechem.assembly.breaking import bonds_left, broken, follows_bonds
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.mounting import law_reads
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, where
+from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.terms import Limit
 from surfacechem.transitions import Transition
 
@@ -15,22 +18,23 @@ OPEN = "the interface debonds as its tensile strength is reached"
 
 
 def bonded_mode(build: Build) -> None:
-    """Whether the interface is bonded, for the potentials that ask; it is, where nothing limits it."""
-    if build.interface.limits:
-        words = {0.0: "debonded", 1.0: "bonded"}
-        start = _starts_bonded(build)
-        build.variables.define("bonded", lambda: build.mode("bonded", 1.0, words, start), "mode", "interface.limits")
-    else:
-        build.variables.define("bonded", lambda: symengine.Integer(1), "internal", "no limit of the traction")
+    """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
+    given = ("mode", "interface.limits") if build.interface.limits else ("internal", "no limit of the traction")
+    build.variables.define("bonded", partial(_bonded, build), *given)
+
+
+def _bonded(build: Build) -> Expression:
+    return build.mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"}, _starts_bonded(build))
 
 
 def _starts_bonded(build: Build) -> Expression | None:
     """An open gap without bonds is not bonded."""
     closed = next((mode.start for mode in build.modes if mode.name == "closed"), None)
-    bonds = bonds_left(build)
-    if closed is not None or bonds is None or "g_n" not in build.motion.gap_rates:
+    if closed is not None or not build.variables.has("g_n"):
         return closed
-    return where(bonds > 0, 1, where(symengine.Symbol("g_n") > 0, 0, 1))
+    start = where(build.variables.get("g_n", "the bonds") > 0, 0, 1)
+    bonds = bonds_left(build)
+    return start if bonds is None else where(bonds > 0, 1, start)
 
 
 def limits(build: Build) -> None:
@@ -80,19 +84,34 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
     if closed is not None and law.release == "local":
         margin, modes = where(holds > 0, where(bonded > 0, strength - t_n, 1), 1), [bonded]
         _opening(build, where(holds > 0, where(bonded > 0, 1, -t_n), 1), closed)
+    breaks = broken(build, law, law.breaks)
+    _refuse_idle(build, law, {*modes, *breaks})
     build.transitions.append(
         Transition(
             "debond",
             margin,
             OPEN,
             dict.fromkeys(modes, none),
-            broken(build, law, law.breaks),
+            breaks,
             settles=True,
             sinks=law.release,
             violation=law.violation,
         )
     )
     return follows_bonds(build, strength)
+
+
+def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
+    """A limit of a tension that bonds do not carry would change nothing."""
+    g = symengine.Symbol("g_n")
+    if not depends(build.psi, g) or build.expanded(derivative(build.psi, g)).free_symbols & changed:
+        return
+    names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
+    raise InputError(
+        f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds. Let it: use "
+        "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
+        law.place,
+    )
 
 
 def _traction(build: Build, law: Limit) -> Expression:

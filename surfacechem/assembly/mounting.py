@@ -103,10 +103,11 @@ def _driven(build: Build, name: str) -> bool:
 
 def read_by_potentials(build: Build, name: str) -> bool:
     """Whether the free energy of the interface depends on a variable."""
-    return any(_reads(law, name) for law in build.interface.potentials)
+    return any(law_reads(law, name) for law in build.interface.potentials)
 
 
-def _reads(law: Law, name: str) -> bool:
+def law_reads(law: Law, name: str) -> bool:
+    """Whether a law depends on a variable, by itself or by a factor."""
     values = (getattr(law, parameter) for parameter, _ in law.specs())
     factors = (factor for value in values if isinstance(value, Varying) for factor in value.factors)
     return name in reads(law.statement) or any(factor.of == name for factor in factors)

@@ -8,10 +8,20 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import far_field, held
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES
+from surfacechem.system import Margin
 from surfacechem.terms import RateLaw
 from surfacechem.transitions import Transition
+
+MATCH = 1e-6
+"""Relative difference of two statements of a strength that rounded input explains."""
+
+RESOLVED, FINEST = 1 - 1e-9, 1e-9
+"""Largest and least part of the opening at which the last bonds break, at which the first ones may."""
+
+SAME = "Give `bond-stiffness` and this law the same E_b."
 
 
 def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:
@@ -37,6 +47,36 @@ def softening_mode(build: Build) -> None:
         build.variables.define("v_n", partial(_velocity, build), "derived", "rate of the normal gap")
 
 
+def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> None:
+    """The envelope falls after it rose, from the traction that complete bonding bears there."""
+    t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
+    t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
+    bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
+    _refuse_steep(law, build.at_start(peak), build.at_start(g_f))
+    borne, strength = build.at_start(bonds), build.at_start(t_max)
+    if abs(borne - strength) > MATCH * strength:
+        raise InputError(
+            f"{law.name()}: at t_max / E_b = {build.at_start(peak):g} m the bonds of the potential bear {borne:g} Pa, "
+            f"not the t_max of {strength:g} Pa. {SAME}",
+            law.place,
+        )
+    # What varies, and what a sweep gives, is watched.
+    reason = "the bonds of the potential bear another traction than t_max where they begin to break"
+    build.margins += [
+        Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
+        Margin("t_max", 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1), reason, remedy=SAME),
+    ]
+
+
+def _refuse_steep(law: RateLaw, peak: float, g_f: float) -> None:
+    what = f"{law.name()}: t_max / E_b = {peak:g} m, where complete bonding begins to break,"
+    if not peak < RESOLVED * g_f:
+        message = f"is not below g_f = {g_f:g} m: the traction would have to snap back. Raise g_f, or use a limit."
+        raise InputError(f"{what} {message}", law.place)
+    if peak < FINEST * g_f:
+        raise InputError(f"{what} is less than {FINEST:g} g_f, too little to be resolved. Lower E_b.", law.place)
+
+
 def _velocity(build: Build) -> Expression:
     rate = build.motion.gap_rates["g_n"] if "g_n" in build.motion.gap_rates else build.rate_of("g_n")
     return build.name(VARIABLES["v_n"], rate)
@@ -52,6 +92,7 @@ def softening(build: Build, law: RateLaw) -> None:
     peak = law.peak()  # type: ignore[attr-defined]
     none, one = symengine.Integer(0), symengine.Integer(1)
     lost = {mode: -one}
+    _check(build, law, phi, g_n, peak)
     build.transitions += [
         Transition("soften", where(mode**2 > 0, 1, left - phi), "bonds begin to break as the gap opens", {mode: one}),
         *_tear(build, mode, phi, left),

@@ -15,7 +15,8 @@ class CompliantDebonding(RateLaw):
     With the potential :math:`\tfrac12 \phi E_b g_n^2` the traction is the bilinear law of cohesive zones: it peaks at
     :math:`t_{max}` and ends at :math:`g_f`; unloading goes back to zero gap along :math:`\phi E_b`. The break is
     irreversible. Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear form as in
-    Camanho & Davila (2002), NASA/TM-2002-211737. Admissible where the elastic energy of a bond exceeds its bond energy.
+    Camanho & Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential.
+    Admissible where the elastic energy of a bond exceeds its bond energy.
 
     >>> law = CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)
     >>> law.envelope(g_n=1e-8), round(law.envelope(g_n=3e-8), 12)
