@@ -35,6 +35,7 @@ FLOORS = {
         "equilibria",
         "jumps",
         "stretches",
+        "watching",
         "stalls",
         "events",
         "pacing",
