@@ -18,9 +18,10 @@ from surfacechem.jumps import Jump, Jumper, booked
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
-from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined
+from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined, piece
 from surfacechem.system import START, System
 from surfacechem.transitions import HELD, SLIP
+from surfacechem.watching import sizes, to_pass
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,8 @@ LATE, RENEWALS = 1e-6, 4
 AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
 
-HOLDABLE = ("stop", "touch", "release")
+SLIDING = ("stop", "slip", "slip forward", "slip backward")
+HOLDABLE = (*SLIDING, "touch", "release")
 HOLD, LONGEST_HOLD = 1e-9, 1e-4
 """Transitions whose chatter is resolved, and the parts of a piece of time for which it is: the first time, then
 longer, and at most."""
@@ -163,6 +165,8 @@ class Hybrid:
             max_steps=problem.max_steps - self.steps,
             max_seconds=seconds,
             exchanged=self.exchanged,
+            goes_on=end < problem.segments[-1],
+            seen=sizes(problem, self.system.states, start, self.largest),
         )
         return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
@@ -243,17 +247,13 @@ class Hybrid:
             return False
         name = self.jumps[-1].transition.name
         if name in HOLDABLE:
-            if name == "stop":
+            if name in SLIDING:
                 point.parameters[columns[SLIP]] = 0.0
-            point.parameters[columns[HELD]] = point.t + max(self.hold * self._piece(point.t), MOMENT * point.t)
+            point.parameters[columns[HELD]] = point.t + max(
+                self.hold * piece(self.problem.segments, point.t), MOMENT * point.t
+            )
             self.hold, self.calm = 10 * self.hold, len(self.jumps)
         return True
-
-    def _piece(self, t: float) -> float:
-        """Length of the piece of time in which a time lies [s]: no brief pulse is held through."""
-        segments = self.problem.segments
-        j = int(np.clip(np.searchsorted(segments, t, side="right"), 1, len(segments) - 1))
-        return float(segments[j] - segments[j - 1])
 
     def _margins(self, point: Point) -> Array:
         if self.jumper.margins_read_rates:
@@ -286,10 +286,10 @@ class Hybrid:
 
     def _due(self, now: Array, point: Point) -> int | None:
         """The transition whose margin is closed, or is zero and closing; the drift of the integration is not closed."""
-        small = NOISE * self.largest[self.first :]
+        small = NOISE * sizes(self.problem, self.system.states, point, self.largest)[self.first :]
         drift = np.maximum(DRIFT * self.problem.rtol * self.largest[self.first :], small)
         closed = now < -drift
-        near = ~closed & (now <= small)
+        near = ~closed & (now <= small) & ~to_pass(self.problem)[self.first :]
         if near.any():
             closed |= near & (self.jumper.margin_rates(self._consistent(point)) < 0)
         return int(closed.argmax()) if closed.any() else None

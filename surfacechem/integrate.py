@@ -21,14 +21,14 @@ from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
 from surfacechem.preparing import PREPARING
 from surfacechem.solvers import ASKING, AUTO, solver
-from surfacechem.solvers.contract import Margin, Problem, Result, Solver, Status
+from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.rates import output_rates
 from surfacechem.stalls import solve
 from surfacechem.starting import stable_start
-from surfacechem.system import Margin as Watched
 from surfacechem.system import System
 from surfacechem.terms import Spec
 from surfacechem.validity import check_start
+from surfacechem.watching import awaited, watched
 
 Array = NDArray[np.float64]
 
@@ -135,13 +135,6 @@ class Trajectory:
         return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
 
 
-def _watched(margin: Watched) -> Margin:
-    """What the stepper does at a margin of the system."""
-    if margin.peak:
-        return Margin.peak()
-    return Margin.stop() if margin.terminal else Margin.restart()
-
-
 class Model:
     """A system with its machine code, made when it is built."""
 
@@ -219,7 +212,7 @@ class Model:
             parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
-            margins=tuple(map(_watched, self.margins)) + (Margin.stop(),) * len(system.transitions),
+            margins=tuple(map(watched, self.margins)) + tuple(map(awaited, system.transitions)),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,

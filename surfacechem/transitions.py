@@ -71,6 +71,8 @@ class Transition:
     """What makes it a fold, where it is one."""
     passes: bool = False
     """Whether nothing happens to the interface: a stage of the loading ends."""
+    to_pass: bool = False
+    """Whether it takes more than to touch zero."""
     measure: str = ""
     """What its margin measures, where that of other transitions measures the same."""
     times: tuple[float, ...] = ()

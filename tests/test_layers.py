@@ -36,6 +36,7 @@ FLOORS = {
         "equilibria",
         "jumps",
         "stretches",
+        "watching",
         "stalls",
         "events",
         "pacing",

@@ -13,7 +13,7 @@ from surfacechem.assembly.mounting import ACROSS, Direction
 from surfacechem.assembly.resistance import resist, resistance, stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, positive
+from surfacechem.expressions import Expression, where
 from surfacechem.quantities import Quantity
 from surfacechem.system import Margin
 from surfacechem.terms import Friction, HeatTransfer
@@ -45,10 +45,16 @@ def friction(build: Build) -> None:
 
 
 def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
-    """The pressure for a law that needs one, where the gap may open: an open contact does not rub."""
+    """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
+
+    At zero it is one that grows or falls, not one that stays: so a contact begins and ends. A rigid one that nothing
+    bonds opens where its pressure ends.
+    """
     if "p" not in law.nonnegative or "p" in build.scene.loading:
         return {}
-    return {"p": positive(build.variables.get("p", law))}
+    p = build.variables.get("p", law)
+    rigid = any(mode.name == "closed" for mode in build.modes) and not build.interface.limits
+    return {"p": p if rigid else where(p < 0, 0 * p, p)}
 
 
 def _reversal(build: Build, directions: Collection[Direction]) -> None:

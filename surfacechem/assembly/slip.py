@@ -251,20 +251,28 @@ def _is_damped(kind: Kind) -> bool:
 def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
     limit = build.motion.stick_limits["t"]
+    # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
+    bears = where(limit > 0, limit, 0)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = broken(build, breaking) if breaking is not None else {}
     settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
     for s, word in ((1, "forward"), (-1, "backward")):
-        margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, limit - s * needed))
+        margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, bears - s * needed))
         reason = f"sticking gives way and the interface slides {word}"
         build.transitions.append(
             Transition(
-                f"slip {word}", margin, reason, {slip: symengine.Integer(s)}, jump, settles=settles, sinks="local"
+                f"slip {word}",
+                margin,
+                reason,
+                {slip: symengine.Integer(s)},
+                jump,
+                settles=settles,
+                sinks="local",
+                to_pass=True,
             )
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
     stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
-    # What nothing rubs on has nothing to stop at: its velocity may fade to rounding without an end.
-    stops = where(slip**2 > 0, where(limit > 0, slip * v, 1), 1)
-    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop))
+    stops = where(slip**2 > 0, slip * v, 1)
+    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop, to_pass=True))

@@ -62,11 +62,18 @@ class Margin:
     direction: int = -1
     smooth: bool = False
     """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
+    to_pass: bool = False
+    """Whether it has to be passed: touched, or passed for a moment by less than the tolerance, it holds."""
 
     @classmethod
     def stop(cls) -> "Margin":
         """The run ends where the margin falls to zero."""
         return cls(terminal=True)
+
+    @classmethod
+    def bear(cls) -> "Margin":
+        """The run ends where the margin falls below zero."""
+        return cls(terminal=True, to_pass=True)
 
     @classmethod
     def restart(cls, direction: int = 0) -> "Margin":
@@ -99,6 +106,10 @@ class Problem:
     record_steps: bool = False
     exchanged: Array | None = None
     """What each quadrature amounted to at most before, where the problem continues another."""
+    seen: Array | None = None
+    """How large each margin was at most before, where the problem continues another."""
+    goes_on: bool = False
+    """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
 
     def __post_init__(self) -> None:
         n, segments = self.program.n, len(self.segments) - 1

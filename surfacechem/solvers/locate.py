@@ -26,6 +26,7 @@ from surfacechem.solvers.native import (
     TAU,
     TRIAL,
     TRIAL_DOT,
+    any_true,
     compiled,
     copy,
     evaluate,
@@ -35,7 +36,7 @@ from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
 from surfacechem.solvers.radau_tables import EDGE, SCANNED
-from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, noise, update_sides
+from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, noise, passed_by, update_sides
 
 ALIKE = 1e3
 """Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
@@ -76,12 +77,12 @@ def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float)
 
 
 @compiled
-def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bool) -> float:
-    """Where a margin is across zero, or touches it, around a lowest point near b; -1 where it is not."""
+def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bool, least: float) -> float:
+    """Where a margin is across zero by so much, or touches it, around a lowest point near b; -1 where it is not."""
     side = w.margin[M_SIDE, m]
     at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
     for _iteration in range(80):
-        if at_b <= 0.0:
+        if at_b <= -least:
             return b
         if c - a <= 1e-8 * c or not _may_reach(a, b, c, at_a, at_b, at_c):
             break
@@ -108,7 +109,7 @@ def _dips(w: Any, h: float, kinds: Any, m: int, a: float, b: float, c: float) ->
     if not _may_reach(a, b, c, values[0], values[1], values[2]):
         return False
     keep_polynomial(w)
-    x = _reaches(w, h, m, a, b, c, is_limit(kinds, m))
+    x = _reaches(w, h, m, a, b, c, is_limit(kinds, m) and kinds[m, 3] == 0, passed_by(w, kinds, m))
     w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
     return x > 0.0
 
@@ -126,11 +127,7 @@ def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float)
             found = AT_START
         elif falls:
             w.margin[M_HIGH, m] = before
-        marked = (
-            falls
-            or crosses(w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1])
-            or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
-        )
+        marked = falls or crosses(w, kinds, m) or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
         w.fired[m] = marked
         if marked and found == 0.0:
             found = x
@@ -165,7 +162,7 @@ def _scan(w: Any, h: float, kinds: Any) -> float:
             _mark_dips(w, h, kinds, before, x)
         if found != 0.0:
             return found
-        update_sides(w)
+        update_sides(w, kinds)
         earlier, before = before, x
     return 0.0
 
@@ -262,15 +259,28 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
 
 
 @compiled
+def _resolved(w: Any, size: float) -> float:
+    """Difference of two times that are one for all that can be told."""
+    return float(1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size))
+
+
+@compiled
 def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
     _margins_at_end(w, size)
-    near = 1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size)
+    near = _resolved(w, size)
     for m in range(kinds.shape[0]):
         value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
-        across = crosses(w.margin[M_SIDE, m], value, kinds[m, 1])
+        across = crosses(w, kinds, m)
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
         w.fired[m] = across or (w.fired[m] != 0 and close)
+
+
+@compiled
+def _has_reached(w: Any, h: float, size: float, m: int) -> bool:
+    """Whether the margin that a step went for is zero at its end; else the polynomial has seen what is not there."""
+    left = w.margin[M_NOW, m] * w.margin[M_SIDE, m]
+    return bool(left <= ALIKE * noise(w, m) + abs(w.margin[M_SLOPE, m]) * _resolved(w, size) / h)
 
 
 @compiled
@@ -290,8 +300,8 @@ def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
 
 @compiled
 def find_event(w: Any, h: float, kinds: Any) -> float:
-    """Size of the step onto the first event, marking all that fire there; h if there is none, 0 if the step must be
-    repeated, AT_START if a limit is passed at the start.
+    """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
+    none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
     """
     end = _scan(w, h, kinds)
     if end <= 0.0:
@@ -302,5 +312,7 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     if size == 0.0:
         return 0.0
     _mark_coincident(w, h, size, kinds)
-    w.fired[first] = 1
+    w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
+    if w.fired[first] == 0 and not any_true(w.fired):
+        update_sides(w, kinds)
     return size

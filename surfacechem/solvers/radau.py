@@ -33,14 +33,14 @@ _STATUSES = tuple(Status)
 LOOSEST = 3e-5
 """Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
 
-TIMES = 12
+TIMES = 14
 """Where segments and output times stand among the arguments of the compiled entry point."""
 
 
 @lru_cache(maxsize=256)
 def _kinds(margins: tuple[Margin, ...]) -> NDArray[np.int64]:
-    rows = [(margin.terminal, margin.direction, margin.smooth) for margin in margins]
-    return np.array(rows, np.int64).reshape(-1, 3)
+    rows = [(margin.terminal, margin.direction, margin.smooth, margin.to_pass) for margin in margins]
+    return np.array(rows, np.int64).reshape(-1, 4)
 
 
 class _Tables:
@@ -60,6 +60,8 @@ class _Tables:
         step_rows: int,
         event_rows: int,
         exchanged: Array | None = None,
+        seen: Array | None = None,
+        goes_on: bool = False,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
         self.stop = np.zeros(1, np.int64)
@@ -75,6 +77,8 @@ class _Tables:
             program.chain_table,
             program.ledger_groups,
             np.zeros(q) if exchanged is None else exchanged,
+            np.zeros(program.n_margins) if seen is None else seen,
+            int(goes_on),
             max_steps,
             self.stop,
             min(rtol, LOOSEST),
@@ -130,6 +134,8 @@ def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
         step_rows,
         event_rows,
         problem.exchanged,
+        problem.seen,
+        problem.goes_on,
     )
 
 
@@ -310,7 +316,7 @@ def search_arguments(program: Program, ends: Array, table: Array, counts: NDArra
     """
     none, nothing = np.zeros(0), _no_rows(len(ends))
     return (
-        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, _no_accounts(), none, 0,
+        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, _no_accounts(), none, none, 0, 0,
         counts[0], 1.0, np.ones(program.n), _kinds(()),
         ends, table, none, none, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip

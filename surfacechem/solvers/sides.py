@@ -10,6 +10,7 @@ from surfacechem.solvers.native import (
     M_NOW,
     M_SIDE,
     MARGINS,
+    RTOL,
     TAU,
     YDOT,
     Y,
@@ -59,11 +60,33 @@ def start_margins(w: Any, kinds: Any) -> None:
 
 
 @compiled
-def crosses(side: float, value: float, direction: int) -> bool:
-    """Whether a value lies across zero from its side, in a direction that counts."""
+def crosses(w: Any, kinds: Any, m: int) -> bool:
+    """Whether a margin lies across zero from its side, in a direction that counts; one to pass, by more than noise."""
+    side, value, direction = w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1]
+    if kinds[m, 3] == 1:
+        return bool(side == 1.0 and value < -noise(w, m))
     falling = side == 1.0 and value <= 0.0 and direction <= 0
     rising = side == -1.0 and value >= 0.0 and direction >= 0
-    return falling or rising
+    return bool(falling or rising)
+
+
+@compiled
+def mark_at_end(w: Any, kinds: Any) -> None:
+    """Mark the kinks that reach zero with the end of a segment: the next one cannot tell on which side they were."""
+    set_inputs(w, w.vector[Y], w.vector[YDOT])
+    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
+    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+    for m in range(kinds.shape[0]):
+        side = w.margin[M_SIDE, m]
+        counts = kinds[m, 0] == 0 and abs(side) == 1.0 and side * kinds[m, 1] <= 0.0
+        if counts and abs(w.margin[M_NOW, m]) <= noise(w, m):
+            w.fired[m] = 1
+
+
+@compiled
+def passed_by(w: Any, kinds: Any, m: int) -> float:
+    """How far below zero the lowest point between two crossings has to lie to count."""
+    return float(max(w.clock[RTOL] * w.margin[M_LARGEST, m], noise(w, m)) if kinds[m, 3] == 1 else 0.0)
 
 
 @compiled
@@ -76,13 +99,13 @@ def falls_from_start(w: Any, m: int) -> bool:
 
 
 @compiled
-def update_sides(w: Any) -> None:
+def update_sides(w: Any, kinds: Any) -> None:
     """Move on to the margins of now: their sides, the largest seen, and what was before."""
     copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
     for m in range(w.margin.shape[1]):
         value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
         moved = value - w.margin[M_BEFORE, m] if side == BEYOND else value
-        if abs(moved) > (0.0 if abs(side) == 1.0 else noise(w, m)):
+        if abs(moved) > (0.0 if abs(side) == 1.0 and kinds[m, 3] == 0 else noise(w, m)):
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
         w.margin[M_BEFORE, m] = value

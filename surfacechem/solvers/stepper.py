@@ -60,6 +60,8 @@ def _compiled() -> Any:
         count,
         int64[::1],
         real,
+        real,
+        int64,
         int64,
         int64[::1],
         float64,

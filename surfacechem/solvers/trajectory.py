@@ -44,7 +44,7 @@ from surfacechem.solvers.radau_advance import (
 )
 from surfacechem.solvers.radau_outputs import write_outputs
 from surfacechem.solvers.radau_step import first_size, loosening
-from surfacechem.solvers.sides import start_margins
+from surfacechem.solvers.sides import mark_at_end, start_margins
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
@@ -150,6 +150,7 @@ def _ledger_limit(w: Any, h: float, remaining: float) -> float:
 def _run_segment(
     w: Any,
     end: float,
+    goes_on: bool,
     kinds: Any,
     max_steps: int,
     stop: Any,
@@ -190,6 +191,8 @@ def _run_segment(
         _move(w, size, end if whole else w.clock[BASE] + (w.clock[TAU] + size), times, outputs, steps, counts)
         if whole:
             w.clock[TAU] = end - w.clock[BASE]
+            if kinds.shape[0] > 0 and goes_on:
+                mark_at_end(w, kinds)
         size_last, norm_last = h, max(norm, 1e-2)
         h = keep_matrices(w, h, min(proposed, limit))
         if kinds.shape[0] > 0 and any_true(w.fired):
@@ -203,6 +206,8 @@ def _run_segment(
 def _run(
     w: Any,
     exchanged: Any,
+    seen: Any,
+    goes_on: int,
     y0: Any,
     parameters: Any,
     segments: Any,
@@ -221,7 +226,7 @@ def _run(
     clear(w.count)
     clear(w.ledger[Q])
     copy(exchanged, w.ledger[Q_LARGEST])
-    clear(w.margin[M_LARGEST])
+    copy(seen, w.margin[M_LARGEST])
     copy(y0, w.vector[Y])
     clear(w.vector[YDOT])
     status = GOOD
@@ -229,7 +234,10 @@ def _run(
         w.clock[BASE] = segments[segment]
         w.clock[TAU] = 0.0
         copy(parameters[segment], w.inputs[1 + 2 * n :])
-        status = _run_segment(w, segments[segment + 1], kinds, max_steps, stop, times, outputs, steps, events, counts)
+        more = goes_on != 0 or segment + 2 < segments.shape[0]
+        status = _run_segment(
+            w, segments[segment + 1], more, kinds, max_steps, stop, times, outputs, steps, events, counts
+        )
         if status != GOOD:
             break
     counts[END] = FINISHED if status == GOOD else status
@@ -262,6 +270,8 @@ def run_batch(
     chains: Any,
     groups: Any,
     exchanged: Any,
+    seen: Any,
+    goes_on: int,
     max_steps: int,
     stop: Any,
     rtol: float,
@@ -295,6 +305,8 @@ def run_batch(
         _run(
             w,
             exchanged,
+            seen,
+            goes_on,
             y0[i],
             parameters[i],
             segments,

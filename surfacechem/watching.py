@@ -1,0 +1,55 @@
+"""What the stepper is to do at the margins of a system, and what of a margin is no more than rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile import Function
+from surfacechem.equilibria import Point
+from surfacechem.solvers.contract import Margin, Problem
+from surfacechem.system import Margin as Watched
+from surfacechem.system import State
+from surfacechem.transitions import Transition
+
+Array = NDArray[np.float64]
+
+NUDGE = 1e-6
+"""Part by which states are changed to see what margins are made of."""
+
+
+def watched(margin: Watched) -> Margin:
+    """What the stepper does at a margin of the system."""
+    if margin.peak:
+        return Margin.peak()
+    return Margin.stop() if margin.terminal else Margin.restart()
+
+
+def awaited(item: Transition) -> Margin:
+    """What the stepper does at the margin of a transition."""
+    return Margin.bear() if item.to_pass else Margin.stop()
+
+
+def to_pass(problem: Problem) -> NDArray[np.bool_]:
+    """Which margins it takes more to than to touch zero."""
+    return np.array([kind.to_pass for kind in problem.margins], dtype=bool)
+
+
+def sizes(problem: Problem, states: Sequence[State], point: Point, seen: Array) -> Array:
+    """Largest sizes of the margins seen; of one to pass also what cancels in it where it is zero."""
+    margins = problem.program.margins
+    if margins is None or not np.any(passed := to_pass(problem)):
+        return seen
+    return np.where(passed, np.maximum(seen, _terms(margins, states, point)), seen)
+
+
+def _terms(margins: Function, states: Sequence[State], point: Point) -> Array:
+    """Size of the terms of each margin, which rounding is in proportion to whatever is left, shape (margins,)."""
+    typical = np.maximum([state.finest or state.scale for state in states], np.abs(point.y))
+    rows = np.repeat(point.inputs()[None], 1 + len(states), axis=0)
+    rows[1:, 1 : 1 + len(states)] += NUDGE * np.diag(typical)
+    values = margins(rows)
+    found = np.max(np.abs(values[1:] - values[0]), axis=0) / NUDGE
+    return np.where(np.isfinite(found), found, 0.0)

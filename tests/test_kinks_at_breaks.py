@@ -1,0 +1,38 @@
+"""Kinks that fall on breakpoints of the loading are events like any other, once each."""
+
+import numpy as np
+import pytest
+from scenes import bodies
+
+from surfacechem.assembly import assemble
+from surfacechem.event_table import event_columns
+from surfacechem.integrate import Model, Run
+from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.loading import Harmonic, Table
+from surfacechem.scene import Interface, Mounting, Scene
+
+
+def times(scene, solver="radau", rtol=1e-11):
+    run = Run(np.linspace(0.0, 4.0, 9).tolist(), rtol, solver=solver)
+    columns = {column.name: column.values for column in event_columns(Model(assemble(scene)).solve(run))}
+    return columns["event_time"][columns["event_name"] == "v"]
+
+
+@pytest.mark.parametrize("solver", ["radau", "lsoda"])
+@pytest.mark.parametrize("breaks", [[], [1.0], [1.0, 2.5], [0.7, 2.0, 3.0]])
+def test_a_velocity_reverses_at_breakpoints_of_another_load(breaks, solver):
+    pressure = Table(times=[0.0, *breaks, 4.0], values=[1e5 * (1 + k % 2) for k in range(2 + len(breaks))])
+    loading = {"p": pressure, "v": Harmonic(amplitude=1e-3, frequency=0.5)}
+    scene = Scene(bodies("T", "T"), Interface("T", [], [Coulomb(mu=0.3)]), (), loading, None, 300.0, {"T": 300.0})
+    for rtol in (1e-9, 1e-11):
+        np.testing.assert_allclose(times(scene, solver, rtol), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
+
+
+def test_so_it_does_in_a_scene_with_transitions():
+    """The stretches of such a run end at the breakpoints, too."""
+    push = Table(times=[0.0, 1.0, 4.0], values=[-1e-6, -2e-6, -1e-6])
+    loading = {"w_n": push, "v": Harmonic(amplitude=1e-3, frequency=0.5)}
+    rubbing, mount = Interface("T", [], [Coulomb(mu=0.3)]), Mounting(k=1e11)
+    scene = Scene(bodies("T", "T"), rubbing, (), loading, None, 300.0, {"T": 300.0}, normal=mount)
+    assert assemble(scene).transitions
+    np.testing.assert_allclose(times(scene), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
