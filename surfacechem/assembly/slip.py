@@ -255,7 +255,8 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     bears = where(limit > 0, limit, 0)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = broken(build, breaking) if breaking is not None else {}
-    settles = not (kind.inertial and not kind.elastic) and not kind.rate_dependent
+    balanced = not (kind.inertial and not kind.elastic)
+    settles = balanced and not kind.rate_dependent
     for s, word in ((1, "forward"), (-1, "backward")):
         margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, bears - s * needed))
         reason = f"sticking gives way and the interface slides {word}"
@@ -272,7 +273,7 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
             )
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
-    onward = NONE if settles else where(absolute(needed) <= limit, 0, sign(needed))
-    stop = {symengine.Symbol("v"): NONE} if kind.inertial and not kind.elastic else {}
+    onward = NONE if balanced else where(absolute(needed) <= limit, 0, sign(needed))
+    stop = {} if balanced else {symengine.Symbol("v"): NONE}
     stops = where(slip**2 > 0, slip * v, 1)
     build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop, to_pass=True))
