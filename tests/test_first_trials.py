@@ -108,10 +108,10 @@ PULSE = Table(times=[0.0, 0.5, 0.5 + 5e-10, 0.5 + 1e-9, 1.0], values=[0.0, 0.0, 
 
 
 def test_a_brief_pulse_makes_a_slider_slip():
-    """Twice the limit forward, then back until the spring holds the limit the other way."""
+    """Twice the limit forward, then back until the spring holds the limit the other way, which it does not pass."""
     trajectory = slider(PULSE, closed=1e-6)  # the pulse lasts ten million last digits of its time
-    times = [0.5 + 2.5e-10, 0.5 + 5e-10, 0.5 + 1e-9]
-    assert [name for name, _ in events(trajectory)] == ["slip forward", "stop", "slip backward"]
+    times = [0.5 + 2.5e-10, 0.5 + 5e-10]
+    assert [name for name, _ in events(trajectory)] == ["slip forward", "stop"]
     assert [t for _, t in events(trajectory)] == pytest.approx(times, abs=3e-16)
 
 

@@ -59,4 +59,7 @@ def _at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float
     drive = build.variables.call(bound, bound.drive, {**_own(law), "v": values["initial.v"]})
     numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
     numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
-    return float(build.expanded(drive).subs({**numbers, build.t: 0.0}))
+    try:
+        return float(build.expanded(drive).subs({**numbers, build.t: 0.0}))
+    except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
+        return 0.0
