@@ -80,6 +80,8 @@ class Hybrid:
     """Number of short stretches in a row that time could not resolve."""
     written: int = 0
     """Number of outputs written."""
+    limits: list[int] = field(default_factory=list)
+    """Limits that were reached together with the last transition."""
     status: Status = Status.FINISHED
     reason: str = ""
 
@@ -189,7 +191,10 @@ class Hybrid:
     def _transition(self, part: Part, point: Point) -> int | None:
         """The transition at which a stretch has ended, if any."""
         if part.status is Status.EVENT:
-            index = int(part.result.events.index[-1]) - self.first
+            events = part.result.events
+            fired = events.index[events.t == events.t[-1]]
+            self.limits = [int(i) for i in fired if i < self.first and self.problem.margins[i].terminal]
+            index = int(fired[-1]) - self.first
             return index if index >= 0 else None
         return self.jumper.equilibria.lost(point, self.problem.rtol) if part.status in LOST else None
 
@@ -210,6 +215,7 @@ class Hybrid:
                 return None
             due = self._due(now[self.first :], point)
             if due is None:
+                self.limits = []
                 return point
             jumped = self._jump(due, point)
             if jumped is None:
@@ -278,10 +284,13 @@ class Hybrid:
 
     def _ended(self, now: Array) -> bool:
         """Whether a jump has carried the state to where a law ends."""
-        kinds = self.problem.margins[: self.first]
-        closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < -NOISE * self.largest[i]]
+        kinds, margins = self.problem.margins[: self.first], self.system.moving_margins()
+        # Beyond the end of a law, be it by rounding, what it says has no meaning.
+        least = [0.0 if margin.domain else -NOISE * size for margin, size in zip(margins, self.largest, strict=False)]
+        closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < least[i]]
+        closed += [i for i in self.limits if now[i] <= NOISE * self.largest[i]]
         if closed and self.jumps:
-            self.status, self.reason = Status.EVENT, self.system.moving_margins()[closed[0]].reason
+            self.status, self.reason = Status.EVENT, margins[closed[0]].reason
         return bool(closed and self.jumps)
 
     def _due(self, now: Array, point: Point) -> int | None:
@@ -329,12 +338,11 @@ class Hybrid:
             parameters=np.array([part.start.parameters for part in parts]) if parts else problem.parameters,
         )
         n, q = problem.program.n, problem.program.n_ledger
-        ended = self.jumps[-1].t if self.reason and self.jumps else None
         reached = parts[-1].end if parts else float(problem.segments[0])
         return Result(
             problem=merged,
             status=self.status,
-            t=reached if ended is None else ended,
+            t=max(reached, self.jumps[-1].t) if self.reason and self.jumps else reached,
             y=last.y if last else problem.y0,
             ydot=last.ydot if last else np.zeros(n),
             ledger=self.booked,

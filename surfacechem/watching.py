@@ -51,5 +51,6 @@ def _terms(margins: Function, states: Sequence[State], point: Point) -> Array:
     rows = np.repeat(point.inputs()[None], 1 + len(states), axis=0)
     rows[1:, 1 : 1 + len(states)] += NUDGE * np.diag(typical)
     values = margins(rows)
-    found = np.max(np.abs(values[1:] - values[0]), axis=0) / NUDGE
+    with np.errstate(invalid="ignore"):  # a margin out of play may be infinite
+        found = np.max(np.abs(values[1:] - values[0]), axis=0) / NUDGE
     return np.where(np.isfinite(found), found, 0.0)

@@ -42,12 +42,17 @@ def folds(build: Build) -> None:
     build.transitions.append(
         Transition(
             "snap",
-            tangent - FOLD,
+            _bounded(tangent - FOLD),
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
             settles=True,
             fold=Fold(tangent, falls, relative, warming, str(_temperature(build))),
         )
     )
+
+
+def _bounded(x: Expression) -> Expression:
+    """The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later."""
+    return x / (1 + absolute(x))
 
 
 def _along(expression: Expression, e: Equilibrium) -> Expression:
