@@ -296,7 +296,7 @@ class System:
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
         origins = [self.parameters[j].symbol for j in self.origins]
         # What counts from an origin does so in either time; shifted both ways it would be rounded to digits of t.
-        lapses = {self.t - origin: symengine.Dummy() for origin in origins}
+        lapses = {self.t - origin: symengine.Symbol(f"since {k}") for k, origin in enumerate(origins)}
         shift = {symbol: symbol + start for symbol in (self.t, *origins)}
         back = {dummy: lapse for lapse, dummy in lapses.items()}
         return [symengine.sympify(self.expand(item)).subs(lapses).subs(shift).subs(back) for item in expressions]
