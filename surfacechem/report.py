@@ -66,7 +66,7 @@ def states(system: System) -> str:
 
 def run_summary(solution: Solution, written: Path | None) -> str:
     """What was solved, how it ended, how accurate and how fast it was, and where it is."""
-    trajectory = solution.trajectory
+    trajectory, books = solution.trajectory, solution.audit
     system = trajectory.model.system
     lines = [
         solution.title or "untitled",
@@ -74,8 +74,8 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         labelled(solution.status, solution.reason),
         *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
         labelled("time", f"{_time(solution)}; {_work(trajectory)}"),
-        *([labelled("events", event_summary(trajectory.jumps))] if trajectory.jumps else []),
-        labelled("balances", _balances(solution.audit)),
+        *([labelled("events", event_summary(trajectory.jumps, books.energy_scale))] if trajectory.jumps else []),
+        labelled("balances", _balances(books)),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
         *([labelled("written", str(written))] if written else []),
