@@ -144,11 +144,15 @@ def event_violations(jumps: Sequence[Jump]) -> list[str]:
     return list(dict.fromkeys(jump.transition.name for jump in jumps if jump.verdict != ADMISSIBLE))
 
 
+def event_counts(jumps: Sequence[Jump]) -> str:
+    """Names of the transitions, and how often each happened."""
+    names = [jump.transition.name for jump in jumps]
+    return ", ".join(f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names))
+
+
 def event_summary(jumps: Sequence[Jump], exchanged: float) -> str:
     """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged [J/m^2]."""
-    names = [jump.transition.name for jump in jumps]
-    counts = [f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names)]
     released = sum(jump.released for jump in jumps)
     verdicts = {jump.verdict for jump in jumps} - {ADMISSIBLE}
     heat = f"; released {released:.4g} J/m^2" if abs(released) > len(jumps) * ROUNDING * exchanged else ""
-    return f"{', '.join(counts)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"
+    return f"{event_counts(jumps)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"
