@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfacechem.integrate import Trajectory
 from surfacechem.jumps import ADMISSIBLE, Jump
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-12
+"""Heat of a jump that counts as none, relative to the energy that was exchanged."""
 
 
 @dataclass(frozen=True)
@@ -22,24 +28,41 @@ class EventColumn:
     long_name: str
 
 
+@dataclass(frozen=True)
+class Row:
+    """An event with the states at its two sides, and its jump where it is one."""
+
+    t: float
+    name: str
+    reason: str
+    before: Array
+    after: Array
+    jump: Jump | None = None
+
+
 def event_columns(trajectory: Trajectory) -> list[EventColumn]:
     """The table, without the columns of jumps where nothing jumped; empty where nothing happened."""
-    margins, events = trajectory.model.margins, trajectory.result.events
-    plain = [
-        (float(t), margins[i].name, margins[i].reason, None)
-        for t, i in zip(events.t, events.index, strict=True)
-        if i < len(margins) and not margins[i].peak
-    ]
-    jumped = [(jump.t, jump.transition.name, jump.transition.reason, jump) for jump in trajectory.jumps]
-    rows = sorted([*plain, *jumped], key=lambda row: row[0])
+    rows = _rows(trajectory)
     if not rows:
         return []
     columns = [
-        EventColumn("event_time", np.array([row[0] for row in rows]), "s", "time of the event"),
-        EventColumn("event_name", np.array([row[1] for row in rows], dtype=object), "1", "name of the event"),
-        EventColumn("event_reason", np.array([row[2] for row in rows], dtype=object), "1", "what happened"),
+        EventColumn("event_time", np.array([row.t for row in rows]), "s", "time of the event"),
+        EventColumn("event_name", _texts(row.name for row in rows), "1", "name of the event"),
+        EventColumn("event_reason", _texts(row.reason for row in rows), "1", "what happened"),
     ]
-    return columns + (_jump_columns(trajectory, [row[3] for row in rows]) if jumped else [])
+    return columns + (_jump_columns(trajectory, rows) if trajectory.jumps else [])
+
+
+def _rows(trajectory: Trajectory) -> list[Row]:
+    """Jumps and other events in order of time."""
+    margins, events = trajectory.model.margins, trajectory.result.events
+    smooth = [
+        Row(float(t), margins[i].name, margins[i].reason, y, y)
+        for t, i, y in zip(events.t, events.index, events.y, strict=True)
+        if i < len(margins) and not margins[i].peak
+    ]
+    jumped = [Row(j.t, j.transition.name, j.transition.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
+    return sorted([*smooth, *jumped], key=lambda row: row.t)
 
 
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
@@ -51,35 +74,57 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     return found | ended
 
 
-def _jump_columns(trajectory: Trajectory, jumps: Sequence[Jump | None]) -> list[EventColumn]:
-    def values(read: Any) -> Any:
-        return np.array([np.nan if jump is None else read(jump) for jump in jumps])
-
-    verdicts = np.array(["" if jump is None else jump.verdict for jump in jumps], dtype=object)
+def _jump_columns(trajectory: Trajectory, rows: Sequence[Row]) -> list[EventColumn]:
+    """What jumped; where nothing did, the state goes on and nothing is released or judged."""
+    jumps = [row.jump for row in rows]
+    amounts = np.array([(j.released, j.entropy) if j else (0.0, 0.0) for j in jumps])
+    verdicts = _texts(j.verdict if j else "" for j in jumps)
     columns = [
-        EventColumn("event_since", values(lambda j: j.since), "s", "time since the transition before or the start"),
-        EventColumn("event_released", values(lambda j: j.released), "J/m^2", "energy turned into heat"),
-        EventColumn("event_entropy", values(lambda j: j.entropy), "J/(m^2 K)", "entropy produced"),
-        EventColumn("event_verdict", verdicts, "1", "whether the second law allows it"),
+        EventColumn("event_since", _since(rows), "s", "time since the transition before or the start"),
+        EventColumn("event_released", amounts[:, 0], "J/m^2", "energy turned into heat"),
+        EventColumn("event_entropy", amounts[:, 1], "J/(m^2 K)", "entropy produced"),
+        EventColumn("event_verdict", verdicts, "1", "whether the second law allows it; empty where nothing jumps"),
     ]
+    before, after = (np.array([getattr(row, side) for row in rows]) for side in ("before", "after"))
     for k, state in enumerate(trajectory.model.system.states):
         if state.name in trajectory.model.system.inside:
             continue
         q = state.quantity
         columns += [
-            EventColumn(f"{q.name}_before", values(lambda j, k=k: j.before.y[k]), q.unit, f"{q.long_name} before"),
-            EventColumn(f"{q.name}_after", values(lambda j, k=k: j.after.y[k]), q.unit, f"{q.long_name} after"),
+            EventColumn(f"{q.name}_before", before[:, k], q.unit, f"{q.long_name} before"),
+            EventColumn(f"{q.name}_after", after[:, k], q.unit, f"{q.long_name} after"),
         ]
     return columns
 
 
+def _since(rows: Sequence[Row]) -> Any:
+    """Times since the last jump before each row, or since the start."""
+    last, found = 0.0, []
+    for row in rows:
+        found.append(row.jump.since if row.jump else row.t - last)
+        last = row.t if row.jump else last
+    return np.array(found)
+
+
+def _texts(values: Iterable[str]) -> Any:
+    return np.array(list(values), dtype=object)
+
+
 def event_findings(jumps: Sequence[Jump]) -> list[str]:
-    """Jumps against the second law that the case did not accept, in words."""
-    flagged = [jump for jump in jumps if jump.verdict != ADMISSIBLE and jump.transition.violation != "accept"]
-    return [
-        f"{jump.transition.reason} at t = {jump.t:.9g} s: {jump.verdict} ({jump.entropy:.3g} J/(m^2 K))"
-        for jump in flagged
-    ]
+    """Jumps against the second law that the case did not accept, in words; those that repeat in one line."""
+    flagged: dict[tuple[str, str], list[Jump]] = {}
+    for jump in jumps:
+        if jump.verdict != ADMISSIBLE and jump.transition.violation != "accept":
+            flagged.setdefault((jump.transition.reason, jump.verdict), []).append(jump)
+    return [_finding(reason, verdict, same) for (reason, verdict), same in flagged.items()]
+
+
+def _finding(reason: str, verdict: str, jumps: Sequence[Jump]) -> str:
+    worst = min(jumps, key=lambda jump: jump.entropy)
+    lost, at = f"{worst.entropy:.3g} J/(m^2 K)", f"t = {jumps[0].t:.9g} s"
+    if len(jumps) == 1:
+        return f"{reason} at {at}: {verdict} ({lost})"
+    return f"{reason} {len(jumps)} times, first at {at}: {verdict} (at worst {lost}, at t = {worst.t:.9g} s)"
 
 
 def event_waits(trajectory: Trajectory) -> list[str]:
@@ -99,11 +144,15 @@ def event_violations(jumps: Sequence[Jump]) -> list[str]:
     return list(dict.fromkeys(jump.transition.name for jump in jumps if jump.verdict != ADMISSIBLE))
 
 
-def event_summary(jumps: Sequence[Jump]) -> str:
-    """The transitions of a run in one line."""
+def event_counts(jumps: Sequence[Jump]) -> str:
+    """Names of the transitions, and how often each happened."""
     names = [jump.transition.name for jump in jumps]
-    counts = [f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names)]
+    return ", ".join(f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names))
+
+
+def event_summary(jumps: Sequence[Jump], exchanged: float) -> str:
+    """The transitions of a run in one line; ``exchanged`` is the largest energy that anything exchanged [J/m^2]."""
     released = sum(jump.released for jump in jumps)
     verdicts = {jump.verdict for jump in jumps} - {ADMISSIBLE}
-    heat = f"; released {released:.4g} J/m^2" if released else ""
-    return f"{', '.join(counts)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"
+    heat = f"; released {released:.4g} J/m^2" if abs(released) > len(jumps) * ROUNDING * exchanged else ""
+    return f"{event_counts(jumps)}{heat}; {'all admissible' if not verdicts else ', '.join(sorted(verdicts))}"

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Self, dataclass_transform
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
+from surfacechem.units import quotient
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,10 @@ def resolved_unit(unit: str, x: str) -> str:
     """A unit with "[x]" replaced.
 
     >>> resolved_unit("[x]/s", "m/s")
-    '(m/s)/s'
+    'm/s^2'
     """
-    return x if unit == "[x]" else unit.replace("[x]", f"({x})")
+    top, _, bottom = unit.partition("/")
+    return quotient(*(x if part == "[x]" else part for part in (top, bottom))) if "[x]" in unit else unit
 
 
 def parameter(

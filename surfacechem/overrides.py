@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from surfacechem.document import Tree, from_plain, labels, parse, with_paths
@@ -10,6 +10,9 @@ from surfacechem.errors import InputError, Place, suggestion
 
 ORIGIN = "override"
 """What stands for the file in messages about a value that was set from outside."""
+
+WRITTEN_OUT = ("level", "value", "rises-to")
+"""Keys of a value that may also stand by itself."""
 
 
 def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
@@ -36,6 +39,17 @@ def assignments(texts: Sequence[str]) -> dict[str, object]:
     return {path: tree.plain() for path, tree in _pairs(texts)}
 
 
+def parameter_path(path: str, known: Container[str]) -> str:
+    """The known path of a parameter whose value may stand in the case by itself or be written out.
+
+    >>> parameter_path("loading.v", {"loading.v.level"}), parameter_path("friction.mu.value", {"friction.mu"})
+    ('loading.v.level', 'friction.mu')
+    """
+    above, _, last = path.rpartition(".")
+    others = [path, f"{path}.level", *([above] if last in WRITTEN_OUT else [])]
+    return next((other for other in others if other in known), path)
+
+
 def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
     pairs = overrides.items() if isinstance(overrides, Mapping) else (_split(text) for text in overrides)
     for path, value in pairs:
@@ -59,8 +73,8 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return _replaced(tree, new)
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    if keys == ["level"] and not isinstance(tree.value, dict) and not _removes(new):
-        return new  # a bare value is the level of a constant history
+    if len(keys) == 1 and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not _removes(new):
+        return new  # a bare value is, for example, the level of a constant history
     if tree.value is not None and not isinstance(tree.value, dict):
         raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
     known = tree.value or {}

@@ -93,3 +93,6 @@ VARIABLES = _table(
     ("dmu_dphi", "J", "derivative of the chemical potential per bond with respect to the bonding state"),
 )
 """What laws may read. Temperatures of bodies and interface resolve to the node that carries them."""
+
+INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))
+"""What laws read of each other, and no case names."""

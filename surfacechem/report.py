@@ -7,7 +7,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from surfacechem.event_table import event_summary
+import numpy as np
+
+from surfacechem.event_table import event_counts, event_summary
+from surfacechem.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
     from surfacechem.audit import Audit
@@ -66,7 +69,7 @@ def states(system: System) -> str:
 
 def run_summary(solution: Solution, written: Path | None) -> str:
     """What was solved, how it ended, how accurate and how fast it was, and where it is."""
-    trajectory = solution.trajectory
+    trajectory, books = solution.trajectory, solution.audit
     system = trajectory.model.system
     lines = [
         solution.title or "untitled",
@@ -74,8 +77,8 @@ def run_summary(solution: Solution, written: Path | None) -> str:
         labelled(solution.status, solution.reason),
         *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
         labelled("time", f"{_time(solution)}; {_work(trajectory)}"),
-        *([labelled("events", event_summary(trajectory.jumps))] if trajectory.jumps else []),
-        labelled("balances", _balances(solution.audit)),
+        *([labelled("events", event_summary(trajectory.jumps, books.energy_scale))] if trajectory.jumps else []),
+        labelled("balances", _balances(books)),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
         *(labelled("warning", warning) for warning in solution.warnings),
         *([labelled("written", str(written))] if written else []),
@@ -95,17 +98,36 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
         labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
         *([labelled("error", f"{accuracy.errors.max():.2g} ({accuracy.source})")] if accuracy else []),
         labelled("time", f"{speed}; {sweep.batch.steps.sum()} steps"),
+        *([labelled("events", events)] if (events := _sweep_events(solution)) else []),
         labelled("balances", _sweep_balances(sweep)),
         *([labelled("written", str(written))] if written else []),
     ]
     return "\n".join(lines)
 
 
+def _sweep_events(solution: SweepSolution) -> str:
+    """What jumped in all runs, and what the second law says to it."""
+    sweep = solution.sweep
+    runs = [sweep[i].jumps for i in range(len(sweep))] if solution.system.transitions else []
+    jumps = [jump for run in runs for jump in run]
+    if not jumps:
+        return ""
+    found = []
+    for verdict in sorted({jump.verdict for jump in jumps} - {ADMISSIBLE}):
+        count = sum(any(jump.verdict == verdict for jump in run) for run in runs)
+        found.append(f"{verdict} in {count} of {len(runs)} runs")
+    worst = int(np.argmax(sweep.entropy_destroyed))
+    if (most := sweep.entropy_destroyed[worst]) > 0:
+        at = zip(solution.axes, solution.plan.points[worst].values(), strict=True)
+        found.append(f"at worst {-most:.3g} J/(m^2 K) at {', '.join(f'{name} = {value:g}' for name, value in at)}")
+    return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
+
+
 def _sweep_balances(sweep: Sweep) -> str:
     """The worst of all runs."""
     errors = (("energy", sweep.energy_error), ("entropy", sweep.entropy_error), ("sites", sweep.site_error))
     residuals = ", ".join(f"{name} {values.max():.1e}" for name, values in errors)
-    count = int(sweep.destroys_entropy.sum())
+    count = int(sweep.violations.sum())
     return f"{residuals}; " + (f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy")
 
 

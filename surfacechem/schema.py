@@ -18,7 +18,7 @@ from surfacechem.case.medium import MEDIUM_KEYS, PROPERTIES
 from surfacechem.case.run import RUN_KEYS, SPACINGS
 from surfacechem.case.scene import BODY_KEYS, BODY_NAME, INTERFACE_KEYS, NODE
 from surfacechem.case.sweep import RANGE_KEYS, SWEEP_KEYS
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Conduction, Mounting
 from surfacechem.substances import Property
 from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw, Spec
@@ -249,7 +249,7 @@ def _sweep() -> Schema:
     values = {"anyOf": [{"type": "array", "items": _ref("quantity"), "minItems": 1}, span]}
     path = rf"({'|'.join(TOP_KEYS)})(\.[^.]+)*"
     over = {**_object({}, patterns={path: values}), "minProperties": 1, "maxProperties": 2}
-    variables = {name: _ref("quantity") for name in VARIABLES}
+    variables = {name: _ref("quantity") for name in VARIABLES if name not in INTERNAL}
     until = {**_object(variables), "minProperties": 1, "maxProperties": 1}
     texts = {"over": "values of one or two parameters, by path", "until": "a prescribed ramp and where each run ends"}
     properties = {"over": {**over, "description": texts["over"]}, "until": {**until, "description": texts["until"]}}

@@ -18,6 +18,7 @@ from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.overrides import parameter_path
 from surfacechem.solution import Accuracy, Solution
 from surfacechem.solvers import AUTO
 from surfacechem.system import System
@@ -205,7 +206,7 @@ class Simulation:
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = self._units
-        changes = {path if path in units else _level(path, units): value for path, value in changes.items()}
+        changes = {parameter_path(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, units)}")
@@ -215,8 +216,3 @@ class Simulation:
 def _listed(values: object) -> object:
     """Arrays as lists."""
     return values.tolist() if isinstance(values, np.ndarray) else values
-
-
-def _level(path: str, known: Mapping[str, str]) -> str:
-    """The path of a constant history may leave out its one parameter."""
-    return f"{path}.level" if f"{path}.level" in known else path

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.event_table import event_columns
 from surfacechem.netcdf import CONVENTIONS, Column, replacing, versions, write_netcdf
 from surfacechem.quantities import Quantity
 from surfacechem.solution import DATASET_NAMES
@@ -90,7 +91,7 @@ class SweepSolution:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the coordinates first."""
-        return (*self._coordinates(), *self._along(), *self._of_runs(), *self._statistics())
+        return (*self._coordinates(), *self._along(), *self._of_runs(), *self._events(), *self._statistics())
 
     @property
     def inner(self) -> str:
@@ -158,11 +159,30 @@ class SweepSolution:
             ("energy_error", sweep.energy_error, "1", "largest energy residual relative to the energy exchanged"),
             ("entropy_error", sweep.entropy_error, "1", "largest entropy residual relative to what was exchanged"),
             ("site_error", sweep.site_error, "1", "largest residual of the site balances"),
-            ("destroys_entropy", sweep.destroys_entropy.astype(float), "1", "1 where a law destroys entropy, else 0"),
+            ("destroys_entropy", sweep.destroys_entropy.astype(float), "1", "1 where a law or a jump does, else 0"),
         ]
+        if self.system.transitions:
+            text = "most entropy that a jump has destroyed"
+            rows.append(("entropy_destroyed", sweep.entropy_destroyed, "J/(m^2 K)", text))
         if self.accuracy:
             rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))
         return [Column(name, tuple(self.axes), self._shaped(values), unit, text) for name, values, unit, text in rows]
+
+    def _events(self) -> list[Column]:
+        """The events of each run where there are jumps; beyond the last one of a run times and values are not set."""
+        runs = range(len(self.sweep)) if self.system.transitions else ()
+        tables = [{column.name: column for column in event_columns(self.sweep[i])} for i in runs]
+        most = max((len(table["event_time"].values) for table in tables if table), default=0)
+        every = {name: column for table in tables for name, column in table.items()}
+        columns = []
+        for name, column in every.items():
+            empty: str | float = "" if column.values.dtype == object else np.nan
+            values = np.full((len(tables), most), empty, dtype=column.values.dtype)
+            for i, table in enumerate(tables):
+                if name in table:
+                    values[i, : len(table[name].values)] = table[name].values
+            columns.append(Column(name, (*self.axes, "event"), self._shaped(values), column.unit, column.long_name))
+        return columns
 
     def _statistics(self) -> list[Column]:
         columns = []

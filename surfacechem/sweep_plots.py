@@ -45,7 +45,9 @@ def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = 
 
 
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Callable[[Axes], None]]:
-    known = [str(name) for name in dataset.data_vars if dataset[name].dtype.kind == "f"]
+    known = [
+        str(name) for name in dataset.data_vars if dataset[name].dtype.kind == "f" and "event" not in dataset[name].dims
+    ]
     for name in variables or ():
         if name not in known:
             raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")

@@ -15,6 +15,7 @@ from surfacechem import spectrum
 from surfacechem.audit import EPSILON, SLACK, Audit, audit
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.jumps import VIOLATES
 from surfacechem.solvers.contract import Counters, Problem, Result, Status
 from surfacechem.solvers.radau import Batch, consistent
 from surfacechem.spectrum import Statistics
@@ -186,8 +187,18 @@ class Sweep:
             worst = np.maximum(worst, np.nanmax(np.abs(change - booked), axis=1))
         return worst
 
-    @cached_property
+    @property
     def destroys_entropy(self) -> NDArray[np.bool_]:
+        """Which runs have a law that destroys entropy beyond their tolerance, or a jump that does."""
+        return self.violations | (self.entropy_destroyed > 0)
+
+    @property
+    def entropy_destroyed(self) -> Array:
+        """Most entropy that a jump of each run has destroyed [J/(m^2 K)]; where nothing jumps, none."""
+        return np.zeros(len(self))
+
+    @cached_property
+    def violations(self) -> NDArray[np.bool_]:
         """Which runs have a law that destroys entropy beyond their tolerance."""
         rates = self._productions()
         largest = [np.nanmax(np.abs(rate), axis=1) for rate in rates]
@@ -268,6 +279,12 @@ class Separate(Sweep):
         return np.array([books.site_error for books in self._audits])
 
     @cached_property
-    def destroys_entropy(self) -> NDArray[np.bool_]:
+    def violations(self) -> NDArray[np.bool_]:
         """Which runs have a law that destroys entropy beyond their tolerance."""
         return np.array([bool(books.violations) for books in self._audits])
+
+    @cached_property
+    def entropy_destroyed(self) -> Array:
+        """Most entropy that a jump of each run has destroyed [J/(m^2 K)]; one that was refused destroys none."""
+        flagged = [[j for j in run.jumps if j.verdict == VIOLATES and not j.stops] for run in self.trajectories]
+        return np.array([max((-jump.entropy for jump in jumps), default=0.0) for jumps in flagged])

@@ -189,6 +189,26 @@ def _unit(text: str) -> Any:
         raise InputError(f"{_short(text)} is not a unit.{_HINT}") from None
 
 
+def quotient(unit: str, per: str) -> str:
+    """A unit per another.
+
+    >>> quotient("m", "s"), quotient("m/s", "s"), quotient("W/m^2", "s"), quotient("1", "m/s")
+    ('m/s', 'm/s^2', 'W/(m^2 s)', 's/m')
+    """
+    powers: dict[str, int] = {}
+    for text, sign in ((unit, 1), (per, -1)):
+        for side, factors in zip((sign, -sign), text.split("/"), strict=False):
+            for base, _, power in (factor.partition("^") for factor in factors.strip("()").split() if factor != "1"):
+                powers[base] = powers.get(base, 0) + side * int(power or 1)
+    top, bottom = ([_power(b, abs(p)) for b, p in powers.items() if p * sign > 0] for sign in (1, -1))
+    below = f"({' '.join(bottom)})" if len(bottom) > 1 else "".join(bottom)
+    return "/".join([" ".join(top) or "1", *([below] if below else [])])
+
+
+def _power(base: str, power: int) -> str:
+    return base if power == 1 else f"{base}^{power}"
+
+
 def needed(unit: str) -> str:
     """What a unit measures, in words: ``a length [m]``."""
     exact = next((words for words, known in WORDS.items() if known == unit), None)

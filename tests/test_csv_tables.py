@@ -35,11 +35,15 @@ def test_columns_have_units(tmp_path):
     assert table.values == [0.0, 6.0]
 
 
-def test_a_column_is_chosen_by_name_and_the_only_one_without(tmp_path):
+def test_a_column_of_another_name_is_chosen_by_name(tmp_path):
     by_name = load(tmp_path, "t [s], a [W/m^2], b [W/m^2]\n0,1,2\n3,1,2\n", changes=["loading.Q_1.table.column=b"])
     assert by_name.case.scene.loading["Q_1"].values == [2.0, 2.0]
-    only = load(tmp_path, "power [W/m^2], t [s]\n5, 0\n5, 3\n")
+    only = load(tmp_path, "power [W/m^2], t [s]\n5, 0\n5, 3\n", changes=["loading.Q_1.table.column=power"])
     assert only.case.scene.loading["Q_1"].values == [5.0, 5.0]
+    with pytest.raises(
+        InputError, match=r"heat\.csv:2: 5 K is a temperature; Q_1, from the column a, needs a heat flux"
+    ):
+        load(tmp_path, "t [s], a [K]\n0, 5\n3, 5\n", changes=["loading.Q_1.table.column=a"])
 
 
 def test_it_is_the_table_written_into_the_case(tmp_path):
@@ -80,7 +84,13 @@ def test_editors_know_both_ways(table):
         ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: 't' is no name with a unit"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, 1, 1\n", r"heat.csv:3: 3 values for 2 columns"),
         ("t [s], Q_1 [W/m^2]\n\n2, 0\n1, 1\n", r"heat.csv:4: times must never decrease"),
-        ("t [s], Q_2 [W], Q_3 [W]\n0, 0, 0\n1, 1, 1\n", r"heat.csv:1: no column 'Q_1'. Did you mean"),
+        (
+            "t [s], Q_2 [W], x [W]\n0, 0, 0\n1, 1, 1\n",
+            r"heat.csv:1: no column 'Q_1'. Did you mean 'Q_2'\? Known: Q_2, t",
+        ),
+        ("t [s], Q_2 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: no column 'Q_1'.*To take one.*`column: Q_2`\.$"),
+        ("t [s], power [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: no column 'Q_1'. Known: power, t. .*`column: power`"),
+        ("t [s]\n0\n1\n", r"heat.csv:1: no column 'Q_1'"),
         ("t [s], Q_1 [W/m^2], Q_1 [W/m^2]\n0, 0, 0\n1, 1, 1\n", r"heat.csv:1: the column Q_1 is there 2 times"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n", r"heat.csv: a table needs as many times \(1\)"),
         ("# nothing\n", r"heat.csv: the table is empty"),

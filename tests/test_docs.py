@@ -1,5 +1,6 @@
 """What the documentation shows is true: its Python runs, its commands print what it says, its cases load."""
 
+import ast
 import doctest
 import os
 import re
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import surfacechem
+from surfacechem.assembly import assemble
 from surfacechem.case import names
 from surfacechem.document import parse
 from surfacechem.solvers import stepper
@@ -150,6 +152,29 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
         code, got = surfacechem_command(command, tmp_path, path=str(tmp_path))
         assert code == 0, got
         assert expected in got
+
+
+def test_the_page_on_events_names_every_transition():
+    """Those that the assembly spells out, those of the shipped cases, and those at the bounds of the bonding state."""
+    calls = (node for path in (ROOT / "surfacechem" / "assembly").glob("*.py") for node in ast.walk(parsed(path)))
+    spelt = {
+        call.args[0].value
+        for call in calls
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Transition"
+        if isinstance(call.args[0], ast.Constant)
+    }
+    assert {"soften", "tear", "rejoin", "open"} <= spelt
+    systems = [surfacechem.load(name).system for name in names()]
+    systems.append(assemble(surfacechem.load("exothermic").case.scene, frozenset((-1, 1))))
+    happen = {item.name for system in systems for item in system.transitions}
+    assert {"loosen", "debond", "snap"} <= happen
+    page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (`.*?) \|", page, re.MULTILINE))))
+    assert {name for name in spelt | happen if not name.startswith("end of ")} <= told
+
+
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def test_links_of_the_readme_exist():

@@ -12,6 +12,7 @@ from surfacechem import integrate, rerun, sweep_plots
 from surfacechem.cli import app
 from surfacechem.errors import InputError
 from surfacechem.references import get
+from surfacechem.report import sweep_summary
 
 RATE = "loading.f.ramp.rate"
 K_0 = "interface.potential.bond-energy.K_0"
@@ -167,12 +168,55 @@ def test_forces_that_overflow(exponent):
 
 def test_scenes_with_jumps_are_swept_run_by_run():
     case = surfacechem.load("press-hold-pull")
-    data = case.sweep({"programme.1.until.p": ["8 kPa", "10 kPa"]}).dataset
-    single = case.run({"programme.1.until.p": 8e3})
+    data = case.sweep({"programme.approach.until.p": ["8 kPa", "10 kPa"]}).dataset
+    single = case.run({"programme.approach.until.p": 8e3})
     for name in ("g_n", "t_n", "theta_bond_s", "E_total"):
         assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
     for name in ("energy_error", "entropy_error", "site_error"):
         assert data[name].values[0] == single.dataset.attrs[name]
+
+
+def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
+    t_max = "interface.limits.tensile-strength.t_max"
+    case = surfacechem.load("debonding")
+    solution = case.sweep({t_max: ["20 MPa", "77.46 MPa", "1 GPa"]})
+    data, single = solution.dataset, case.run({t_max: 20e6})
+    assert data["destroys_entropy"].values.tolist() == [1, 0, 0]
+    assert data["entropy_destroyed"].values.tolist() == [-single.dataset["event_entropy"].item(), 0, 0]
+    assert "debond" in single.dataset.attrs["entropy_violations"]
+    assert data["event_name"].values.tolist() == [["debond"], ["debond"], [""]]
+    for name in ("event_time", "event_released", "T_before", "T_after"):
+        assert data[name].dims == ("t_max", "event")
+        assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
+        assert np.isnan(data[name].values[2]).all()
+    (events,) = (line for line in sweep_summary(solution, None).splitlines() if line.startswith("  events"))
+    assert "2 debond; destroys entropy in 1 of 3 runs, at worst -0." in events
+    assert events.endswith("at t_max = 2e+07")
+    refused = surfacechem.load("debonding", {"interface.limits.tensile-strength.violation": "refuse"})
+    data = refused.sweep({t_max: ["20 MPa", "77.46 MPa"]}).dataset
+    assert not data["destroys_entropy"].any()
+    assert "destroys entropy" in data["reason"].values[0]
+
+
+@pytest.mark.parametrize(
+    ("case", "path", "value", "written"),
+    [
+        ("press-hold-pull", "programme.hold.for", 3.0, "programme.hold.for"),
+        ("press-hold-pull", "programme.approach.w_n", -2e-7, "programme.approach.w_n"),
+        ("press-hold-pull", "programme.pull.until.theta_bond_s.falls-to", 1e-5, None),
+        ("press-hold-pull", "programme.approach.until.p.rises-to", 2e3, "programme.approach.until.p"),
+        ("debonding", "interface.limits.tensile-strength.t_max.value", 5e7, "interface.limits.tensile-strength.t_max"),
+        ("debonding", "mechanics.normal.k", 2e13, None),
+        ("sliding-dry", "loading.v", 0.01, "loading.v.level"),
+        ("exothermic", "bodies.lower.C", 1e3, None),
+    ],
+)
+def test_paths_of_a_sweep_are_those_of_the_case(case, path, value, written):
+    simulation = surfacechem.load(case)
+    assert simulation._plan({path: [value]}, None).axes[0].path == (written or path)
+    if path != "mechanics.normal.k":
+        changed = surfacechem.load(case, {path: value}).model.values()
+        assert changed == simulation.model.values(simulation._values({path: value}))
 
 
 def test_fitted_media_are_swept_run_by_run():

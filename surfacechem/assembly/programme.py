@@ -13,11 +13,12 @@ from surfacechem.assembly.interface import LOADABLE
 from surfacechem.assembly.mounting import LENGTH
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
 from surfacechem.system import State
 from surfacechem.terms import Spec
 from surfacechem.transitions import Transition
+from surfacechem.units import quotient
 from surfacechem.variables import unit_of
 
 SCALES = {"m": LENGTH, "m/s": LENGTH}
@@ -60,8 +61,8 @@ def _driven(build: Build, name: str, stage: Expression) -> Expression:
     rate: Expression = symengine.Integer(0)
     for i, item in enumerate(build.scene.programme):
         if name in item.rates:
-            spec = Spec(f"({quantity.unit})/s", f"rate of {name} in the stage {item.name}")
-            value = build.parameters.add(f"{name}_rate", f"programme.{i + 1}.{name}", spec, item.rates[name])
+            spec = Spec(quotient(quantity.unit, "s"), f"rate of {name} in the stage {item.name}")
+            value = build.parameters.add(f"{name}_rate", f"{_path(item)}.{name}", spec, item.rates[name])
             rate = rate + where(_during(stage, i), value, 0)
     start = build.scene.initial.get(name, 0.0)
     build.states.append(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
@@ -86,12 +87,16 @@ def stage_ends(build: Build) -> None:
         advance = {stage: symengine.Integer(i + 1), begun: build.t}
         if item.duration is not None:
             spec = Spec("s", f"length of the stage {item.name}", above=0)
-            length = build.parameters.add("length", f"programme.{i + 1}.for", spec, item.duration)
+            length = build.parameters.add("length", f"{_path(item)}.for", spec, item.duration)
             _stage_end(build, item, where(_during(stage, i), begun + length - build.t, 1), advance)
         elif item.event:
             _at_event(build, item, stage, i, begun)
         elif item.variable:
             _at_value(build, item, stage, i, advance)
+
+
+def _path(item: Stage) -> str:
+    return f"programme.{item.name}"
 
 
 def _stage_end(build: Build, item: Stage, margin: Expression, advance: dict[Expression, Expression]) -> None:
@@ -102,17 +107,21 @@ def _stage_end(build: Build, item: Stage, margin: Expression, advance: dict[Expr
 def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
     x = _variable(build, item)
     spec = Spec(unit_of(item.variable), f"end of the stage {item.name}")
-    value = build.parameters.add(item.variable, f"programme.{i + 1}.until.{item.variable}", spec, item.value)
+    path = f"{_path(item)}.until.{item.variable}{'' if item.rising else '.falls-to'}"
+    value = build.parameters.add(item.variable, path, spec, item.value)
     sign = symengine.Integer(1 if item.rising else -1)
     _stage_end(build, item, where(_during(stage, i), sign * (value - x), 1), advance)
 
 
 def _variable(build: Build, item: Stage) -> Expression:
+    if item.variable in build.nodes:
+        return build.nodes[item.variable].T
     if build.variables.has(item.variable):
         return build.variables.get(item.variable, f"the stage {item.name}")
     if any(named.name == item.variable for named in build.named):
         return symengine.Symbol(item.variable)
-    known = [*(role.variable for role in build.variables.roles), *(named.name for named in build.named)]
+    roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
+    known = {*roles, *build.nodes} - INTERNAL
     raise InputError(
         f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}", item.place
     )

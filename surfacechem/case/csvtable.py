@@ -56,10 +56,10 @@ def table(tree: Tree, unit: str) -> Table:
     fields = mapping(tree.value["table"], KEYS[1:])
     content = fields["csv"]
     rows = _rows(content)
-    wanted = text(fields["column"], "column") if "column" in fields else tree.place.path.rpartition(".")[2]
+    variable = tree.place.path.rpartition(".")[2]
     columns = [_column(cell, rows[0]) for cell in rows[0].cells]
     times = _index("t", columns, rows[0])
-    values = _index(wanted, columns, rows[0], len(columns) == 2 and "column" not in fields)
+    values = _values(variable, fields.get("column"), columns, rows[0])
     for row in rows[1:]:
         if len(row.cells) != len(columns):
             raise row.error(f"{len(row.cells)} values for {len(columns)} columns.")
@@ -70,7 +70,7 @@ def table(tree: Tree, unit: str) -> Table:
     try:
         return Table(
             times=moments,
-            values=[_number(row, values, columns, unit) for row in rows[1:]],
+            values=[_number(row, values, columns, unit, variable) for row in rows[1:]],
             place=tree.place,
         )
     except InputError as error:
@@ -113,21 +113,32 @@ def _column(cell: str, heading: Row) -> tuple[str, str]:
     return found["name"], found["unit"].strip()
 
 
-def _index(name: str, columns: Sequence[tuple[str, str]], heading: Row, only: bool = False) -> int:
+def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]], heading: Row) -> int:
+    """The column that is named, else that of the variable; one of another name is never meant by itself."""
+    if named is not None:
+        return _index(text(named, "column"), columns, heading)
+    others = [name for name, _ in columns if name != "t"]
+    if variable not in others and others:
+        guess = suggestion(variable, [name for name, _ in columns])
+        other = others[0] if len(others) == 1 else "NAME"
+        raise heading.error(f"no column '{variable}'.{guess} To take one of another name, write `column: {other}`.")
+    return _index(variable, columns, heading)
+
+
+def _index(name: str, columns: Sequence[tuple[str, str]], heading: Row) -> int:
     names = [known for known, _ in columns]
     if names.count(name) > 1:
         raise heading.error(f"the column {name} is there {names.count(name)} times.")
-    if name not in names and only and "t" in names:
-        return 1 - names.index("t")
     if name not in names:
         raise heading.error(f"no column '{name}'.{suggestion(name, names)}")
     return names.index(name)
 
 
-def _number(row: Row, index: int, columns: Sequence[tuple[str, str]], unit: str) -> float:
+def _number(row: Row, index: int, columns: Sequence[tuple[str, str]], unit: str, variable: str = "") -> float:
     name, given = columns[index]
     cell = row.cells[index]
+    whose = f"{variable}, from the column {name}," if variable and variable != name else name
     try:
-        return parse(cell if given == "1" else f"{cell} {given}", unit, name=name)
+        return parse(cell if given == "1" else f"{cell} {given}", unit, name=whose)
     except InputError as error:
         raise row.error(error.message) from None

@@ -16,6 +16,7 @@ from surfacechem.case.fields import choice, items, mapping, number, shown, text
 from surfacechem.document import Tree
 from surfacechem.errors import InputError
 from surfacechem.terms import Factor, Law, Load, Spec, Varying, resolved_unit
+from surfacechem.units import quotient
 
 L = TypeVar("L", bound=Law)
 Units = Mapping[str, str]
@@ -87,7 +88,7 @@ def _level(tree: Tree, unit: str, name: str) -> float:
 
 def _is_rate(tree: Tree, unit: str) -> bool:
     with suppress(InputError):
-        number(tree, f"({unit})/s", "rate")
+        number(tree, quotient(unit, "s"), "rate")
         return True
     return False
 

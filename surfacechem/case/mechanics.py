@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from surfacechem.assembly import LOADABLE
 from surfacechem.case.fields import choice, items, mapping, number, shown, text
 from surfacechem.case.laws import build
 from surfacechem.document import Tree
-from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Mounting, Stage
 from surfacechem.terms import Spec
+from surfacechem.units import quotient
 
 MECHANICS_KEYS = ("normal", "tangential", "transverse")
 STIFFNESS_KEYS = ("stiffness", "E", "H")
@@ -76,9 +77,9 @@ def _stage(item: Tree, units: Mapping[str, str]) -> Stage:
     if not isinstance(item.value, dict) or len(item.value) != 1:
         raise item.error(f"a stage is `name: {{rates, for or until}}`, not {shown(item)}.")
     ((name, tree),) = item.value.items()
-    known = [*(variable for variable in units if variable in VARIABLES), *STAGE_KEYS]
-    fields = mapping(tree, known)
-    rates = {key: number(child, f"({units[key]})/s", key) for key, child in fields.items() if key not in STAGE_KEYS}
+    fields = mapping(tree, [*LOADABLE, *STAGE_KEYS])
+    moved = {key: child for key, child in fields.items() if key not in STAGE_KEYS}
+    rates = {key: number(child, quotient(units[key], "s"), key) for key, child in moved.items()}
     if "for" in fields and "until" in fields:
         raise fields["until"].error("the stage has two ends: give `for` or `until`.")
     stage = Stage(name, rates, place=tree.place)

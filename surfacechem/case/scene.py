@@ -17,7 +17,7 @@ from surfacechem.case.mechanism import read_mechanism
 from surfacechem.case.medium import read_medium
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, suggestion
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
 
@@ -62,7 +62,7 @@ class SceneReader:
         )
         self.temperatures = self._temperatures()
         coverages = [variable.name for variable in self.mechanism.variables] if self.mechanism else []
-        self.units = {name: quantity.unit for name, quantity in VARIABLES.items()}
+        self.units = {name: quantity.unit for name, quantity in VARIABLES.items() if name not in INTERNAL}
         self.units |= dict.fromkeys(self.nodes, "K") | dict.fromkeys(coverages, "1")
 
     @property

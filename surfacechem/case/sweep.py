@@ -11,7 +11,8 @@ from surfacechem.case.fields import choice, items, mapping, number, whole
 from surfacechem.case.run import SPACINGS
 from surfacechem.document import Tree
 from surfacechem.errors import InputError, suggestion
-from surfacechem.quantities import VARIABLES
+from surfacechem.overrides import parameter_path
+from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.sweeps import MOST_RUNS, Axis, Plan
 
 SWEEP_KEYS = ("over", "until")
@@ -53,12 +54,12 @@ def read_until(tree: Tree) -> tuple[str, Tree]:
     if len(fields) != 1:
         raise tree.error("`until` is one prescribed variable and its value, for example `until: {f: 200 pN}`.")
     ((name, value),) = fields.items()
-    choice(Tree(name, value.place), "variable", VARIABLES)
+    choice(Tree(name, value.place), "variable", [variable for variable in VARIABLES if variable not in INTERNAL])
     return name, value
 
 
 def _axis(path: str, tree: Tree, units: Mapping[str, str]) -> Axis:
-    path = path if path in units else f"{path}.level" if f"{path}.level" in units else path
+    path = parameter_path(path, units)
     if path not in units:
         raise InputError(f"no parameter '{path}' to sweep.{suggestion(path, units)}", tree.place)
     unit = units[path]
