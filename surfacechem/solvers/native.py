@@ -44,10 +44,11 @@ constant."""
 
 (
     ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE, PIVOT,
-    WOBBLE, WOBBLE_NOW, WOBBLE_BEFORE, WOBBLE_EARLIER,
-) = np.arange(18)  # fmt: skip
+    WOBBLE, WOBBLE_NOW, WOBBLE_SUMS,
+) = np.arange(17)  # fmt: skip
 """Rows of the vectors of length n; PIVOT is SCALE as it was when the Newton matrices were factored, WOBBLE the
-roughness of the equations over neighbouring times and what it is found from."""
+roughness of the equations over neighbouring times. It is found from the last three rows, of which WOBBLE_SUMS is the
+first."""
 Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.arange(8)
 """Rows of the vectors of length n_ledger."""
 M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH = np.arange(9)
@@ -268,7 +269,7 @@ def lay_out(
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
         _take(cursor, (GUESSED + 1,), np.float64),
         _take(cursor, (REFUSED + 1,), np.int64),
-        _take(cursor, (WOBBLE_EARLIER + 1, n), np.float64),
+        _take(cursor, (WOBBLE_SUMS + 3, n), np.float64),
         _take(cursor, (ROWS, n), np.float64),
         _take(cursor, (ROWS, n), np.float64),
         _take(cursor, (ROWS, n), np.float64),

@@ -7,6 +7,8 @@ about to fail, so smooth runs do not pay for it.
 
 from typing import Any
 
+import numpy as np
+
 from surfacechem.solvers.chains import solve_real
 from surfacechem.solvers.native import (
     ATOL,
@@ -18,14 +20,12 @@ from surfacechem.solvers.native import (
     RTOL,
     SCALE,
     WOBBLE,
-    WOBBLE_BEFORE,
-    WOBBLE_EARLIER,
     WOBBLE_NOW,
+    WOBBLE_SUMS,
     YDOT,
     Y,
     clear,
     compiled,
-    copy,
     evaluate,
     set_inputs,
 )
@@ -34,10 +34,11 @@ from surfacechem.solvers.radau_tables import GAMMA
 ULPS = 4.4e-16
 """Rounding of a term: its own, and that of the sum it enters."""
 
-NEIGHBOURS, NEAR = 6, 1e-3
-"""Times at which equations are compared, and how far they are apart as parts of a step: near enough for any smooth
-equation to be a straight line.
-"""
+DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
+"""A fifth difference of values with independent errors has their size."""
+
+WINDOWS, NEAR = 3, 1e-3
+"""Differences that are taken, and how far apart their times are as parts of a step."""
 
 LARGEST = 1e-6
 """Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
@@ -45,18 +46,25 @@ LARGEST = 1e-6
 
 @compiled
 def _measure_wobble(w: Any, y: int, ydot: int) -> None:
-    """How much the equations differ from smooth ones over neighbouring times: what their loads round to."""
-    t = w.inputs[0]
+    """Fifth differences of the equations over neighbouring times: smooth ones have none, rounding of their loads does.
+
+    Source: Hamming (1973), Numerical Methods for Scientists and Engineers, noise by differences.
+    """
+    t, n = w.inputs[0], w.algebraic.shape[0]
     clear(w.vector[WOBBLE])
+    for row in range(WINDOWS):
+        clear(w.vector[WOBBLE_SUMS + row])
     set_inputs(w, w.vector[y], w.vector[ydot])
-    for k in range(NEIGHBOURS):
+    for k in range(WINDOWS + DIFFERENCE.shape[0] - 1):
         w.inputs[0] = t + k * NEAR * w.clock[H_FACTORED]
-        copy(w.vector[WOBBLE_BEFORE], w.vector[WOBBLE_EARLIER])
-        copy(w.vector[WOBBLE_NOW], w.vector[WOBBLE_BEFORE])
         evaluate(w, RESIDUAL, w.vector[WOBBLE_NOW].ctypes.data)
-        for i in range(w.algebraic.shape[0] if k > 1 else 0):
-            bend = w.vector[WOBBLE_NOW, i] - 2.0 * w.vector[WOBBLE_BEFORE, i] + w.vector[WOBBLE_EARLIER, i]
-            w.vector[WOBBLE, i] = max(w.vector[WOBBLE, i], abs(bend))
+        for row in range(WINDOWS):
+            if 0 <= k - row < DIFFERENCE.shape[0]:
+                for i in range(n):
+                    w.vector[WOBBLE_SUMS + row, i] += DIFFERENCE[k - row] * w.vector[WOBBLE_NOW, i]
+    for row in range(WINDOWS):
+        for i in range(n):
+            w.vector[WOBBLE, i] = max(w.vector[WOBBLE, i], abs(w.vector[WOBBLE_SUMS + row, i]))
     w.inputs[0] = t
 
 
