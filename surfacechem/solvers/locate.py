@@ -259,6 +259,22 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
 
 
 @compiled
+def _short_of(w: Any, m: int, size: float) -> float:
+    """A step that ends just short of a kink: beyond it the last stage would feel what begins there."""
+    side = w.margin[M_SIDE, m]
+    resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    for attempt in range(6):
+        shorter = size - resolution * 2.0**attempt
+        if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
+            break
+        _margins_at_end(w, shorter)
+        if w.margin[M_NOW, m] * side > 0.0:
+            return shorter
+    _step_onto(w, size)
+    return size
+
+
+@compiled
 def _resolved(w: Any, size: float) -> float:
     """Difference of two times that are one for all that can be told."""
     return float(1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size))
@@ -311,6 +327,8 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:
         return 0.0
+    if kinds[first, 0] == 0 and kinds[first, 2] == 0:
+        size = _short_of(w, first, size)
     _mark_coincident(w, h, size, kinds)
     w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
     if w.fired[first] == 0 and not any_true(w.fired):
