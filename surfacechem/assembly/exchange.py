@@ -47,14 +47,12 @@ def friction(build: Build) -> None:
 def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
     """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
 
-    At zero it is one that grows or falls, not one that stays: so a contact begins and ends. A rigid one that nothing
-    bonds opens where its pressure ends.
+    At zero it is one that grows or falls, not one that stays: so a contact begins and ends.
     """
     if "p" not in law.nonnegative or "p" in build.scene.loading:
         return {}
     p = build.variables.get("p", law)
-    rigid = any(mode.name == "closed" for mode in build.modes) and not build.interface.limits
-    return {"p": p if rigid else where(p < 0, 0 * p, p)}
+    return {"p": where(p < 0, 0 * p, p)}
 
 
 def _reversal(build: Build, directions: Collection[Direction]) -> None:

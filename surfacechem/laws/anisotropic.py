@@ -9,12 +9,12 @@ from surfacechem.terms import Friction, parameter
 class AnisotropicCoulomb(Friction):
     r"""Dry friction with a coefficient for each of two directions along the interface.
 
-    .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}, \quad
-        \Big(\frac{t_t}{\mu_1 p}\Big)^2 + \Big(\frac{t_2}{\mu_2 p}\Big)^2 \le 1 \text{ while sticking}
+    .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}
 
-    The traction is not along the slip unless the coefficients are equal, when this is `coulomb` in the plane. Source:
-    Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients. Any velocities; p >= 0. Dissipates
-    :math:`t_t v + t_2 v_2 \ge 0`.
+    It sticks within :math:`(t_t/\mu_1)^2 + (t_2/\mu_2)^2 \le p^2`. The traction is not along the slip unless the
+    coefficients are equal, when this is `coulomb` in the plane.
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:dry_fric with a tensor of coefficients. Any velocities; p >= 0.
+    Dissipates :math:`t_t v + t_2 v_2 \ge 0`.
 
     >>> law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)
     >>> law.traction(p=1e5, direction=0.6), law.transverse(p=1e5, direction_2=0.8)
