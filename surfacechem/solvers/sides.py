@@ -23,6 +23,9 @@ from surfacechem.solvers.native import (
 LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
 """Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
 
+SHALLOW = 1e-10
+"""Relative depth below zero, at most, that a margin must reach to pass where it turns round there."""
+
 NOISE = 4e-15
 """Relative to the largest value seen, a margin this small is zero."""
 
@@ -86,7 +89,7 @@ def mark_at_end(w: Any, kinds: Any) -> None:
 @compiled
 def passed_by(w: Any, kinds: Any, m: int) -> float:
     """How far below zero the lowest point between two crossings has to lie to count."""
-    return float(max(w.clock[RTOL] * w.margin[M_LARGEST, m], noise(w, m)) if kinds[m, 3] == 1 else 0.0)
+    return float(max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m)) if kinds[m, 3] == 1 else 0.0)
 
 
 @compiled
