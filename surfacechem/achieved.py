@@ -21,7 +21,7 @@ from surfacechem.event_table import event_times
 from surfacechem.integrate import Trajectory
 from surfacechem.profiles import profile_values
 from surfacechem.scene import Scene
-from surfacechem.solution import Accuracy
+from surfacechem.solution import EARLIER, Accuracy
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = 
     second = trajectory.model.resolve(trajectory, other)
     shared = len(trajectory.result.times)
     if len(second.result.times) < shared or shared < 2:
-        why = f"a second run at rtol {other:.0e} ended earlier: {second.reason}"
+        why = f"a second run at rtol {other:.0e} {EARLIER}: {second.reason}"
         return from_balances(trajectory, f"balances only, since {why}")
     errors, note = apart(trajectory, second)
     source = second_run(other) + (", and one with half of the cells" if cells else "")

@@ -52,6 +52,10 @@ DATASET_NAMES = {
 """Names that differ in the dataset, where no two may be the same but for their case."""
 
 
+EARLIER = "ended earlier"
+"""What is said of a second run that did not come as far."""
+
+
 @dataclass(frozen=True)
 class Accuracy:
     """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
@@ -132,6 +136,8 @@ class Solution:
     def _inaccurate(self) -> list[str]:
         """An error well beyond what was asked for, or so large that the result is none."""
         found = self.accuracy
+        if found is not None and self.status == "finished" and EARLIER in found.source:
+            return [f"the error is not known: {found.source.partition('since ')[2]}"]
         if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
             return []
         wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"

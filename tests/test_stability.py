@@ -177,8 +177,8 @@ WRONG_CELLS = [place for place, outcome in BROKEN.items() if outcome == WRONG]
 def test_where_the_matrix_says_wrong_so_does_the_summary_of_the_run(name, value):
     case = read(regimes()[name].problem(value))
     solution = Simulation(replace(case, run=replace(case.run, rtol=1e-10))).run()
-    assert solution.accuracy.source.startswith("estimate")
-    assert solution.accuracy.error > 10.0**-LEAST_DIGITS
+    unknown = "ended earlier" in solution.accuracy.source
+    assert unknown or solution.accuracy.error > 10.0**-LEAST_DIGITS
     assert any("error" in warning for warning in solution.warnings), solution.warnings
     assert "warning" in run_summary(solution, None)
 
