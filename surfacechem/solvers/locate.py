@@ -260,7 +260,9 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
 
 @compiled
 def _short_of(w: Any, m: int, size: float) -> float:
-    """A step that ends just short of a kink: beyond it the last stage would feel what begins there."""
+    """A step that ends just short of a kink, where it counts as zero: beyond it the last stage would feel what begins
+    there.
+    """
     side = w.margin[M_SIDE, m]
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     for attempt in range(6):
@@ -268,7 +270,7 @@ def _short_of(w: Any, m: int, size: float) -> float:
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
             break
         _margins_at_end(w, shorter)
-        if w.margin[M_NOW, m] * side > 0.0:
+        if 0.0 < w.margin[M_NOW, m] * side <= noise(w, m):
             return shorter
     _step_onto(w, size)
     return size
