@@ -32,6 +32,9 @@ DIGITS = 64 * float(np.finfo(float).eps)
 SOON = 1e-9
 """Part of the time of a fold within which nothing but the gaps changes."""
 
+ATOM = 1e-20
+"""Gap [m] that counts as none."""
+
 BALANCED = 1e-12
 """Tractions out of balance that count as none, relative to their parts."""
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
 from surfacechem.domains import Domain
-from surfacechem.equilibria import BALANCED, Equilibria, Heat, Lost, Point
+from surfacechem.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
+from surfacechem.springs import stored
 from surfacechem.system import Account, System
 from surfacechem.transitions import HELD, Transition
 
@@ -35,9 +36,6 @@ DIGITS = 4 * float(np.finfo(float).eps)
 """Last digits of a number."""
 
 NEWTON = 60
-
-ATOM = 1e-20
-"""Gap [m] that counts as none."""
 
 
 @dataclass(frozen=True)
@@ -223,9 +221,10 @@ class Jumper:
             return books, {}
         (k, w, F, g), (_, w_new, F_new, g_new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (last, before))
         if item.fold:
-            way = k * (w_new - w) * ((w_new + w) - (g_new + g)) / 2 + (F_new + F) / 2 * (g_new - g)
+            middle = (g_new + g) / 2
+            way = stored(k, w_new, middle) - stored(k, w, middle) + (F_new + F) / 2 * (g_new - g)
             return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
-        lift = k * (w_new - w) * ((w_new + w) / 2 - g)
+        lift = stored(k, w_new, g) - stored(k, w, g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)
         accounts = list(self.system.pulls)
         books[2:] = [(F_new * g)[accounts.index(name)] for name in self.system.given]

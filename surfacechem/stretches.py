@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.equilibria import Point
+from surfacechem.equilibria import ATOM, Point
 from surfacechem.solvers.contract import Counters, Events, Points, Problem, Result, Status
 from surfacechem.system import State
 
 Array = NDArray[np.float64]
-
-ATOM = 1e-20
-"""Gap [m] that counts as none where a run stalls."""
 
 
 @dataclass(frozen=True)

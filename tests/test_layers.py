@@ -12,7 +12,18 @@ import surfacechem.data
 
 # A floor sees itself and the floors before it. "name.*" is a folder: the package and all modules in it.
 FLOORS = {
-    "words": ["quantities", "expressions", "units", "document", "overrides", "errors", "data", "fits", "grids"],
+    "words": [
+        "quantities",
+        "expressions",
+        "units",
+        "document",
+        "overrides",
+        "errors",
+        "data",
+        "fits",
+        "grids",
+        "springs",
+    ],
     "contracts": ["law", "terms", "substances", "scene"],
     "core": [
         "balances",

@@ -10,12 +10,13 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.expressions import Expression, where
+from surfacechem.springs import stored
 from surfacechem.transitions import Transition
 
 
 def load_steps(build: Build) -> None:
     """The transition that loads make by their jumps, where a gap in equilibrium or a spring feels them."""
-    springs = [k * (w - g) ** 2 / 2 for k, w, _, g in build.motion.pulls.values()]
+    springs = [stored(k, w, g) for k, w, _, g in build.motion.pulls.values()]
     felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
     steps = {name: load for name, load in build.loads.items() if load.jumps() and felt & _histories(build, name)}
     if not steps:

@@ -9,9 +9,10 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, sqrt
+from surfacechem.expressions import Expression, derivative, sqrt
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
+from surfacechem.springs import stored
 from surfacechem.system import Account, Pace
 from surfacechem.terms import Law, Varying, reads
 
@@ -127,9 +128,18 @@ class FarField:
     w_dot: Expression
     F: Expression
 
+    def stored(self, g: Expression) -> Expression:
+        """Elastic energy of the bodies [J/m^2]."""
+        return stored(self.k, self.w, g)
+
+    def carried(self, g: Expression) -> Expression:
+        """Traction that the bodies carry elastically [Pa], the fall of what they store as the gap opens."""
+        slot = symengine.Symbol("opening")
+        return -derivative(self.stored(slot), slot).subs({slot: g})
+
     def force(self, g: Expression, rate: Expression) -> Expression:
         """Traction with which the far field pulls the gap open [Pa]."""
-        return self.k * (self.w - g) + self.c_b * (self.w_dot - rate) + self.F
+        return self.carried(g) + self.c_b * (self.w_dot - rate) + self.F
 
     def paces(self, text: str) -> list[Pace]:
         """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""
@@ -145,13 +155,13 @@ class FarField:
 
     def yielding(self, g: Expression, traction: Expression) -> Expression:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
-        return (self.k * (self.w - g) + self.c_b * self.w_dot + self.F - traction) / (self.c_b + self.c_g)
+        return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
     def book(self, build: Build, g: Expression, rate: Expression) -> None:
         """Energies of the bodies, work of the far field, heat of the dampers."""
         text = AXES[self.axis]
         build.paces += self.paces(text)
-        spring, kinetic = self.k * (self.w - g) ** 2 / 2, self.m * rate**2 / 2
+        spring, kinetic = self.stored(g), self.m * rate**2 / 2
         for name, energy, what in (
             ("spring", spring, "elastic energy of the bodies"),
             ("kinetic", kinetic, "kinetic energy"),
@@ -160,7 +170,7 @@ class FarField:
                 quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
                 build.motion.mechanical.append(build.name(quantity, energy))
         bulk = self.w_dot - rate
-        power = (self.k * (self.w - g) + self.c_b * bulk) * self.w_dot + self.F * rate
+        power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * rate
         if power != 0:
             build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
             build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
