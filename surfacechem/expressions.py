@@ -134,7 +134,7 @@ FRACTION_FLOOR = 1e-300
 
 
 def log_fraction(x: Expression) -> Expression:
-    """Natural logarithm of a fraction, finite at zero."""
+    """Natural logarithm of a fraction, or of a rate that may vanish, finite at zero."""
     if not is_symbolic(x):
         return math.log(max(x, FRACTION_FLOOR))
     import symengine

@@ -95,8 +95,6 @@ class Law(ABC):
     """Variables that must stay above zero for the law to hold."""
     nonnegative: ClassVar[tuple[str, ...]] = ()
     """Variables that must not fall below zero."""
-    kinks: ClassVar[tuple[str, ...]] = ()
-    """Variables at whose zeros the formula bends, so that a step has to end there."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""
@@ -132,6 +130,11 @@ class Law(ABC):
     @property
     def peaks(self) -> Mapping[str, Expression]:
         """Values of variables at which the formula has a narrow peak, which a step must not pass over."""
+        return {}
+
+    @property
+    def kinks(self) -> Mapping[str, Expression]:
+        """Values of variables at which the formula bends, so that a step has to end there."""
         return {}
 
     @property

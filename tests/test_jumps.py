@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies
+from scenes import SITES, bodies, varying
 
 from surfacechem.assembly import assemble
 from surfacechem.audit import audit
@@ -10,7 +10,10 @@ from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
-from surfacechem.laws.friction import Coulomb, MohrCoulomb
+from surfacechem.laws.contact import NormalStiffness
+from surfacechem.laws.factors import Linear
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb
+from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.scene import Interface, Mounting, Scene
@@ -21,7 +24,14 @@ K = 1e11
 
 
 def solve(potentials=(), *, until, loading, J_c=None, **scene):
-    interface = Interface("T", potentials, scene.pop("frictions", ()), sites=SITES, limits=scene.pop("limits", ()))
+    interface = Interface(
+        "T",
+        potentials,
+        scene.pop("frictions", ()),
+        scene.pop("reactions", ()),
+        sites=SITES,
+        limits=scene.pop("limits", ()),
+    )
     loads = loading | ({"J_c": Hold(level=J_c)} if J_c else {})
     initial = {"T": 300.0} | scene.pop("initial", {})
     whole = Scene(bodies("T", "T"), interface, loading=loads, T_0=300.0, initial=initial, **scene)
@@ -107,6 +117,29 @@ def test_what_sticks_slides_both_ways():
     trajectory = solve(until=1e-3, loading=loading, frictions=[Coulomb(mu=0.5)], tangential=Mounting(k=1e8, m=1.0))
     (slip,) = (mode for mode in trajectory.model.system.modes if mode.name == "slip")
     assert slip.words == {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+
+
+def test_a_gap_in_equilibrium_follows_bonds_that_sliding_breaks():
+    """The slider has a mass, the gap has none: as the bonds and their stiffness go, it goes with them."""
+    E, w_n = 1e13, -1e-6
+    stiffness = varying(E, Linear(of="phi", slope=0.5, about=0.0))
+    trajectory = solve(
+        [NormalStiffness(E_n=stiffness), BondEnergy(K_0=1.0)],
+        until=10.0,
+        loading={"w_n": Hold(level=w_n), "w_t": Ramp(rate=1e-6)},
+        frictions=[BondedCoulomb(mu=0.3, mu_b=0.6, mu_ub=0.5)],
+        reactions=[LinearAffinity(c_r=0.0)],
+        normal=Mounting(k=1e12),
+        tangential=Mounting(k=1e11, m=1e9, c_b=1e10),
+        initial={"phi": 1.0},
+    )
+    slip = jumps(trajectory, "slip forward")[0]
+    gaps = [point.y[trajectory.model.jumper.states.index("g_n")] for point in (slip.before, slip.after)]
+    np.testing.assert_allclose(gaps, [1e12 * w_n / (1e12 + 1.5 * E), 1e12 * w_n / (1e12 + E)], rtol=1e-12)
+    p = np.array(gaps) * np.array([1.5 * E, E])
+    stored = p**2 / 2 * (1 / 1e12 + 1 / np.array([1.5 * E, E]))
+    assert slip.released == pytest.approx(stored[0] - stored[1] - 0.5, rel=1e-9)
+    assert audit(trajectory).energy_error < 1e-9
 
 
 def test_a_dead_shear_load_sticks_up_to_the_limit_and_ends_there():

@@ -138,6 +138,20 @@ def test_initial_layer_far_below_rounding() -> None:
     assert result.y[0] == pytest.approx(np.cos(1.0), rel=1e-8)
 
 
+def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
+    """y' = 1e30 y (1 - y) + 1e-3 from y = 0: a long implicit step would rest on the unstable equilibrium."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y) - 1e-3])
+    end = 7.6e-29
+    times = np.array([end, 1.0])
+    problem = Problem(program, np.zeros(1), times, np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, np.array([1e-14]))
+    result = radau.solve(problem)
+    assert result.status == Status.FINISHED
+    grown = np.exp(1e30 * end - np.log(1e33))
+    # Close to the absolute tolerance it is known to a few per cent, which last as it grows.
+    np.testing.assert_allclose(result.outputs[:, 0], [grown / (1 + grown), 1.0], rtol=1e-2)
+
+
 def test_vanishing_capacity_ends_at_zero_temperature() -> None:
     """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
     t, temperature, rate = se.symbols("t T dT")

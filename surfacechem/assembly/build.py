@@ -204,9 +204,9 @@ class Build(Draft):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
             self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
-        for name in law.kinks:
+        for name, bend in law.kinks.items():
             value = own[name] if name in own else self.variables.get(name, law)
-            self.margins.append(Margin(name, value, f"{name} changes its sign, where {law.name()} bends", False))
+            self.margins.append(Margin(name, value - bend, f"{law.name()} bends at this {name}", False))
         for name, top in law.peaks.items():
             value, reason = self.variables.get(name, law) - top, f"{law.name()} is at its peak"
             self.margins.append(Margin(f"{name} at the peak of {law.name()}", value, reason, terminal=False, peak=True))

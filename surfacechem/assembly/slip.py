@@ -256,7 +256,7 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = broken(build, breaking) if breaking is not None else {}
     balanced = not (kind.inertial and not kind.elastic)
-    settles = balanced and not kind.rate_dependent
+    settles = bool(jump) or (balanced and not kind.rate_dependent)  # other gaps follow the bonds and their heat
     for s, word in ((1, "forward"), (-1, "backward")):
         margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, bears - s * needed))
         reason = f"sticking gives way and the interface slides {word}"

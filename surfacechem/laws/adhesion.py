@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from surfacechem.expressions import Expression, positive, where
 from surfacechem.terms import Potential, RateLaw, parameter
 
@@ -49,9 +51,12 @@ class AdhesionLoss(RateLaw):
     (-7.5e+17, 0.0)
     """
 
-    kinks = ("mu",)
-
     b: float = parameter("J s/m^2", "viscosity of adhesion", above=0)
+
+    @property
+    def kinks(self) -> Mapping[str, Expression]:
+        """Where loss ends."""
+        return {"mu": 0.0}
 
     def rate(self, mu: Expression, n_c: Expression, N_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surfacechem.expressions import Expression, exp, expm1, log, log_fraction, where
+from surfacechem.expressions import Expression, exp, expm1, log_fraction, where
 from surfacechem.laws.forces import (
     BellFactor,
     DemboFactor,
@@ -38,7 +38,7 @@ class Bell(StatedBothWays):
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
         on, off = (BellFactor(x_beta=x).log_factor(f, T_c) for x in (self.x_on, self.x_off))
-        return log(self.k_on) + on, log(self.k_off) + off
+        return log_fraction(self.k_on) + on, log_fraction(self.k_off) + off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
@@ -95,7 +95,8 @@ class DemboSpring(StatedBothWays):
         bond, transition = self.stiffness, self.transition_stiffness
         formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
         rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
-        return log(self.k_on) + formation.log_factor(f, T_c), log(self.k_off) + rupture.log_factor(f, T_c)
+        on, off = formation.log_factor(f, T_c), rupture.log_factor(f, T_c)
+        return log_fraction(self.k_on) + on, log_fraction(self.k_off) + off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
@@ -130,7 +131,7 @@ class TwoPathway(StatedBothWays):
         """Logarithms of the coefficients of formation and rupture."""
         ratio = self.k_catch / self.k_slip
         factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
-        return log(self.k_on), log(self.k_slip) + factor.log_factor(f, T_c)
+        return log_fraction(self.k_on), log_fraction(self.k_slip) + factor.log_factor(f, T_c)
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
@@ -168,7 +169,7 @@ class DudkoHummerSzabo(StatedBothWays):
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
         factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
-        return log(self.k_on), log(self.k_off) + factor.log_factor(f, T_c)
+        return log_fraction(self.k_on), log_fraction(self.k_off) + factor.log_factor(f, T_c)
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

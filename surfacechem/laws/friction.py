@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from surfacechem.expressions import Expression, absolute, decay, positive, power
 from surfacechem.terms import Friction, parameter
 
@@ -53,6 +55,11 @@ class MohrCoulomb(Friction):
     t_n_max: float = parameter("Pa", "adhesive tensile strength", default=0.0, at_least=0)
     c: float = parameter("Pa", "shear strength without pressure (cohesion)", default=0.0, at_least=0)
     mu_s: float | None = parameter("1", "static friction coefficient; mu if not given", default=None, at_least=0)
+
+    @property
+    def kinks(self) -> Mapping[str, Expression]:
+        """The tension at which only cohesion is left."""
+        return {"p": -self.t_n_max}
 
     def traction(self, p: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""

@@ -72,6 +72,9 @@ COARSE = 3e-6
 FORESEEN = 1.5
 """The longest step, in units of the one before, whose middle is foreseen well enough to differentiate there."""
 
+REACH = 30.0
+"""The longest step, in units of the one before, that its polynomial is continued to."""
+
 STIFFER = 3.0
 """How much larger than at the start of the step the foreseen derivatives may be."""
 
@@ -202,10 +205,10 @@ def factor_newton(w: Any, h: float) -> bool:
 
 @compiled
 def predict(w: Any, h: float) -> None:
-    """First guess of the stages from the stored polynomial, or no change where there is none."""
+    """First guess of the stages from the stored polynomial; no change where there is none, or none that reaches."""
     k, last = w.count[MEMBER], w.count[LAST_MEMBER]
     s, top, z = stage_count(k), stage_count(last), w.z
-    if w.clock[H_LAST] == 0.0:
+    if not h <= REACH * w.clock[H_LAST]:
         for i in range(s):
             clear(z[i])
         return

@@ -181,6 +181,20 @@ def choose_member(w: Any, slowest: float) -> bool:
 
 
 @compiled
+def growing_size(w: Any) -> float:
+    """Step in which what is still below the tolerance, where no error counts, grows no more than e-fold by its own.
+
+    The method would damp what grows much faster, and never leave an equilibrium that is unstable.
+    """
+    mass, stiffness = w.jacobian[1], w.jacobian[0]
+    fastest = 0.0
+    for j in range(mass.shape[0]):
+        if mass[j, j] != 0.0 and abs(w.vector[Y, j]) < w.vector[ATOL, j]:
+            fastest = max(fastest, -stiffness[j, j] / mass[j, j])
+    return 1.0 / fastest if fastest > 0.0 else np.inf
+
+
+@compiled
 def _rate_norm(w: Any, rate: Any) -> float:
     norm = 0.0
     for j in range(w.algebraic.shape[0]):

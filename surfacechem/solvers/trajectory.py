@@ -43,7 +43,7 @@ from surfacechem.solvers.radau_advance import (
     store_polynomial,
 )
 from surfacechem.solvers.radau_outputs import write_outputs
-from surfacechem.solvers.radau_step import first_size, loosening
+from surfacechem.solvers.radau_step import first_size, growing_size, loosening
 from surfacechem.solvers.sides import mark_at_end, start_margins
 
 FINISHED = int(Status.FINISHED)
@@ -194,7 +194,7 @@ def _run_segment(
             if kinds.shape[0] > 0 and goes_on:
                 mark_at_end(w, kinds)
         size_last, norm_last = h, max(norm, 1e-2)
-        h = keep_matrices(w, h, min(proposed, limit))
+        h = min(keep_matrices(w, h, min(proposed, limit)), growing_size(w))
         if kinds.shape[0] > 0 and any_true(w.fired):
             if _write_events(w, events, kinds, counts):
                 return EVENT
