@@ -278,7 +278,7 @@ interface:
 mechanics: {tangential: {k: 1e13 Pa/m}}
 loading: {w_n: {table: {times: [0, 5, 12], values: [10 nm, 0.5 nm, 80 nm]}}, w_t: {ramp: {rate: 1 um/s}}}
 initial: {T: 300 K, g_n: 10 nm}
-run: {until: 12 s, rtol: 1e-13}
+run: {until: 12 s}
 """
     solution = solved(text, exact=1e-8)
     states = [state.name for state in solution.trajectory.model.system.states]

@@ -105,13 +105,14 @@ def normal_motion(build: Build) -> None:
     if not mount.quasi_static:
         build.variables.get("v_n", "the mechanics")
     closing(build, g)
-    far.book(build, g, rate)
+    dot = symengine.Symbol("dg_n_dt")
+    far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
     if mount.inertial:
-        build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate
+        build.rows["g_n"] = dot - rate
         force = far.force(g, rate) - t_n - far.c_g * rate
         build.rows["v_n"] = symengine.Symbol("dv_n_dt") - force / far.m
     elif mount.damped:
-        build.rows["g_n"] = symengine.Symbol("dg_n_dt") - rate
+        build.rows["g_n"] = dot - rate
     else:
         _quasi_static(build, g, far, t_n)
 

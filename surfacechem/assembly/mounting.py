@@ -157,8 +157,13 @@ class FarField:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
-    def book(self, build: Build, g: Expression, rate: Expression) -> None:
-        """Energies of the bodies, work of the far field, heat of the dampers."""
+    def book(self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None) -> None:
+        """Energies of the bodies, work of the far field, heat of the dampers.
+
+        Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
+        ``moves``: then energy is conserved in each step, however stiff the damper.
+        """
+        moves = rate if moves is None else moves
         text = AXES[self.axis]
         build.paces += self.paces(text)
         spring, kinetic = self.stored(g), self.m * rate**2 / 2
@@ -170,17 +175,17 @@ class FarField:
                 quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
                 build.motion.mechanical.append(build.name(quantity, energy))
         bulk = self.w_dot - rate
-        power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * rate
+        power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
             build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
             build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
         if self.F != 0:
             build.motion.given[f"W_{self.axis}"] = self.F * g
         if self.c_b != 0:
-            _bulk_damper(build, self, self.c_b * bulk**2)
+            _bulk_damper(build, self, self.c_b * bulk * (self.w_dot - moves))
         if self.c_g != 0:
             label = build.unique(f"contact_damper_{self.axis}")
-            build.dissipation[label] = self.c_g * rate**2
+            build.dissipation[label] = self.c_g * rate * moves
             build.frictions.add(label)
 
 

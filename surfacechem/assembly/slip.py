@@ -133,7 +133,8 @@ def motion(build: Build, kind: Kind) -> None:
     needed = t_e if t_e is not None else far.force(u, NONE)  # type: ignore[union-attr]
     slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(kind.slides)
     if far is not None:
-        far.book(build, u, rate)
+        derived = rate == symengine.Symbol("v_t") and not kind.inertial
+        far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
         _balance(build, kind, far, slides, t_f, carried)
     else:
         build.supply("W_t", "work of the far field on the tangential displacement", carried * rate, None)

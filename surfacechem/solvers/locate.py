@@ -259,9 +259,9 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
 
 
 @compiled
-def _short_of(w: Any, m: int, size: float) -> float:
-    """A step that ends just short of a kink, where it counts as zero: beyond it the last stage would feel what begins
-    there.
+def _short_of(w: Any, h: float, m: int, size: float) -> float:
+    """A step that ends just short of a kink, where it counts as zero or time knows nothing nearer: beyond it the last
+    stage would feel what begins there.
     """
     side = w.margin[M_SIDE, m]
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
@@ -270,7 +270,8 @@ def _short_of(w: Any, m: int, size: float) -> float:
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
             break
         _margins_at_end(w, shorter)
-        if 0.0 < w.margin[M_NOW, m] * side <= noise(w, m):
+        nearest = 2.0 * abs(w.margin[M_SLOPE, m]) * (size - shorter) / h
+        if 0.0 < w.margin[M_NOW, m] * side <= max(nearest, noise(w, m)):
             return shorter
     _step_onto(w, size)
     return size
@@ -330,7 +331,7 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     if size == 0.0:
         return 0.0
     if kinds[first, 0] == 0 and kinds[first, 2] == 0:
-        size = _short_of(w, first, size)
+        size = _short_of(w, h, first, size)
     _mark_coincident(w, h, size, kinds)
     w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
     if w.fired[first] == 0 and not any_true(w.fired):

@@ -72,11 +72,21 @@ def _write_state(w: Any, row: Any, t: float) -> None:
 
 
 @compiled
+def _is_last(w: Any, events: Any, counts: Any, m: int) -> bool:
+    """Whether the last event written is of this margin, at this time: a step ends just short of a kink, and beyond."""
+    last = counts[EVENTS] - 1
+    now = w.clock[BASE] + w.clock[TAU]
+    return bool(0 <= last < events.shape[0] and events[last, 0] == m and events[last, 1] == now)
+
+
+@compiled
 def _write_events(w: Any, events: Any, kinds: Any, counts: Any) -> bool:
     """A row for each margin that fired; True if one of them is terminal."""
     terminal = False
     for m in range(kinds.shape[0]):
         if w.fired[m] != 0:
+            if kinds[m, 0] == 0 and _is_last(w, events, counts, m):
+                continue
             if counts[EVENTS] < events.shape[0]:
                 row = events[counts[EVENTS]]
                 row[0] = m
