@@ -164,7 +164,10 @@ class Equilibria:
             sizes = np.atleast_2d(self._balance(self._rows(point, way, gaps)))[:, 1::2]
             return np.asarray(DIGITS * np.where(way.pulls != 0, sizes, 0.0) @ np.abs(way.pulls))
 
-        return self._moved(point, way, march(driving, float(point.y[way.column]), direction, noise))
+        gap = march(driving, float(point.y[way.column]), direction, noise)
+        if gap is not None and abs(gap) < ATOM and abs(driving([0.0])) <= noise([0.0]):
+            gap = 0.0  # laws that end with the gap shall know it
+        return self._moved(point, way, gap)
 
     def settle(self, point: Point, heat: Heat | None = None) -> Point | None:
         """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat."""

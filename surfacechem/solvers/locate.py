@@ -264,13 +264,14 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
     stage would feel what begins there.
     """
     side = w.margin[M_SIDE, m]
+    slope = max(abs(w.margin[M_SLOPE, m]) / h, abs(w.margin[M_BEFORE, m]) / size)
     resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
-    for attempt in range(6):
+    for attempt in range(40):
         shorter = size - resolution * 2.0**attempt
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
             break
         _margins_at_end(w, shorter)
-        nearest = 2.0 * abs(w.margin[M_SLOPE, m]) * (size - shorter) / h
+        nearest = 2.0 * slope * (size - shorter)
         if 0.0 < w.margin[M_NOW, m] * side <= max(nearest, noise(w, m)):
             return shorter
     _step_onto(w, size)
@@ -318,6 +319,16 @@ def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
 
 
 @compiled
+def _kink(w: Any, kinds: Any, first: int) -> int:
+    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
+    found = -1
+    for m in range(kinds.shape[0]):
+        if kinds[m, 0] == 0 and kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
+            found = m
+    return found
+
+
+@compiled
 def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
@@ -330,9 +341,12 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:
         return 0.0
-    if kinds[first, 0] == 0 and kinds[first, 2] == 0:
-        size = _short_of(w, h, first, size)
     _mark_coincident(w, h, size, kinds)
+    kink = _kink(w, kinds, first)
+    if kink >= 0:
+        size = _short_of(w, h, kink, size)
+        _mark_coincident(w, h, size, kinds)
+        w.fired[kink] = 1
     w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
     if w.fired[first] == 0 and not any_true(w.fired):
         update_sides(w, kinds)

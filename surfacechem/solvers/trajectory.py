@@ -55,6 +55,8 @@ FIRST_COUNTER, COUNTERS = 4, 6
 
 PATIENCE = 40
 """Steps that the ledger may refuse beside every second: what it misses may be noise, which must not end a run."""
+SAME = 1e-12
+"""Difference of times, relative to time, that makes no second event of a kink."""
 SHORTEST = 1e-10
 """Part of the time so far below which the ledger shortens no step: what ends the run there is told by the states."""
 
@@ -73,10 +75,12 @@ def _write_state(w: Any, row: Any, t: float) -> None:
 
 @compiled
 def _is_last(w: Any, events: Any, counts: Any, m: int) -> bool:
-    """Whether the last event written is of this margin, at this time: a step ends just short of a kink, and beyond."""
+    """Whether the last event written is of this margin and, but for digits, of now: a step ends just short of a kink,
+    and the next one passes it.
+    """
     last = counts[EVENTS] - 1
     now = w.clock[BASE] + w.clock[TAU]
-    return bool(0 <= last < events.shape[0] and events[last, 0] == m and events[last, 1] == now)
+    return bool(0 <= last < events.shape[0] and events[last, 0] == m and now - events[last, 1] <= SAME * now)
 
 
 @compiled
@@ -197,8 +201,9 @@ def _run_segment(
             h *= 0.25
             w.clock[H_FACTORED] = 0.0
             continue
-        whole = size == remaining
-        _move(w, size, end if whole else w.clock[BASE] + (w.clock[TAU] + size), times, outputs, steps, counts)
+        reached = w.clock[BASE] + (w.clock[TAU] + size)
+        whole = size == remaining or reached >= end
+        _move(w, size, end if whole else reached, times, outputs, steps, counts)
         if whole:
             w.clock[TAU] = end - w.clock[BASE]
             if kinds.shape[0] > 0 and goes_on:
