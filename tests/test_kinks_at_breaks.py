@@ -8,7 +8,8 @@ from surfacechem.assembly import assemble
 from surfacechem.event_table import event_columns
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.loading import Harmonic, Table
+from surfacechem.laws.loading import Harmonic, Ramp, Table
+from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.scene import Interface, Mounting, Scene
 
 
@@ -36,3 +37,15 @@ def test_so_it_does_in_a_scene_with_transitions():
     scene = Scene(bodies("T", "T"), rubbing, (), loading, None, 300.0, {"T": 300.0}, normal=mount)
     assert assemble(scene).transitions
     np.testing.assert_allclose(times(scene), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
+
+
+def test_a_step_ends_where_a_given_gap_closes():
+    """The traction bends at touch; the work on the gap is the change of the energy, whatever felt the gap."""
+    law, g = VanDerWaalsFlatFlat(A_H=1e-12, D_0=4e-8), Ramp(start=7e-8, rate=-3e-8)
+    scene = Scene(bodies("T", "T"), Interface("T", [law]), (), {"g_n": g}, None, 300.0, {"T": 300.0})
+    trajectory = Model(assemble(scene)).solve(Run([0.0, 4.0], 1e-9))
+    accounts = [account.quantity.name for account in trajectory.model.system.ledger]
+    work = law.energy(g_n=-5e-8) - law.energy(g_n=7e-8)
+    assert trajectory.result.ledger[accounts.index("W_g_n")] == pytest.approx(work, rel=1e-10)
+    (closes,) = trajectory.result.events.t
+    assert closes == pytest.approx(7 / 3, rel=1e-14)

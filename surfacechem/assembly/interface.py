@@ -171,7 +171,10 @@ def _sides_of_touch(build: Build) -> None:
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
     conditions = {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
     psi = symengine.sympify(build.psi).xreplace(conditions)
-    if "g_n" not in build.motion.gap_rates or not depends(psi, side):
+    if not depends(psi, side):
+        return
+    if "g_n" not in build.motion.gap_rates:
+        build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
         return
     build.psi = psi
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
