@@ -184,6 +184,7 @@ GALLERY: dict[str, tuple[list[str], str | None]] = {
     "anisotropic-slide": (["v", "v_2"], None),
     "area-stretch": (["T_1", "T_2", "T_c", "phi", "t_coulomb"], None),
     "bond-constant-force": (["phi"], None),
+    "bouncing-plate": (["g_n", "T"], None),
     "closing-film": (["T"], "g_n"),
     "closing-gas-gap": (["T_1", "T_2", "q_1_film", "q_1_radiation"], None),
     "cohesive-cooling": (["T"], "g_n"),

@@ -17,6 +17,11 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-12
 """Heat of a jump that counts as none, relative to the energy that was exchanged."""
 
+SLOW = 1e-3
+"""Part of the speed of the fastest impact below which a rebound is one of the last."""
+
+REST = "rest"
+
 
 @dataclass(frozen=True)
 class EventColumn:
@@ -66,12 +71,31 @@ def _rows(trajectory: Trajectory) -> list[Row]:
 
 
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
-    """Times [s] of the events by name, in order; where physics stopped the run, also that of its end."""
-    table = {column.name: column.values for column in event_columns(trajectory)}
-    times, names = table.get("event_time", np.empty(0)), table.get("event_name", np.empty(0, object))
-    found = {str(name): times[names == name] for name in dict.fromkeys(names)}
+    """Times [s] of the events by name, in order; where physics stopped the run, also that of its end.
+
+    The last of endless rebounds are left out: how many of them there are is a matter of the tolerance.
+    """
+    rows = _telling(trajectory, _rows(trajectory))
+    found = {
+        name: np.array([row.t for row in rows if row.name == name]) for name in dict.fromkeys(r.name for r in rows)
+    }
     ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
     return found | ended
+
+
+def _telling(trajectory: Trajectory, rows: Sequence[Row]) -> list[Row]:
+    """The events without slow rebounds and what they set off; coming to rest ends them and is one."""
+    names = [state.name for state in trajectory.model.system.states]
+    kept, fastest, slow = [], 0.0, -np.inf
+    for row in rows:
+        if row.jump and row.jump.transition.returns is not None:
+            speed = abs(float(row.before[names.index("v_n")]))
+            fastest = max(fastest, speed)
+            slow = row.t if speed < SLOW * fastest else -np.inf
+        elif row.t != slow or row.name == REST:
+            slow = -np.inf
+        kept += [row] if slow == -np.inf else []
+    return kept
 
 
 def _jump_columns(trajectory: Trajectory, rows: Sequence[Row]) -> list[EventColumn]:

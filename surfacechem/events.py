@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.equilibria import BALANCED, DRIFT, Point
 from surfacechem.jumps import Jump, Jumper, booked
+from surfacechem.rebounds import Rebounds
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
@@ -44,7 +45,7 @@ AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
 
 SLIDING = ("stop", "slip", "slip forward", "slip backward")
-HOLDABLE = (*SLIDING, "touch", "release")
+HOLDABLE = (*SLIDING, "touch", "release", "impact", "rub")
 HOLD, LONGEST_HOLD = 1e-9, 1e-4
 """Transitions whose chatter is resolved, and the parts of a piece of time for which it is: the first time, then
 longer, and at most."""
@@ -89,6 +90,11 @@ class Hybrid:
     def clock(self) -> int:
         """Column of the time at which a stretch starts."""
         return next(j for j, p in enumerate(self.system.parameters) if p.path == START)
+
+    @cached_property
+    def rebounds(self) -> Rebounds:
+        """What leaves an exact zero and returns to it."""
+        return Rebounds(self.system, self.first)
 
     def run(self) -> Result:
         """The whole run as one result."""
@@ -158,17 +164,18 @@ class Hybrid:
         local = start.parameters.copy()
         local[self.clock] = start.t
         local[self.system.origins] -= start.t
+        segments = self.rebounds.pieces(start.t, end)
         part = changed(
             problem,
             y0=start.y,
             times=np.clip(times - start.t, 0.0, end - start.t),
-            segments=np.array([0.0, end - start.t]),
-            parameters=local[None],
+            segments=segments,
+            parameters=np.repeat(local[None], len(segments) - 1, axis=0),
             max_steps=problem.max_steps - self.steps,
             max_seconds=seconds,
             exchanged=self.exchanged,
             goes_on=end < problem.segments[-1],
-            seen=sizes(problem, self.system.states, start, self.largest),
+            seen=self.rebounds.seen(start.t, sizes(problem, self.system.states, start, self.largest)),
         )
         return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
@@ -317,6 +324,7 @@ class Hybrid:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
             self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
             return None
+        self.rebounds.see(jump)
         changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
         self.booked = self.booked + np.array(changes)
         return jump.after

@@ -227,7 +227,8 @@ class Jumper:
         lift = stored(k, w_new, g) - stored(k, w, g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)
         accounts = list(self.system.pulls)
-        books[2:] = [(F_new * g)[accounts.index(name)] for name in self.system.given]
+        for j, name in enumerate(self.system.given, start=2):
+            books[j] = (F_new * g)[accounts.index(name)] if name in accounts else books[j]
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
     def _rested(self, index: int, start: Point, lost: Lost | None, heat: Heat, balanced: float) -> Point | None:

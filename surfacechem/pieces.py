@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.system import System
+from surfacechem.system import TOLERANCE, System
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,8 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
             rows[:, j] = [parameter.at(float(start)) for start in starts]
         elif parameter.path == "run.slack":
             rows[:, j] = min(max(values[parameter.path], STRAY * rtol), LARGEST_SLACK)
+        elif parameter.path == TOLERANCE:
+            rows[:, j] = rtol
         else:
             rows[:, j] = values[parameter.path]
     return rows

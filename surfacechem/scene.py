@@ -76,6 +76,11 @@ class Mounting(Law):
     With a mass the gap is inertial, with a damper alone overdamped, with a stiffness alone quasi-static; with a
     far-field traction and nothing else it is under dead load. Source: lumped form of the momentum balance of Sauer,
     Duong & Mandadapu (2021), eq. e:sf_moc.
+
+    Where no potential bears the bodies their contact is rigid. A mass that reaches it with the velocity :math:`v < 0`
+    leaves it with :math:`-e\,v`, and :math:`(1 - e^2)\,m v^2/2` is heat in the bodies (Newton's law of impact;
+    Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8). A rebound is never assumed: without e the
+    bodies rest on each other as soon as they meet.
     """
 
     contract = "mechanics"
@@ -88,6 +93,9 @@ class Mounting(Law):
     c_g: float = parameter("Pa s/m", "damper beside the interface; heats it", default=0.0, at_least=0, varies=False)
     beta_1: float = parameter(
         "1", "fraction of the heat of c_b that goes into body 1", default=0.5, at_least=0, at_most=1, varies=False
+    )
+    e: float = parameter(
+        "1", "coefficient of restitution of a rigid contact", default=0.0, at_least=0, at_most=1, varies=False
     )
 
 

@@ -24,6 +24,9 @@ from surfacechem.transitions import Equilibrium, Mode, Sink, Transition
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
 
+TOLERANCE = "run.rtol"
+"""Path of the relative tolerance of a run, where what follows each other without end has to end."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -227,7 +230,7 @@ class System:
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the energy that a jump releases, by the kind of the jump."""
     given: Mapping[str, Expression] = field(default_factory=dict)
-    """Tractions of the far field times their gaps [J/m^2], by the account of their work."""
+    """Tractions of the far field times their gaps, and what impacts rub off a drive [J/m^2], by account of the work."""
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
     """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
     work."""

@@ -77,6 +77,8 @@ class Transition:
     """What its margin measures, where that of other transitions measures the same."""
     times: tuple[float, ...] = ()
     """Times [s] at which it happens, where these are given."""
+    returns: Expression | None = None
+    """Time in which it may happen again [s], zero where that is open: its margin begins anew at an exact zero."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
 

@@ -134,6 +134,26 @@ def rigid_under_load() -> Scene:
     return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER, normal=Mounting(k=1e14))
 
 
+def rigid_with_a_mass() -> Scene:
+    """Bodies that rebound from a rigid contact, and rub on it."""
+    return _hitting(Mounting(k=1e13, m=0.01, c_b=1e5, c_g=4e4, e=0.6))
+
+
+def rigid_with_a_damper() -> Scene:
+    """Bodies that close without inertia."""
+    return _hitting(Mounting(k=1e13, c_b=1e5, c_g=4e4))
+
+
+def _hitting(mounting) -> Scene:
+    interface = Interface("T", [], [Coulomb(mu=0.3)])
+    loading = {"w_n": Ramp(start=-2e-9, rate=1e-9), "F_n": Hold(level=-3e5), "w_t": Ramp(rate=1e-3)}
+    initial = TOGETHER | {"g_n": 3e-9, "u_t": 0.0, "v": 1e-4}
+    tangential = Mounting(k=1e8, m=10.0)
+    return Scene(
+        bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=mounting, tangential=tangential
+    )
+
+
 def _bonded_rigid(limits) -> Interface:
     return Interface("T", [BondEnergy(K_0=300.0)], (), [LinearAffinity(c_r=1e16)], SITES, limits=limits)
 
@@ -358,6 +378,8 @@ ALL = [
     Moving(stretched_gap),
     Moving(rigid, ({"closed": 1.0}, {"closed": 0.0})),
     Moving(rigid_under_load, ({"closed": 1.0}, {"closed": 0.0})),
+    Moving(rigid_with_a_mass, ({"closed": 1.0, "slip": 1.0}, {"closed": 0.0, "slip": -1.0})),
+    Moving(rigid_with_a_damper, ({"closed": 1.0, "slip": 1.0}, {"closed": 0.0, "slip": 0.0})),
     Moving(bonded_contact, ({"bonded": 1.0}, {"bonded": 0.0})),
     Moving(inertial_slider, SLIDING),
     Moving(damped_slider, SLIDING),

@@ -49,6 +49,7 @@ FLOORS = {
         "stretches",
         "watching",
         "stalls",
+        "rebounds",
         "events",
         "pacing",
         "pieces",

@@ -64,6 +64,16 @@ def test_the_books_hold_what_jumps_release(name):
     assert table == [jump.transition.name for jump in solution.trajectory.jumps]
 
 
+def test_endless_rebounds_end_in_a_network_too():
+    """It does not follow as many of them as the compiled path."""
+    interface, net = network("bouncing-plate")
+    net.advance(3.0)
+    jumps = interface.scene.moments.jumps
+    assert [jump.transition.name for jump in jumps] == (len(jumps) - 1) * ["impact"] + ["rest"]
+    assert jumps[-1].t == pytest.approx(2.55863396, rel=1e-6)
+    assert (interface["g_n"], interface["v_n"]) == (0.0, 0.0)
+
+
 def test_single_steps_end_at_the_event():
     interface, net = network("stick-slip")
     times = []

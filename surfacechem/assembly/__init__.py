@@ -14,6 +14,7 @@ from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.folds import folds
 from surfacechem.assembly.force import force, rupture
 from surfacechem.assembly.gap import normal_gap, normal_motion
+from surfacechem.assembly.impact import impacts, missed
 from surfacechem.assembly.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.assembly.limits import bonded_mode, limits
 from surfacechem.assembly.load_steps import load_steps
@@ -54,11 +55,13 @@ STAGES = (
     friction,
     normal_motion,
     tangential_motion,
+    impacts,
     relaxing,
     folds,
     load_steps,
     heat_paths,
     mean_influx,
+    missed,
     equations,
     released,
     stage_ends,

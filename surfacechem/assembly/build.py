@@ -119,6 +119,10 @@ class Build(Draft):
         self.modes.append(Mode(name, symbol, initial, words, start, given, waits or {}))
         return symbol
 
+    def find_mode(self, name: str) -> Any:
+        """The symbol of a mode, None where the scene has none of that name."""
+        return next((mode.symbol for mode in self.modes if mode.name == name), None)
+
     @property
     def held_until(self) -> Expression:
         """Time until which what begins and stops without end is held as it is; made once."""

@@ -19,8 +19,7 @@ LEAST = 1e-3
 TOUCHING = 1e-12
 """Overlap [m] that still is touch: far below the size of an atom, far above the rounding of a gap."""
 
-REMEDY = "Give a potential that does, such as `penalty`"
-RIGID = ", or leave out the mass and the damper: contact on a stiffness alone is rigid."
+REMEDY = "Give a potential that does, such as `penalty`."
 CLOSED = "the gap closed, and no potential bears the bodies in contact"
 
 
@@ -33,12 +32,11 @@ def closing(build: Build, g: Any) -> None:
     # A law may have no number there.
     if not build.at_start(without_bonds) <= LEAST:
         return
-    remedy = REMEDY + ("." if g in build.psi.free_symbols else RIGID)
     if build.at_start(borne) <= LEAST:
-        build.warnings.append(f"no potential bears the bodies in contact: the run ends if the gap closes. {remedy}")
+        build.warnings.append(f"no potential bears the bodies in contact: the run ends if the gap closes. {REMEDY}")
     gap = g + TOUCHING
     margin = where(borne > LEAST, 1, gap) if borne.free_symbols else gap
-    build.margins.append(Margin("g_n >= 0", margin, CLOSED, remedy=remedy, domain=True))
+    build.margins.append(Margin("g_n >= 0", margin, CLOSED, remedy=REMEDY, domain=True))
 
 
 def _borne(build: Build, g: Any) -> Expression:

@@ -38,7 +38,7 @@ class Motion:
     mechanical: list[Expression] = field(default_factory=list)
     """Elastic and kinetic energies of the bodies [J/m^2]."""
     given: dict[str, Expression] = field(default_factory=dict)
-    """Potentials of the far-field tractions [J/m^2], which do work in a jump, by the account of that work."""
+    """What works in a jump [J/m^2], potentials of the far-field tractions above all, by the account of that work."""
     pulls: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
     """Stiffness, displacement and traction of the far field, and the gap, by the account of the work."""
     far_fields: dict[str, Any] = field(default_factory=dict)
@@ -57,6 +57,10 @@ class Motion:
     """Tangential traction that sticking can bear along each direction, by axis."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
+    works: dict[Friction, str] = field(default_factory=dict)
+    """Accounts of the work against friction where the velocity of sliding is prescribed."""
+    heals: dict[Expression, Expression] = field(default_factory=dict)
+    """New values of modes that a rigid contact has as it closes again."""
 
 
 @dataclass(eq=False)

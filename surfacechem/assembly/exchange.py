@@ -38,7 +38,8 @@ def friction(build: Build) -> None:
         build.frictions.add(label)
         build.dissipation[label] = power
         if not build.motion.slips:
-            build.supply(f"W_{label}", f"work done against {law.title}", power, None)
+            build.motion.works[law] = f"W_{label}"
+            build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
             _reversal(build, resisted)
         else:
             stick_limit(build, law, bound, pressed)

@@ -8,13 +8,21 @@ import symengine
 
 from surfacechem.assembly.breaking import bonds_left
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.closing import closing
+from surfacechem.assembly.closing import TOUCHING, closing
 from surfacechem.assembly.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import State
+from surfacechem.system import Margin, State
+from surfacechem.terms import Spec
 from surfacechem.transitions import Equilibrium
+
+UNSEEN = 1e-9
+"""Overlap [m] far beyond what is left where an impact is found."""
+
+MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
+SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
+OVERLAP = "the bodies overlap, and their contact is rigid"
 
 
 def normal_gap(build: Build) -> None:
@@ -22,11 +30,30 @@ def normal_gap(build: Build) -> None:
     mount = held(build, "n")
     if mount is None:
         return
-    if read_by_potentials(build, "g_n") or not mount.quasi_static:
+    meets = not read_by_potentials(build, "g_n")
+    if meets and mount.quasi_static:
+        _rigid(build, mount)
+    else:
         build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
         build.variables.get("g_n", "the mechanics")
-    else:
-        _rigid(build, mount)
+        if meets and not _ends_before_touch(build):
+            _unilateral(build, mount)
+    _refuse_idle_restitution(build, mount)
+
+
+def _ends_before_touch(build: Build) -> bool:
+    """Whether a law holds for an open gap only, so that a run ends as it closes."""
+    return any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat))
+
+
+def _refuse_idle_restitution(build: Build, mount: Held) -> None:
+    """Only a mass that meets a rigid contact rebounds by a coefficient."""
+    if not mount.law.e or (mount.inertial and build.find_mode("closed") is not None):
+        return
+    why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
+    if mount.inertial and read_by_potentials(build, "g_n"):
+        why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
+    raise InputError(f"the coefficient of restitution e would change nothing: {why}. Leave it out.", mount.law.place)
 
 
 def _moving(build: Build, mount: Held) -> Expression:
@@ -49,7 +76,14 @@ def _moving(build: Build, mount: Held) -> Expression:
 def _yielding(build: Build, mount: Held) -> Expression:
     """Velocity at which dampers bear what is out of balance; given by the state, so that power is linear in rates."""
     g = symengine.Symbol("g_n")
-    return build.name(VARIABLES["v_n"], far_field(build, mount).yielding(g, derivative(build.psi, g)))
+    yielding = far_field(build, mount).yielding(g, derivative(build.psi, g))
+    return build.name(VARIABLES["v_n"], _free(build) * yielding)
+
+
+def _free(build: Build) -> Expression:
+    """Zero while a rigid contact is closed."""
+    closed = build.find_mode("closed")
+    return symengine.Integer(1) if closed is None else 1 - closed
 
 
 def _rigid(build: Build, mount: Held) -> None:
@@ -58,19 +92,45 @@ def _rigid(build: Build, mount: Held) -> None:
         raise InputError(
             "a rigid interface under dead load has no opening. Give the mounting a stiffness k.", Place(path=mount.by)
         )
-    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, starts_closed(build, mount))
+    far = far_field(build, mount)
+    pull = far.k * far.w + far.F
+    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, _starts_closed(build, pull))
     build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
-    build.variables.define("t_n", partial(_reaction, build, mount, closed), "derived", "equilibrium with the far field")
+    _carry(build, closed * pull)
+
+
+def _unilateral(build: Build, mount: Held) -> None:
+    """A gap that moves and that no potential bears: closed it stands still and carries any pressure."""
+    far = far_field(build, mount)
+    pull = far.force(symengine.Integer(0), symengine.Integer(0))
+    g, v = symengine.symbols("g_n v_n")
+    start = _starts_closed(build, pull)
+    if mount.inertial:
+        start = where(absolute(v) > 0, 0, start)
+    closed = build.mode("closed", 0.0, {0.0: "open", 1.0: "closed"}, where(g > 0, 0, start))
+    if mount.inertial:
+        build.motion.gap_rates["g_n"] = (1 - closed) * v
+    initial = build.scene.initial.get("g_n", 0.0)
+    first = build.constant("g_n_i", "initial.g_n", Spec("m", "initial gap"), initial, internal=False)
+    build.margins += [
+        Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT),
+        Margin("touch", where(closed > 0, 1, g + UNSEEN), MISSED),
+    ]
+    _carry(build, closed * pull)
+
+
+def _carry(build: Build, traction: Expression) -> None:
+    """What a rigid contact carries, for the laws that read it."""
+    build.variables.define("t_n", partial(_reaction, build, traction), "derived", "equilibrium with the far field")
     build.variables.define("p", partial(_pressure, build), "derived", "equilibrium with the far field")
 
 
-def starts_closed(build: Build, mount: Held) -> Expression:
+def _starts_closed(build: Build, pull: Expression) -> Expression:
     """Whether a rigid interface is closed at the start: it is where bonds hold it, or the far field does not pull."""
-    far = far_field(build, mount)
     bonds = bonds_left(build)
     if bonds is None:
         bonds = symengine.Integer(1 if build.interface.limits else 0)
-    return where(bonds > 0, 1, where(far.k * far.w + far.F > 0, 0, 1))
+    return where(bonds > 0, 1, where(pull > 0, 0, 1))
 
 
 def _rigid_gap(build: Build, mount: Held, closed: Expression) -> Expression:
@@ -78,10 +138,8 @@ def _rigid_gap(build: Build, mount: Held, closed: Expression) -> Expression:
     return build.name(VARIABLES["g_n"], (1 - closed) * (far.w + far.F / far.k))
 
 
-def _reaction(build: Build, mount: Held, closed: Expression) -> Expression:
-    far = far_field(build, mount)
-    quantity = Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc")
-    build.areal(quantity, closed * (far.k * far.w + far.F))
+def _reaction(build: Build, traction: Expression) -> Expression:
+    build.areal(Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc"), traction)
     return symengine.Symbol("t_n")
 
 
@@ -104,13 +162,14 @@ def normal_motion(build: Build) -> None:
     t_n = derivative(build.psi, g)
     if not mount.quasi_static:
         build.variables.get("v_n", "the mechanics")
-    closing(build, g)
+    if build.find_mode("closed") is None:
+        closing(build, g)
     dot = symengine.Symbol("dg_n_dt")
     far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
     if mount.inertial:
         build.rows["g_n"] = dot - rate
         force = far.force(g, rate) - t_n - far.c_g * rate
-        build.rows["v_n"] = symengine.Symbol("dv_n_dt") - force / far.m
+        build.rows["v_n"] = symengine.Symbol("dv_n_dt") - _free(build) * force / far.m
     elif mount.damped:
         build.rows["g_n"] = dot - rate
     else:

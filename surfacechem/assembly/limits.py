@@ -39,7 +39,7 @@ def _starts_bonded(build: Build) -> Expression | None:
 
 def limits(build: Build) -> None:
     """Where a limit is reached bonds break; a rigid interface opens, and closes where the gap has closed."""
-    closed = next((mode.symbol for mode in build.modes if mode.name == "closed"), None)
+    closed = build.find_mode("closed")
     heals = [_limit(build, law, closed) for law in build.interface.limits]
     again: dict[Expression, Expression] = {}
     if heals and all(heals):
@@ -50,15 +50,19 @@ def limits(build: Build) -> None:
     if not build.interface.limits:
         t_n = build.variables.get("t_n", "the rigid interface")
         _opening(build, where(closed > 0, -t_n, 1), closed)
+    build.motion.heals = {closed: symengine.Integer(1), **again}
     gap = build.variables.get("g_n", "the rigid interface")
-    margin = where(closed > 0, 1, gap)
-    build.transitions.append(Transition("touch", margin, "the gap closes", {closed: symengine.Integer(1), **again}))
+    if "g_n" not in build.motion.gap_rates:
+        margin = where(closed > 0, 1, gap)
+        build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals))
 
 
 def _opening(build: Build, margin: Expression, closed: Expression) -> None:
     """A rigid interface without bonds opens under tension."""
     modes = {closed: symengine.Integer(0)}
-    build.transitions.append(Transition("open", margin, "the interface opens", modes, settles=True))
+    # What has inertia bears a tension for no time.
+    to_pass = "g_n" in build.motion.gap_rates
+    build.transitions.append(Transition("open", margin, "the interface opens", modes, settles=True, to_pass=to_pass))
 
 
 def _rebond(build: Build, again: dict[Expression, Expression]) -> None:

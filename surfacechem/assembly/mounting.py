@@ -74,10 +74,17 @@ def held(build: Build, axis: str) -> Held | None:
     if law is not None:
         if not (law.k or law.m or law.c_b or law.c_g or pulled(build, axis)):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
+        _refuse_restitution(law, axis)
         return Held(law, axis, law.path)
     if pulled(build, axis):
         return Held(Mounting(), axis, f"loading.F_{axis}" if f"F_{axis}" in scene.loading else "programme")
     return None
+
+
+def _refuse_restitution(law: Mounting, axis: str) -> None:
+    if axis != "n" and law.e:
+        message = f"bodies rebound along the normal: give the coefficient of restitution e there, not {KEYS[axis]}."
+        raise InputError(message, law.place)
 
 
 def held_across(build: Build, along: Held) -> Held | None:
@@ -86,6 +93,7 @@ def held_across(build: Build, along: Held) -> Held | None:
     if law is not None:
         if law.m:
             raise InputError("a mass is the same in every direction. Give `m` under `tangential`.", law.place)
+        _refuse_restitution(law, "t2")
         return Held(law, "t2", law.path, along)
     given = any(_driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
     if given or any(hasattr(friction, "transverse") for friction in build.interface.frictions):
@@ -124,6 +132,7 @@ class FarField:
     c_b: Expression
     c_g: Expression
     beta_1: Expression
+    e: Expression
     w: Expression
     w_dot: Expression
     F: Expression
@@ -219,7 +228,7 @@ def far_field(build: Build, mount: Held) -> FarField:
             _refuse_jumps(build, w)
         w_dot = build.slope_of(w) if needed and given else symengine.Integer(0)
         build.motion.far_fields[mount.axis] = FarField(
-            mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, drive, w_dot, force
+            mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
         )
     far: FarField = build.motion.far_fields[mount.axis]
     return far

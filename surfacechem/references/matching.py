@@ -41,6 +41,9 @@ PROBES = 7
 EDGE = 0.01
 """Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
+BRIEF = 1e-7
+"""Part of the time so far below which a stretch is too short for differences in time."""
+
 
 def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
@@ -152,8 +155,9 @@ def _probes(run: Trajectory) -> tuple[Array, Array]:
     edges = edges[edges <= run.result.times[-1]]
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
-    spread = np.linspace(0, len(edges) - 2, PROBES).astype(int)
-    chosen = np.union1d(spread, np.arange(min(PROBES, len(edges) - 1)))
+    long = np.flatnonzero(np.diff(edges) > BRIEF * edges[1:])
+    spread = np.linspace(0, len(long) - 1, PROBES).astype(int)
+    chosen = long[np.union1d(spread, np.arange(min(PROBES, len(long))))]
     parts = np.linspace(EDGE, 1 - EDGE, max(2, PROBES // len(chosen)))
     starts, lengths = edges[chosen], np.diff(edges)[chosen]
     since = np.multiply.outer(lengths, parts)

@@ -1,0 +1,94 @@
+"""A body that bounces on a rigid one under a dead load, and comes to rest after infinitely many rebounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.references._energy import QuadraticEnergy
+from surfacechem.references.base import Array, Reference
+from surfacechem.terms import parameter
+
+
+class BouncingBody(Reference):
+    r"""A mass falls under a constant load and rebounds with a part e of its velocity; what it loses is heat.
+
+    .. math:: a=-F/m,\quad V=\sqrt{v_i^2+2ag_i},\quad t_1=\frac{v_i+V}a,\quad t_{n+1}-t_n=\frac{2Ve^n}a,\quad
+        t_\infty=t_1+\frac{2V}a\,\frac e{1-e},\quad T_n^2=T_i^2+\frac{T_0}Cm V^2\,(1-e^{2n})
+
+    Quadratic energies, perfect thermal contact. Any t >= 0: from `rest_time` on the gap and its velocity are zero.
+
+    Source: free fall and Newton's law of impact, summed.
+
+    >>> plate = BouncingBody(m=5.0, e=0.5, F_n=-50.0, g_n_i=0.2, v_n_i=0.0, C=100.0, T_0=300.0, T_i=300.0)
+    >>> plate.first, plate.rest_time, float(plate.solution(0.3)["g_n"])
+    (0.2, 0.6000000000000001, 0.05)
+    """
+
+    name: ClassVar[str] = "bouncing-body"
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    e: float = parameter("1", "coefficient of restitution", default=0.0, at_least=0, at_most=1)
+    F_n: float = parameter("Pa", "load, negative where it presses", at_most=0)
+    g_n_i: float = parameter("m", "initial gap", at_least=0)
+    v_n_i: float = parameter("m/s", "initial opening velocity")
+    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
+    T_0: float = parameter("K", "reference temperature", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+
+    @property
+    def _fall(self) -> float:
+        return -self.F_n / self.m
+
+    @property
+    def _speed(self) -> float:
+        return math.sqrt(self.v_n_i**2 + 2 * self._fall * self.g_n_i)
+
+    @property
+    def first(self) -> float:
+        """Time [s] of the first impact."""
+        if not self._fall:
+            return -self.g_n_i / self.v_n_i if self.v_n_i < 0 else math.inf
+        return (self.v_n_i + self._speed) / self._fall
+
+    @property
+    def rest_time(self) -> float:
+        """Time [s] from which on it rests."""
+        if self.e == 1 or not self._fall:
+            return self.first if self.e == 0 else math.inf
+        return self.first + 2 * self._speed / self._fall * self.e / (1 - self.e)
+
+    def _rebounds(self, t: Array) -> Array:
+        """How often it has hit by the times, before it rests."""
+        if not self._fall or self.e == 0:
+            return np.where(t < self.first, 0.0, 1.0)
+        flights = np.maximum((t - self.first) * self._fall / (2 * self._speed), 0.0)
+        left = 1 - flights * (1 - self.e) / self.e
+        count = flights if self.e == 1 else np.log(np.maximum(left, np.finfo(float).tiny)) / math.log(self.e)
+        whole = np.floor(count)
+        # The logarithm rounds: it may be in the flight before, or beyond.
+        whole += np.where(flights >= self._sum(whole + 1), 1.0, 0.0) - np.where(flights < self._sum(whole), 1.0, 0.0)
+        return np.where(t < self.first, 0.0, whole + 1)
+
+    def _sum(self, n: Array) -> Array:
+        """Flights after the first impact up to a number, in times of one with the speed of the first impact."""
+        return n if self.e == 1 else self.e * (1 - self.e**n) / (1 - self.e)
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        n = self._rebounds(t)
+        started = self.first + 2 * self._speed / self._fall * self._sum(n - 1) if self._fall else self.first
+        tau = np.where(n > 0, t - started, t)
+        v = np.where(n > 0, self._speed * self.e**n, self.v_n_i)
+        g = np.where(n > 0, 0.0, self.g_n_i) + v * tau - self._fall * tau**2 / 2
+        rests = t >= self.rest_time
+        lost = np.where(rests, 1.0, 1 - self.e ** (2 * n))
+        heat = self.m * self._speed**2 / 2 * lost
+        return {
+            "g_n": np.where(rests, 0.0, g),
+            "v_n": np.where(rests, 0.0, v - self._fall * tau),
+            "released": heat,
+            "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
+        }
