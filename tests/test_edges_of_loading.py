@@ -111,3 +111,13 @@ def test_a_spring_on_nothing_is_told_what_to_hold(solved, axis, way, text):
     mount += "loading: {p: 1 MPa}\n" if axis == "t" else ""
     with pytest.raises(InputError, match=f"Prescribe `w_{axis}` under `loading`"):
         solved(text + mount + END)
+
+
+def test_a_gap_that_a_law_excludes_at_the_start_is_to_be_given(solved):
+    law = "  potential: [van-der-waals-flat-flat: {A_H: 1e-19}, lennard-jones-flat-flat: {n_1: 2e19, n_2: 3e19, "
+    law += "psi_0: 4e-21, g_0: 0.3 nm}]\n"
+    mount = "mechanics: {normal: {k: 1e18}}\nloading: {w_n: {ramp: {start: 3 nm, rate: -0.1 nm/s}}}\n"
+    with pytest.raises(InputError, match="Give `g_n` under `initial`"):
+        solved(CASE + law + mount + END)
+    given = END.replace("{T: 300 K}", "{T: 300 K, g_n: 3 nm}")
+    assert solved(CASE + law + mount + given).status == "finished"

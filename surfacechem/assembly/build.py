@@ -26,6 +26,8 @@ BOTH = "interface", "each body"
 
 NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
+STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
+"""What to do where a variable that finds its own value has none at the start."""
 DIGITS = 1e-12
 """Part of its terms by which rounding may carry a sum below zero."""
 
@@ -201,7 +203,9 @@ class Build(Draft):
         for name in law.positive:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} > 0", value, reason, domain=True))
+            sought = name in self.motion.gap_rates and name not in self.scene.initial
+            remedy = STARTS.get(name, "") if sought else ""
+            self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
