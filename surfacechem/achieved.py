@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
 from surfacechem.audit import audit
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.event_table import event_times
+from surfacechem.event_table import SIDE, event_times
 from surfacechem.integrate import Trajectory
 from surfacechem.profiles import profile_values
 from surfacechem.scene import Scene
@@ -103,14 +103,22 @@ def second_run(rtol: float) -> str:
 
 def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:
     """Largest differences of two runs in each state and in the times of events, and in which events they differ."""
-    shared = min(len(first.result.times), len(second.result.times))
-    ours, theirs = states(first), states(second)
-    errors = {name: relative_error(ours[name][:shared], theirs[name][:shared], FLOOR) for name in ours}
     found, expected = event_times(first), event_times(second)
     note = difference(found, expected)
+    times = first.result.times[: len(second.result.times)]
+    shared = np.flatnonzero(np.full(len(times), True) if note else _beside_jumps(times, first, second))
+    ours, theirs = states(first), states(second)
+    errors = {name: relative_error(ours[name][shared], theirs[name][shared], FLOOR) for name in ours}
     if found and not note:
         errors[EVENTS] = event_error(found, expected, first.run.times[-1])
     return errors, note
+
+
+def _beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
+    """At which times two runs with the same events have made the same jumps; those of the events are compared apart."""
+    ways = np.array([[one.t, other.t] for one, other in zip(first.jumps, second.jumps, strict=False)]).reshape(-1, 2)
+    early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
+    return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
 
 
 def with_cells(estimate: Accuracy, cells: Mapping[str, float]) -> Accuracy:

@@ -26,6 +26,9 @@ EPSILON = float(np.finfo(float).eps)
 ROUNDINGS = 10
 """Number of last digits that add up in a balance, beside one a step."""
 
+UNRESOLVED = 1e-2
+"""An exchange of which rounding may be this part, or more, is not resolved."""
+
 SLACK = 10.0
 """Dissipation below zero by less than this many tolerances of the law's largest is error of the integration."""
 
@@ -46,8 +49,14 @@ class Audit:
     """Largest entropy that was exchanged or produced [J/(m^2 K)]."""
     rtol: float
     """Relative tolerance of the run."""
+    energy_stored: float
+    """Largest energy whose last digits the total energy cannot resolve [J/m^2]."""
+    entropy_stored: float
+    """Largest entropy whose last digits the total entropy cannot resolve [J/(m^2 K)]."""
     energy_rounding: float
     """Energy that the last digits of the states stand for over all steps [J/m^2]."""
+    entropy_rounding: float
+    """Entropy that the last digits of the states stand for over all steps [J/(m^2 K)]."""
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
     largest: Mapping[str, float]
@@ -57,13 +66,13 @@ class Audit:
 
     @property
     def energy_error(self) -> float:
-        """Largest energy residual relative to the energy exchanged."""
-        return _relative(self.energy, self.energy_scale)
+        """Largest energy residual relative to the energy exchanged; to that stored where it is its rounding."""
+        return _resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding)
 
     @property
     def entropy_error(self) -> float:
-        """Largest entropy residual relative to the entropy exchanged or produced."""
-        return _relative(self.entropy, self.entropy_scale)
+        """Largest entropy residual relative to that exchanged or produced; to that stored where it is its rounding."""
+        return _resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding)
 
     @property
     def site_error(self) -> float:
@@ -99,6 +108,12 @@ def _relative(residual: Array, scale: float) -> float:
     return worst / scale if scale > 0 else worst
 
 
+def _resolved(residual: Array, scale: float, stored: float, rounding: float) -> float:
+    """Relative residual; where what was exchanged is lost in the last digits of what is stored, relative to this."""
+    unresolved = float(np.max(np.abs(residual), initial=0.0)) <= rounding and UNRESOLVED * scale <= rounding
+    return _relative(residual, max(scale, stored) if unresolved else scale)
+
+
 def audit(trajectory: Trajectory) -> Audit:
     """Audit of a trajectory."""
     return _Books(trajectory).audit()
@@ -131,8 +146,17 @@ class _Books:
 
     def rounding(self) -> float:
         """Rounding of the total energy at each step, added up, and that of the time in which work was done."""
-        once = max(self.trajectory.roundings["E_total"], EPSILON * _largest([self.column("E_total")]))
-        return once * self.roundings + self._untimed()
+        return EPSILON * self.energy_stored * self.roundings + self._untimed()
+
+    @cached_property
+    def energy_stored(self) -> float:
+        """Largest energy in the total, or behind the rounding of its terms [J/m^2]."""
+        return max(self.trajectory.roundings["E_total"] / EPSILON, _largest([self.column("E_total")]))
+
+    @cached_property
+    def entropy_stored(self) -> float:
+        """Largest entropy in the total, or behind the rounding of its terms [J/(m^2 K)]."""
+        return max(self.trajectory.roundings["S_total"] / EPSILON, self.turned, _largest([self.column("S_total")]))
 
     def _untimed(self) -> float:
         """Energy within the last digits of time: of a history that is steep in it no more is known."""
@@ -157,8 +181,7 @@ class _Books:
     @cached_property
     def entropy_rounding(self) -> float:
         """Rounding of the total entropy at each step, added up [J/(m^2 K)]."""
-        once = EPSILON * max(self.turned, _largest([self.column("S_total")]))
-        return max(self.trajectory.roundings["S_total"], once) * self.roundings
+        return EPSILON * self.entropy_stored * self.roundings
 
     def changes(self, prefix: str) -> Array:
         """Changes of the named totals since the start, shape (times, totals)."""
@@ -181,7 +204,10 @@ class _Books:
             energy_scale=_largest(exchanged),
             entropy_scale=self.turned,
             rtol=self.trajectory.run.rtol,
+            energy_stored=self.energy_stored,
+            entropy_stored=self.entropy_stored,
             energy_rounding=self.rounding(),
+            entropy_rounding=self.entropy_rounding,
             least=low,
             largest=high,
             destroyed=destroyed,

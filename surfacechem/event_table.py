@@ -14,6 +14,9 @@ from surfacechem.jumps import ADMISSIBLE, Jump
 
 Array = NDArray[np.float64]
 
+SIDE = 1e-13
+"""Relative distance from a jump at which a time is that of the jump."""
+
 ROUNDING = 1e-12
 """Heat of a jump that counts as none, relative to the energy that was exchanged."""
 

@@ -14,7 +14,7 @@ from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model
 from surfacechem.references._start import Start
-from surfacechem.references.matching import exact_values, match, renamed
+from surfacechem.references.matching import beside_events, exact_values, match, renamed
 from surfacechem.spectrum import Statistics
 from surfacechem.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
 from surfacechem.sweep_runs import prepared
@@ -73,7 +73,7 @@ def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> floa
     """Largest error of states and named quantities."""
     run, reached = done[i], done.reached[i]
     states = {state.name for state in done.model.system.states}
-    exact = renamed(reference.solution(run.result.times), run)
+    exact = beside_events(lambda t: renamed(reference.solution(t), run), run)
     ours = {name: done.named[name][i][reached] for name in exact}
     return max(relative_error(ours[name], exact[name], FLOOR if name in states else 1.0) for name in exact)
 

@@ -22,6 +22,8 @@ REMEDIES = {
     "g_t": "Prescribe `g_t` under `loading`, or mount the bodies: `mechanics: {tangential: {k: ...}}`.",
     "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
     "v_2": "Prescribe `v` and `v_2` under `loading`, or let `mechanics` give both.",
+    "w_n": "Prescribe `w_n` under `loading` or move it in the programme: 0 m where the far field does not move.",
+    "w_t": "Prescribe `w_t` under `loading` or move it in the programme: 0 m where the far field does not move.",
     "w_t2": "Prescribe `w_t2` under `loading`, beside `w_t`: 0 m where the far field does not move across.",
     "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "direction_2": "Prescribe `v` and `v_2` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",

@@ -86,3 +86,41 @@ def test_the_end_of_a_stopped_run_is_an_event():
 def test_differences_between_events_in_words():
     assert difference({"slip": np.array([0.1])}, {"slip": np.array([0.2])}) == ""
     assert difference({}, {"slip": np.array([0.2])}) == "other events: 1 slip instead of 0"
+
+
+@pytest.mark.parametrize("strength", [20, 55, 90])
+def test_an_output_at_the_time_of_a_jump_is_compared_on_the_side_on_which_it_lies(strength):
+    """The strength is reached at a whole multiple of the spacing of the outputs, but for the last digits."""
+    change = [f"interface.limits.tensile-strength.t_max={strength} MPa"]
+    run = surfacechem.load("debonding", change).run()
+    assert run.accuracy.source == "exact solution pulled-to-debonding"
+    assert run.accuracy.error < 1e-12
+    np.testing.assert_allclose(run.dataset.phi, run.dataset.phi_exact, atol=1e-15)
+
+
+def test_an_output_at_the_time_of_a_jump_is_no_error_of_the_states(tmp_path):
+    """Strength falls as heat comes in: the time of debonding is known to the tolerance alone."""
+    C, k, t_0, w, heat = 2000.0, 1e13, 20e6, 3.8e-6, 1e4
+    hottest = 300.0 * t_0 / (w * k / 2)
+    time = (hottest**2 - 300.0**2) * C / 600.0 / heat
+    case = tmp_path / "hot.yaml"
+    case.write_text(
+        f"""
+T_0: 300 K
+bodies:
+  a: {{temperature: T, C: 1 kJ/m^2/K}}
+  b: {{temperature: T, C: 1 kJ/m^2/K}}
+interface:
+  temperature: T
+  sites: 1e18
+  potential: [bonded-contact: {{E_n: 1e13}}, bond-energy: {{K_0: 1}}]
+  limits: [tensile-strength: {{t_max: {{value: 20 MPa, times: [power: {{exponent: -1}}]}}}}]
+mechanics: {{normal: {{k: 1e13}}}}
+loading: {{w_n: 3.8 um, Q_1: 10 kW/m^2}}
+initial: {{T: 300 K, phi: 1}}
+run: {{times: [0, 1, {time!r}, 5], rtol: 1e-6}}
+"""
+    )
+    run = surfacechem.load(case).run()
+    assert run.trajectory.jumps[0].t == pytest.approx(time, rel=1e-7)
+    assert run.accuracy.error < 1e-7

@@ -219,6 +219,25 @@ def test_paths_of_a_sweep_are_those_of_the_case(case, path, value, written):
         assert changed == simulation.model.values(simulation._values({path: value}))
 
 
+@pytest.mark.parametrize(
+    ("case", "path"),
+    [
+        ("stick-slip", "mechanics.tangential.m"),
+        ("slow-passage", "mechanics.normal.c_g"),
+        ("cohesive-pull-off", "mechanics.normal.k"),
+    ],
+)
+def test_what_makes_a_gap_move_as_it_does_cannot_vanish(case, path):
+    with pytest.raises(InputError, match=f"{path} = 0 is outside its range: > 0"):
+        surfacechem.sweep(case, {path: [1.0, 0.0]})
+
+
+def test_an_output_at_a_jump_is_compared_on_its_side():
+    """The first two debond at a multiple of the spacing of the outputs."""
+    path = "interface.limits.tensile-strength.t_max"
+    assert surfacechem.sweep("debonding", {path: ["20 MPa", "55 MPa", "80.01 MPa"]}).dataset.error.max() < 1e-12
+
+
 def test_fitted_media_are_swept_run_by_run():
     case = surfacechem.load("closing-gas-gap")
     data = case.sweep({"initial.T_2": [500.0, 600.0]}).dataset

@@ -21,7 +21,7 @@ from surfacechem.assembly.load_steps import load_steps
 from surfacechem.assembly.logarithms import logarithmic_state
 from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
-from surfacechem.assembly.programme import programme, stage_ends
+from surfacechem.assembly.programme import TRACTIONS, programme, stage_ends
 from surfacechem.assembly.relaxing import relaxing
 from surfacechem.assembly.softening import softening_mode
 from surfacechem.assembly.tangential import tangential_gap, tangential_motion
@@ -34,7 +34,7 @@ from surfacechem.scene import Scene
 from surfacechem.system import START, Outside, Role, System
 from surfacechem.terms import Spec
 
-__all__ = ["LOADABLE", "assemble"]
+__all__ = ["LOADABLE", "TRACTIONS", "assemble"]
 
 STAGES = (
     temperatures,

@@ -12,7 +12,7 @@ from surfacechem import grids
 from surfacechem.assembly.draft import Draft
 from surfacechem.balances import Node
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, derivative
+from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Margin, Named, Range
 from surfacechem.terms import Friction, Law, Load, Spec
@@ -26,6 +26,10 @@ BOTH = "interface", "each body"
 
 NOTHING = 1e-9
 """Amount, in SI units, by which rounding may carry a variable below zero."""
+STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
+"""What to do where a variable that finds its own value has none at the start."""
+DIGITS = 1e-12
+"""Part of its terms by which rounding may carry a sum below zero."""
 
 
 class Build(Draft):
@@ -203,11 +207,13 @@ class Build(Draft):
         for name in law.positive:
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} reached zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} > 0", value, reason, domain=True))
+            sought = name in self.motion.gap_rates and name not in self.scene.initial
+            remedy = STARTS.get(name, "") if sought else ""
+            self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             reason = f"{name} fell below zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} >= 0", value + NOTHING, reason))
+            self.margins.append(Margin(f"{name} >= 0", value + NOTHING + self._rounding(value), reason))
         for name, bend in law.kinks.items():
             value = own[name] if name in own else self.variables.get(name, law)
             self.margins.append(Margin(name, value - bend, f"{law.name()} bends at this {name}", False))
@@ -257,6 +263,11 @@ class Build(Draft):
             spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
             self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
         return self.variables.get(path, "the interface")
+
+    def _rounding(self, value: Expression) -> Expression:
+        """By how much the last digits of its terms change a sum."""
+        whole = self.expanded(value)
+        return DIGITS * sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
 
     def expanded(self, expression: Expression) -> Expression:
         """The expression without names of quantities."""

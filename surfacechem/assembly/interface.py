@@ -10,6 +10,7 @@ import symengine
 from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.draft import Bond
 from surfacechem.assembly.logarithms import initial_bonding
+from surfacechem.assembly.mounting import held
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
 from surfacechem.quantities import VARIABLES, Quantity
@@ -177,11 +178,20 @@ def _sides_of_touch(build: Build) -> None:
         build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
         return
     build.psi = psi
-    build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, where(g < 0, -1.0, 1.0))
+    rests = _rests(build)
+    start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
+    build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
         margin = where(value * side > 0, where(build.t < build.held_until, 1, value * g), 1)
         other = {side: symengine.Integer(-value)}
-        build.transitions.append(Transition(name, margin, reason, other, settles=True, measure="g_n"))
+        bears = rests and name == "release"
+        build.transitions.append(Transition(name, margin, reason, other, settles=True, to_pass=bears, measure="g_n"))
+
+
+def _rests(build: Build) -> bool:
+    """Whether bodies at no gap are in contact, loaded or not: under a dead load nothing else holds them there."""
+    mount = held(build, "n")
+    return mount is not None and mount.quasi_static and not mount.law.k
 
 
 def _known(build: Build) -> set[Any]:

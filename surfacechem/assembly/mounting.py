@@ -237,12 +237,25 @@ def far_field(build: Build, mount: Held) -> FarField:
 def _bound(build: Build, mount: Held) -> Mounting | FarField:
     """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
     if mount.beside is None:
-        return build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+        law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+        _keep_above_zero(build, mount)
+        return law
     first = far_field(build, mount.beside)
     if mount.law is mount.beside.law:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
+
+
+def _keep_above_zero(build: Build, mount: Held) -> None:
+    """What makes a gap inertial, overdamped or quasi-static may change, but not vanish."""
+    dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
+    makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
+    path = f"mechanics.{KEYS[mount.axis]}.{makes}"
+    items = build.parameters.items
+    for i, item in enumerate(items):
+        if item.path == path and item.value > 0:
+            items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
 
 
 def _refuse_jumps(build: Build, w: str) -> None:

@@ -10,7 +10,7 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.interface import LOADABLE
-from surfacechem.assembly.mounting import LENGTH
+from surfacechem.assembly.mounting import ACROSS, ALONG, LENGTH
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.quantities import INTERNAL, VARIABLES
@@ -21,6 +21,8 @@ from surfacechem.transitions import Transition
 from surfacechem.units import quotient
 from surfacechem.variables import unit_of
 
+TRACTIONS = (ALONG.total, ACROSS.total)
+"""Tractions along the interface, which a stage may wait for though no law reads them."""
 SCALES = {"m": LENGTH, "m/s": LENGTH}
 
 
@@ -106,9 +108,11 @@ def _stage_end(build: Build, item: Stage, margin: Expression, advance: dict[Expr
 
 def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
     x = _variable(build, item)
-    spec = Spec(unit_of(item.variable), f"end of the stage {item.name}")
+    traction = item.variable in TRACTIONS
+    spec = Spec("Pa" if traction else unit_of(item.variable), f"end of the stage {item.name}")
     path = f"{_path(item)}.until.{item.variable}{'' if item.rising else '.falls-to'}"
-    value = build.parameters.add(item.variable, path, spec, item.value)
+    name = f"{item.variable}_end" if traction else item.variable
+    value = build.parameters.add(name, path, spec, item.value)
     sign = symengine.Integer(1 if item.rising else -1)
     _stage_end(build, item, where(_during(stage, i), sign * (value - x), 1), advance)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from surfacechem.assembly import LOADABLE
+from surfacechem.assembly import LOADABLE, TRACTIONS
 from surfacechem.case.fields import choice, items, mapping, number, shown, text
 from surfacechem.case.laws import build
 from surfacechem.document import Tree
@@ -94,7 +94,8 @@ def _until(stage: Stage, tree: Tree, units: Mapping[str, str]) -> Stage:
     if len(tree.value) != 1:
         raise tree.error("`until` waits for one variable, for example `until: {p: 10 kPa}`.")
     ((variable, child),) = tree.value.items()
-    unit = units.get(choice(replace(child, value=variable), "variable", units), "1")
+    known = {**units, **dict.fromkeys(TRACTIONS, "Pa")}
+    unit = known.get(choice(replace(child, value=variable), "variable", known), "1")
     if not isinstance(child.value, dict):
         return replace(stage, variable=variable, value=number(child, unit, variable))
     way = mapping(child, WAYS)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
+from surfacechem.event_table import SIDE
 from surfacechem.integrate import Trajectory
 from surfacechem.references._across import across
 from surfacechem.references._start import Start
@@ -50,11 +51,30 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
     start = Start(run, scene)
     reference = match(references.get(name), options, start)
     solution = partial(_solution, reference, start)
-    exact = solution(run.result.times)
+    exact = beside_events(solution, run)
     if reference.continuous:
         return across(reference, exact, scene, run)
     _check_start(exact, run)
     _check(solution, run)
+    return exact
+
+
+def beside_events(solution: Solution, run: Trajectory) -> dict[str, Array]:
+    """Exact values at the output times; where one of them is that of a jump, on the side on which the run has it."""
+    times, jumps = run.result.times, np.array([jump.t for jump in run.jumps])
+    exact = solution(times)
+    if not len(jumps):
+        return exact
+    near = np.flatnonzero(np.abs(times[:, None] - jumps).min(axis=1) <= SIDE * times)
+    names = [*(state.name for state in run.model.system.states), *(item.name for item in run.model.system.outputs)]
+    ours = np.concatenate([run.result.outputs[near], run.outputs[near]], axis=1)
+    for way in (-SIDE, SIDE):
+        other = solution(times[near] * (1 + 2 * way))
+        for name, values in exact.items():
+            own = ours[:, names.index(name)]
+            nearer = np.abs(other[name] - own) < np.abs(values[near] - own)
+            exact[name] = np.array(values)
+            exact[name][near] = np.where(nearer, other[name], values[near])
     return exact
 
 
