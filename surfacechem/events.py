@@ -175,7 +175,7 @@ class Hybrid:
             max_seconds=seconds,
             exchanged=self.exchanged,
             goes_on=end < problem.segments[-1],
-            seen=self.rebounds.seen(start.t, sizes(problem, self.system.states, start, self.largest)),
+            seen=self.rebounds.seen(start.t, sizes(problem, self.system, start, self.largest)),
         )
         return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
@@ -302,7 +302,7 @@ class Hybrid:
 
     def _due(self, now: Array, point: Point) -> int | None:
         """The transition whose margin is closed, or is zero and closing; the drift of the integration is not closed."""
-        small = NOISE * sizes(self.problem, self.system.states, point, self.largest)[self.first :]
+        small = NOISE * sizes(self.problem, self.system, point, self.largest)[self.first :]
         drift = np.maximum(DRIFT * self.problem.rtol * self.largest[self.first :], small)
         closed = now < -drift
         near = ~closed & (now <= small) & ~to_pass(self.problem)[self.first :]

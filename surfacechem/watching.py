@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,13 +9,13 @@ from surfacechem.compile import Function
 from surfacechem.equilibria import Point
 from surfacechem.solvers.contract import Margin, Problem
 from surfacechem.system import Margin as Watched
-from surfacechem.system import State
+from surfacechem.system import System
 from surfacechem.transitions import Transition
 
 Array = NDArray[np.float64]
 
 NUDGE = 1e-6
-"""Part by which states are changed to see what margins are made of."""
+"""Part by which states and loads are changed to see what margins are made of."""
 
 
 def watched(margin: Watched) -> Margin:
@@ -37,19 +35,26 @@ def to_pass(problem: Problem) -> NDArray[np.bool_]:
     return np.array([kind.to_pass for kind in problem.margins], dtype=bool)
 
 
-def sizes(problem: Problem, states: Sequence[State], point: Point, seen: Array) -> Array:
+def sizes(problem: Problem, system: System, point: Point, seen: Array) -> Array:
     """Largest sizes of the margins seen; of one to pass also what cancels in it where it is zero."""
     margins = problem.program.margins
     if margins is None or not np.any(passed := to_pass(problem)):
         return seen
-    return np.where(passed, np.maximum(seen, _terms(margins, states, point)), seen)
+    return np.where(passed, np.maximum(seen, _terms(margins, system, point)), seen)
 
 
-def _terms(margins: Function, states: Sequence[State], point: Point) -> Array:
-    """Size of the terms of each margin, which rounding is in proportion to whatever is left, shape (margins,)."""
-    typical = np.maximum([state.finest or state.scale for state in states], np.abs(point.y))
-    rows = np.repeat(point.inputs()[None], 1 + len(states), axis=0)
-    rows[1:, 1 : 1 + len(states)] += NUDGE * np.diag(typical)
+def _terms(margins: Function, system: System, point: Point) -> Array:
+    """Size of the terms of each margin, which rounding is in proportion to whatever is left, shape (margins,).
+
+    Loads are made of such terms too, as the phase of an oscillation is.
+    """
+    n, inputs = len(system.states), point.inputs()
+    given = [1 + 2 * n + j for j, p in enumerate(system.parameters) if p.changeable or p.load is not None]
+    columns = np.array([*range(1, 1 + n), *given])
+    typical = np.abs(inputs[columns])
+    typical[:n] = np.maximum(typical[:n], [state.finest or state.scale for state in system.states])
+    rows = np.repeat(inputs[None], 1 + len(columns), axis=0)
+    rows[np.arange(1, len(rows)), columns] += NUDGE * typical
     values = margins(rows)
     with np.errstate(invalid="ignore"):  # a margin out of play may be infinite
         found = np.max(np.abs(values[1:] - values[0]), axis=0) / NUDGE
