@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.equilibria import BALANCED, DRIFT, Point
 from surfacechem.jumps import Jump, Jumper, booked
-from surfacechem.rebounds import Rebounds
+from surfacechem.rebounds import ENDLESS, MANY, Rebounds
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
@@ -114,6 +114,8 @@ class Hybrid:
             if ended is None:
                 break
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
+        if self.status is Status.MAX_STEPS and self.rebounds.count > MANY:
+            self.status, self.reason = Status.FAILED, ENDLESS
         return self._merged()
 
     def _begun(self, point: Point, before: Point | None) -> Point | None:

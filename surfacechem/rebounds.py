@@ -24,12 +24,21 @@ GAP = 1e-6
 """Size [m] that such a margin has at least where it does not rebound: what is opened slowly begins by rounding."""
 
 
+MANY = 1000
+"""Rebounds of a run from which on they are what its steps were used for."""
+
+ENDLESS = (
+    "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
+)
+
+
 class Rebounds:
     """The rebounds of a run; ``first`` is the index of the first transition among the margins."""
 
     def __init__(self, system: System, first: int) -> None:
         self.system = system
         self.margins = [first + j for j, item in enumerate(system.transitions) if item.returns is not None]
+        self.count = 0
         self.last = (0.0, 0.0)
         """Time of the last one, and how long it takes to return [s]; zero where that is open."""
 
@@ -41,6 +50,7 @@ class Rebounds:
     def see(self, jump: Jump) -> None:
         """Remember a jump where it is a rebound, or ends them."""
         if jump.transition.returns is not None:
+            self.count += 1
             self.last = jump.t, float(np.max(self._times(jump.after.inputs())))
 
     def pieces(self, start: float, end: float) -> Array:
