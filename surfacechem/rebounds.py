@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
 from surfacechem.jumps import Jump
+from surfacechem.solvers.contract import Result, Status
 from surfacechem.system import System
 
 Array = NDArray[np.float64]
@@ -30,6 +31,11 @@ MANY = 1000
 ENDLESS = (
     "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
 )
+
+UNSEEN = 1e-12
+"""Overlap [m] that tells of an impact which a method has passed: beyond rounding, and far below the size of an atom."""
+
+MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
 
 
 class Rebounds:
@@ -66,6 +72,12 @@ class Rebounds:
         own = sizes.copy()
         own[self.margins] = 0.0 if self._aloft(start) else np.maximum(sizes[self.margins], GAP)
         return own
+
+    def missed(self, result: Result) -> bool:
+        """Whether a stretch has ended beyond what it should have ended at."""
+        ended = result.events.index if result.status is Status.EVENT else ()
+        found = self.margins if len(result.margins) else []
+        return any(result.margins[j] < -UNSEEN and j not in ended for j in found)
 
     def _aloft(self, start: float) -> float:
         """Time [s] for which what has just rebounded stays away."""
