@@ -543,3 +543,19 @@ def test_pressure_begins_at_once_under_a_damper_that_stands_still():
     assert names(trajectory) == ["slip forward", "touch", "slip forward"]
     assert 1e3 * trajectory.jumps[-1].after.y[g_t] == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
     assert audit(trajectory).energy_error < 1e-10
+
+
+def test_a_method_that_passes_an_impact_fails(monkeypatch):
+    monkeypatch.setattr("surfacechem.solvers.stepping.crossings", lambda *_: {})
+    case = surfacechem.load("bouncing-plate")
+    trajectory = case.model.solve(replace(case.case.run, solver="lsoda"))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the method has not seen the gap close; radau does")
+
+
+def test_rebounds_that_use_up_the_steps_are_named():
+    """A damper makes those without loss slower and slower, and there is no end to them."""
+    given = scene(Mounting(m=M, c_g=2.0, e=1.0))
+    trajectory = Model(assemble(given)).solve(Run([0.0, 1e3], max_steps=5000))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the number of steps allowed was used up by rebounds")
