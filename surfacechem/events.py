@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.equilibria import BALANCED, DRIFT, Point
 from surfacechem.jumps import Jump, Jumper, booked
-from surfacechem.rebounds import Rebounds
+from surfacechem.rebounds import ENDLESS, MANY, MISSED, Rebounds
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
@@ -114,6 +114,8 @@ class Hybrid:
             if ended is None:
                 break
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
+        if self.status is Status.MAX_STEPS and self.rebounds.count > MANY:
+            self.status, self.reason = Status.FAILED, ENDLESS
         return self._merged()
 
     def _begun(self, point: Point, before: Point | None) -> Point | None:
@@ -134,6 +136,9 @@ class Hybrid:
                 return None
             part = self._stretch(started, end)
             if part is None:
+                return None
+            if self.rebounds.missed(part.result):
+                self.status, self.reason = Status.FAILED, MISSED
                 return None
             point = Point(part.end, part.result.y, part.result.ydot, started.parameters)
             if part.status is Status.FINISHED:

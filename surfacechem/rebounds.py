@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile import Function, compile_function
 from surfacechem.jumps import Jump
+from surfacechem.solvers.contract import Result, Status
 from surfacechem.system import System
 
 Array = NDArray[np.float64]
@@ -24,12 +25,26 @@ GAP = 1e-6
 """Size [m] that such a margin has at least where it does not rebound: what is opened slowly begins by rounding."""
 
 
+MANY = 1000
+"""Rebounds of a run from which on they are what its steps were used for."""
+
+ENDLESS = (
+    "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
+)
+
+UNSEEN = 1e-12
+"""Overlap [m] that tells of an impact which a method has passed: beyond rounding, and far below the size of an atom."""
+
+MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
+
+
 class Rebounds:
     """The rebounds of a run; ``first`` is the index of the first transition among the margins."""
 
     def __init__(self, system: System, first: int) -> None:
         self.system = system
         self.margins = [first + j for j, item in enumerate(system.transitions) if item.returns is not None]
+        self.count = 0
         self.last = (0.0, 0.0)
         """Time of the last one, and how long it takes to return [s]; zero where that is open."""
 
@@ -41,6 +56,7 @@ class Rebounds:
     def see(self, jump: Jump) -> None:
         """Remember a jump where it is a rebound, or ends them."""
         if jump.transition.returns is not None:
+            self.count += 1
             self.last = jump.t, float(np.max(self._times(jump.after.inputs())))
 
     def pieces(self, start: float, end: float) -> Array:
@@ -56,6 +72,12 @@ class Rebounds:
         own = sizes.copy()
         own[self.margins] = 0.0 if self._aloft(start) else np.maximum(sizes[self.margins], GAP)
         return own
+
+    def missed(self, result: Result) -> bool:
+        """Whether a stretch has ended beyond what it should have ended at."""
+        ended = result.events.index if result.status is Status.EVENT else ()
+        found = self.margins if len(result.margins) else []
+        return any(result.margins[j] < -UNSEEN and j not in ended for j in found)
 
     def _aloft(self, start: float) -> float:
         """Time [s] for which what has just rebounded stays away."""

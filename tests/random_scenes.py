@@ -54,6 +54,8 @@ class Composer:
         self.dice = Dice(seed)
         self.aside = Dice(seed)
         self.aside.random.seed(f"across {seed}")
+        self.falling = Dice(seed)
+        self.falling.random.seed(f"falling {seed}")
         self.potentials: list[Law] = []
         self.frictions: list[Law] = []
         self.reactions: list[Law] = []
@@ -108,7 +110,7 @@ class Composer:
         self._prescribed()
         programme = self._programme()
         self._start()
-        mounts |= self._across(mounts)
+        mounts |= self._across(mounts) | self._falling(mounts)
         sites, medium = self.mechanism.sites if self.mechanism else self.sites, self._medium()
         laws_of = {"limits": self.limits, "partition": dice.random.random(), "medium": medium}
         reading = (self.potentials, self.frictions, self.reactions)
@@ -289,6 +291,19 @@ class Composer:
         if mounts["tangential"].m and dice.chance(0.5):
             self.initial |= {v: dice.signed(dice.near(dice.length / dice.end)) for v in ("v", "v_2")}
         return {"transverse": replace(self._mounting(), m=0.0)} if dice.chance(0.2) else {}
+
+    def _falling(self, mounts: dict[str, Mounting]) -> dict[str, Mounting]:
+        """Now and then what is rigid falls with a mass, or sinks in a damper; by dice of its own."""
+        dice = self.falling
+        if self.gap != "rigid" or dice.chance(0.3) or any(law.internal for law in self.frictions):
+            return {}
+        k = mounts["normal"].k
+        m = dice.near(k * (dice.end / 20) ** 2, 1.5) if dice.chance(0.8) else 0.0
+        c = dice.near(k * dice.end / 10, 3) * dice.pick(0, 0, 1) if m else dice.near(k * dice.end / 10, 3)
+        self.initial |= {"g_n": dice.pick(0.0, dice.near(dice.length))}
+        self.initial |= {"v_n": dice.signed(dice.near(dice.length / dice.end))} if m and dice.chance(0.5) else {}
+        e = dice.pick(0.0, 0.3, 0.8, 0.95, 1.0) if m else 0.0
+        return {"normal": replace(mounts["normal"], m=m, c_g=c, c_b=c * dice.pick(0, 1), e=e)}
 
     def _prescribed(self) -> None:
         """What is read and has no role yet; heat and area stretch now and then."""

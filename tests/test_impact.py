@@ -524,3 +524,38 @@ def test_nothing_presses_what_leaves():
     exact = get("bouncing-body")(m=2.0, e=0.5, F_n=0.0, g_n_i=0.5, v_n_i=-1.0, C=1e3, T_0=300.0, T_i=300.0)
     assert exact.solution([0.25, 0.5, 1.5])["g_n"] == pytest.approx([0.25, 0.0, 0.5])
     assert (exact.first, exact.rest_time) == (0.5, math.inf)
+
+
+def test_pressure_begins_at_once_under_a_damper_that_stands_still():
+    """What slides on springs sticks then, up to what the pressure bears; the strength of friction may vary."""
+    strength = varying(10.0, Linear(of="T_c", slope=-1e-3, about=300.0))
+    interface = Interface("T", [TangentialStiffness(E_t=1e3)], frictions=[MohrCoulomb(mu=0.5, t_n_max=strength)])
+    given = scene(
+        Mounting(k=100.0, c_g=20.0), {"w_n": Hold(level=-0.1), "w_t": Ramp(rate=0.5)}, {"u_t": 0.0},
+        interface=interface, tangential=Mounting(k=200.0),
+    )  # fmt: skip
+    trajectory = solve(given, 2.0)
+    touch = made(trajectory, "touch")[0]
+    assert touch.t == pytest.approx(0.2 * math.log(3.0), rel=1e-9)
+    g_t = [s.name for s in trajectory.model.system.states].index("g_t")
+    assert 1e3 * touch.before.y[g_t] == pytest.approx(5.0, rel=1e-3)
+    assert touch.after.y[g_t] == touch.before.y[g_t]
+    assert names(trajectory) == ["slip forward", "touch", "slip forward"]
+    assert 1e3 * trajectory.jumps[-1].after.y[g_t] == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
+    assert audit(trajectory).energy_error < 1e-10
+
+
+def test_a_method_that_passes_an_impact_fails(monkeypatch):
+    monkeypatch.setattr("surfacechem.solvers.stepping.crossings", lambda *_: {})
+    case = surfacechem.load("bouncing-plate")
+    trajectory = case.model.solve(replace(case.case.run, solver="lsoda"))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the method has not seen the gap close; radau does")
+
+
+def test_rebounds_that_use_up_the_steps_are_named():
+    """A damper makes those without loss slower and slower, and there is no end to them."""
+    given = scene(Mounting(m=M, c_g=2.0, e=1.0))
+    trajectory = Model(assemble(given)).solve(Run([0.0, 1e3], max_steps=5000))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the number of steps allowed was used up by rebounds")

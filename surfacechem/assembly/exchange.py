@@ -27,7 +27,7 @@ def friction(build: Build) -> None:
         memory(build, law, bound)
         pressed = _pressed(build, law)
         resisted = resistance(build, law, bound, pressed)
-        build.law_margins(law, {}, met=pressed)
+        build.law_margins(bound, {}, met=pressed)
         power = symengine.Integer(0)
         for d, traction in resisted.items():
             across = " across v" if d is ACROSS else ""

@@ -17,10 +17,6 @@ from surfacechem.system import Margin, State
 from surfacechem.terms import Spec
 from surfacechem.transitions import Equilibrium
 
-UNSEEN = 1e-9
-"""Overlap [m] far beyond what is left where an impact is found."""
-
-MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
 SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
 OVERLAP = "the bodies overlap, and their contact is rigid"
 
@@ -112,10 +108,7 @@ def _unilateral(build: Build, mount: Held) -> None:
         build.motion.gap_rates["g_n"] = (1 - closed) * v
     initial = build.scene.initial.get("g_n", 0.0)
     first = build.constant("g_n_i", "initial.g_n", Spec("m", "initial gap"), initial, internal=False)
-    build.margins += [
-        Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT),
-        Margin("touch", where(closed > 0, 1, g + UNSEEN), MISSED),
-    ]
+    build.margins.append(Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT))
     _carry(build, closed * pull)
 
 

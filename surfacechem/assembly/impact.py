@@ -48,7 +48,9 @@ def impacts(build: Build) -> None:
     assert mount is not None
     margin, shut = where(closed > 0, 1, G), {G: NONE}
     if not mount.inertial:
-        build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals, shut))
+        # Where a pull begins, the gap may seem to close again by rounding.
+        margin = where(build.t < build.held_until, 1, margin)
+        build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals, shut, settles=True))
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
