@@ -121,3 +121,17 @@ def test_a_gap_that_a_law_excludes_at_the_start_is_to_be_given(solved):
         solved(CASE + law + mount + END)
     given = END.replace("{T: 300 K}", "{T: 300 K, g_n: 3 nm}")
     assert solved(CASE + law + mount + given).status == "finished"
+
+
+def test_friction_under_a_prescribed_gap_heats_while_it_is_closed(solved):
+    """Three cycles of a gap that is closed for half of each, by quadratic energies."""
+    gap = "loading: {v: 1 mm/s, g_n: {harmonic: {amplitude: 1 um, frequency: 1.5 Hz, phase: 0.5 rad}}}\n"
+    solution = solved(PENALTY + "  friction: [coulomb: {mu: 0.5}]\n" + gap + END)
+    heat = 0.5 * 1e6 * 1e-3 * 2 / (3 * np.pi) * 3
+    assert float(solution.dataset["T"][-1]) == pytest.approx(np.sqrt(300.0**2 + heat * 600.0 / 2000.0), rel=1e-13)
+    assert solution.audit.energy_error < 1e-9
+
+
+def test_a_hundred_touches_of_a_prescribed_gap_keep_the_energy(solved):
+    gap = "loading: {g_n: {harmonic: {amplitude: 1 um, frequency: 50 Hz}}}\n"
+    assert solved(PENALTY + gap + END).audit.energy_error < 1e-9
