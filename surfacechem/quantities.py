@@ -57,6 +57,7 @@ VARIABLES = _table(
     ("drive", "1", "friction traction in units of its direct effect, a p", r"t_t / a p"),
     ("v_2", "m/s", "sliding velocity across v, along the interface", "v_2"),
     ("speed", "m/s", "speed of sliding: magnitude of the velocity (v, v_2)", r"|v|"),
+    ("l_t", "m", "length of the path of sliding", r"\ell"),
     ("turn", "rad", "angle by which sliding has turned since it began", r"\alpha"),
     ("theta", "s", "age of the contact", r"\theta"),
     ("ln_theta", "1", "logarithm of the age of the contact in seconds", r"\ln\theta"),

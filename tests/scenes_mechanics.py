@@ -256,6 +256,26 @@ def plane_damped_slider() -> Scene:
     return _slider(Mounting(k=1e12, c_b=1e7, c_g=1e6), [Coulomb(mu=0.4, mu_s=0.6)], loading=PULL | ACROSS)
 
 
+def plane_uneven_slider() -> Scene:
+    """Friction and dampers that differ from direction to direction, without a mass."""
+    friction = AnisotropicCoulomb(mu_1=varying(0.2, Power(exponent=-1.0)), mu_2=0.5)
+    mounts = {"mounting": Mounting(k=1e10, c_b=1e7, c_g=1e6), "transverse": Mounting(k=3e10, c_b=4e6)}
+    return _slider(frictions=[friction], loading={"p": Ramp(start=1e5, rate=1e4)} | PULL | ACROSS, **mounts)
+
+
+def plane_quasi_static_slider() -> Scene:
+    """Springs alone; temperature and pressure set the traction, which differs from direction to direction."""
+    friction = AnisotropicCoulomb(mu_1=varying(0.2, LinearInTemperature(slope=-1e-3)), mu_2=0.5)
+    loading = {"p": Ramp(start=1e5, rate=1e4)} | PULL | ACROSS
+    return _slider(Mounting(k=1e10), [friction], loading=loading, transverse=Mounting(k=3e10))
+
+
+def plane_jumping_slider() -> Scene:
+    """Springs alone on friction that is the same in all directions, with a static limit of its own."""
+    friction = MohrCoulomb(mu=varying(0.4, LinearInTemperature(slope=-1e-3)), c=2e4, mu_s=0.6)
+    return _slider(Mounting(k=1e10), [friction], loading=PULL | ACROSS)
+
+
 def plane_bonding_slider() -> Scene:
     """A mass that breaks bonds as it slides in the plane."""
     return _slider(
@@ -389,6 +409,9 @@ ALL = [
     Moving(bonding_slider, SLIDING),
     Moving(plane_slider, SLIDING[:2]),
     Moving(plane_damped_slider, SLIDING[:2]),
+    Moving(plane_uneven_slider, SLIDING[:2]),
+    Moving(plane_quasi_static_slider, SLIDING[:2]),
+    Moving(plane_jumping_slider, SLIDING[:2]),
     Moving(plane_bonding_slider, SLIDING[:2]),
     Moving(plane_film),
     Moving(elastic_inertial_slider, SLIDING),

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plane import SPRING, circling, close, events, moments, run, scene
 from scenes import varying
 from scipy.integrate import solve_ivp
 from tables_mechanics import Solved, solve
@@ -13,49 +14,13 @@ from surfacechem.assembly import assemble
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model
 from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
-from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck, Viscous
-from surfacechem.laws.loading import Harmonic, Hold, Ramp
+from surfacechem.laws.loading import Harmonic, Ramp
 from surfacechem.laws.rate_and_state import RateAndStateAging
 from surfacechem.references import get
-from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
-from surfacechem.terms import Load
-
-BODIES = Body("lower", "T", Quadratic(C=50.0)), Body("upper", "T", Quadratic(C=50.0))
-FREE, SPRING = Mounting(m=5.0), Mounting(k=1e8, m=10.0)
-
-
-def scene(frictions, mount=FREE, initial=None, transverse=None, potentials=(), programme=(), **loading) -> Scene:
-    """A slider on one plate; numbers under ``loading`` are held."""
-    histories = {x: load if isinstance(load, Load) else Hold(level=float(load)) for x, load in loading.items()}
-    interface = Interface("T", potentials, frictions)
-    start = {"T": 300.0} | (initial or {})
-    mounts = {"tangential": mount, "transverse": transverse}
-    return Scene(BODIES, interface, (), histories, None, 300.0, start, programme=programme, **mounts)
-
-
-def run(scene: Scene, times, **changes) -> Solved:
-    solved = solve(Model(assemble(scene)), times, changes or None)
-    assert solved.status == "finished", solved.reason
-    assert solved.energy_error < 1e-9
-    return solved
-
-
-def events(solved: Solved) -> list[str]:
-    return [jump.transition.name for jump in solved.jumps]
-
-
-def moments(solved: Solved) -> list[float]:
-    """Times of the events, those that follow each other at once as one."""
-    times = [jump.t for jump in solved.jumps]
-    return [t for before, t in zip([-1.0, *times], times, strict=False) if t > before * (1 + 1e-7)]
-
-
-def close(found, exact, tolerance=1e-10):
-    assert np.max(np.abs(found - exact)) <= tolerance * np.max(np.abs(exact))
-
+from surfacechem.scene import Mounting, Stage
 
 # -- stops of a free mass -------------------------------------------------------------------------------------------
 
@@ -196,14 +161,6 @@ def cartesian(mu, m, k, c, far, p=1e5):
         return np.concatenate([v, force / m])
 
     return rates
-
-
-def circling(t):
-    a = 2 * math.pi
-    return (
-        np.array([2e-3 * math.sin(a * t), 1.5e-3 * math.sin(a * t + 1.0)]),
-        np.array([2e-3 * a * math.cos(a * t), 1.5e-3 * a * math.cos(a * t + 1.0)]),
-    )
 
 
 @pytest.mark.parametrize(
@@ -367,10 +324,18 @@ def test_isotropic_friction_opposes_a_prescribed_velocity():
 
 
 REFUSED = [
-    (scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)], Mounting(k=1e6), p=1, w_t=0, w_t2=0), "needs a mass or a damper"),
+    (scene([Coulomb(mu=0.3)], None, p=1, F_t=1, F_t2=1), "needs a stiffness along both"),
     (
-        scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)], Mounting(k=1e6, c_b=1.0), p=1, w_t=0, w_t2=0),
-        "without a mass the direction of sliding by dry friction is that of the pull, unless",
+        scene([Coulomb(mu=0.3)], Mounting(k=1e6, c_b=1.0), None, Mounting(k=1e6), p=1, w_t=0, w_t2=0),
+        "something resists sliding along one direction in proportion to its rate, and nothing does along the other",
+    ),
+    (
+        scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6), Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), p=1, w_t=0, w_t2=0),
+        "with a static limit of its own friction lets the springs jump",
+    ),
+    (
+        scene([Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), None, Mounting(k=2e6), p=1, w_t=0, w_t2=0),
+        "differ from direction to direction nothing says which way",
     ),
     (scene([Coulomb(mu=0.3)], SPRING, p=1, w_t=0, v_2=1), "v_2 is prescribed, but a mounting moves the interface"),
     (scene([Coulomb(mu=0.3)], SPRING, transverse=Mounting(k=1.0, m=1.0), p=1), "a mass is the same in every direction"),

@@ -77,8 +77,10 @@ def consistent_point(system: System, seed: int, modes: Mapping[str, float] | Non
     held = {state.name: state.symbol for state in system.states}
     for e in system.equilibria:
         residual = system.expand(e.residual)
-        if number(symengine.diff(residual, held[e.state]), point) != 0:
-            rows, free = [*rows, residual], [*free, held[e.state]]
+        felt = (held[name] for name in (e.state, *e.along))
+        moved = next((gap for gap in felt if number(symengine.diff(residual, gap), point) != 0), None)
+        if moved is not None:
+            rows, free = [*rows, residual], [*free, moved]
     slopes = [[symengine.diff(row, unknown) for unknown in free] for row in rows]
     for _ in range(80):
         matrix = mpmath.matrix([[number(entry, point) for entry in row] for row in slopes])

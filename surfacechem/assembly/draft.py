@@ -55,6 +55,8 @@ class Motion:
     """Traction that resists sliding along each direction, by axis."""
     stick_limits: dict[str, Expression] = field(default_factory=dict)
     """Tangential traction that sticking can bear along each direction, by axis."""
+    jolted: dict[Any, Expression] = field(default_factory=dict)
+    """New values of modes and states where loads jump, before what is in equilibrium with them follows."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
     works: dict[Friction, str] = field(default_factory=dict)

@@ -8,7 +8,7 @@ began. With :math:`f` what drives the interface less what resists it,
 of which the first is regular where sliding stops, so that a stop is the zero of a smooth function. The second is not:
 what is not driven straight turns ever faster into its last direction. There s counts as no less than what friction
 takes away within the rounding of time. That bends the path of such speeds and takes no energy, since what turns does no
-work. Without a mass both lines are balances.
+work. Without a mass both lines are balances; on springs alone their rates say how far it slides.
 
 Friction over all directions is an ellipse of tractions, and sticking bears what is inside. Sliding begins in the
 direction in which friction is the pull.
@@ -21,19 +21,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import symengine
 
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.folds import determinant
 from surfacechem.assembly.kinds import PLACE, Kind
-from surfacechem.assembly.mounting import ACROSS, LENGTH, FarField, far_field
+from surfacechem.assembly.mounting import LENGTH
+from surfacechem.assembly.planar import (
+    BEGAN,
+    SLIDES,
+    SPEED,
+    TURNED,
+    Side,
+    against,
+    aim,
+    borne,
+    elliptic,
+    largest,
+    rate_independent,
+    refuse_rails,
+    resistance,
+    side_of,
+    turned,
+    unit_vector,
+)
+from surfacechem.assembly.plane_springs import PATH, on_springs
 from surfacechem.assembly.slip import NONE, UNSTABLE, evolve, name_traction
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
+from surfacechem.expressions import Expression, depends, derivative, norm, sqrt, where
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Given, Margin
 from surfacechem.transitions import Transition
@@ -43,57 +61,70 @@ WORDS = {0.0: "sticks", 1.0: "slides"}
 MOMENT, SLOWEST = 1e-12, 1e-18
 """Part of the time so far, and speed [m/s], below which the turn of what stops is not resolved."""
 
-STILL, NEXT_TO = 1e-14, 1e-12
-"""Parts of what sticking bears that count as none: of a balance, and of one direction beside the other."""
+STILL = 1e-14
+"""Part of what sticking bears that a balance counts as none."""
 
 SWIFT, RADIAN = 0.1, 1e6
 """Scales of the speed [m/s] and of the turn [rad]: what rounding of the pull makes of either as sliding begins is no
 error. The turn is accurate to a part of one radian, not of itself.
 """
 
-SPEED, TURNED = symengine.symbols("speed turn")
-BEGAN = symengine.symbols("began began_2")
-
 
 def states(build: Build, kinds: Sequence[Kind]) -> None:
     """Displacements, speed and direction, and the velocities that follow."""
     inertial = kinds[0].inertial
-    if not (inertial or any(kind.rate_dependent for kind in kinds)):
-        raise InputError(
-            "what sticks and slides in two directions needs a mass or a damper: without either a spring alone would "
-            "have to say how far it slides, and a static limit above the kinetic one leaves that open. Give the "
-            "tangential mounting `m` or `c_b`.",
-            PLACE,
-        )
     slip = build.mode("slip", 0.0, WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
     build.variables.define("sticking", lambda: 1 - slip, "mode", "sticks or slides")
     for kind in kinds:
         u = evolve(build, kind.d.displacement)
         build.variables.define(kind.d.displacement, partial(_same, u), "evolved", "mechanics.tangential")
-    speed = evolve(build, "speed", algebraic=not inertial, scale=SWIFT if inertial else LENGTH)
-    evolve(build, "turn", algebraic=not inertial, scale=RADIAN)
+    balanced = not inertial and _rate_dependent(kinds)
+    role = "algebraic" if balanced else "evolved"
+    if inertial or balanced:
+        speed = evolve(build, "speed", algebraic=balanced, scale=SWIFT if inertial else LENGTH)
+        build.variables.define("speed", lambda: speed, role, "balance of the tangential tractions")
+    else:
+        _path(build, slip)
+    evolve(build, "turn", algebraic=balanced, scale=RADIAN)
     if inertial:
         _given_as_velocities(build)
-    role = "evolved" if inertial else "algebraic"
-    build.variables.define("speed", lambda: speed, role, "balance of the tangential tractions")
-    for kind, cosine in zip(kinds, _unit_vector(build), strict=True):
+    _began_along(build)
+    for kind, cosine in zip(kinds, unit_vector(), strict=True):
         build.variables.define(kind.d.cosine, partial(_same, slip * cosine), role, "turn")
         velocity = build.name(VARIABLES[kind.d.velocity], SPEED * cosine)
         build.variables.define(kind.d.velocity, partial(_same, velocity), "derived", "speed and turn")
         build.motion.gap_rates[kind.d.displacement] = velocity
 
 
+def _path(build: Build, slip: Expression) -> None:
+    """The length of the path of sliding, whose rate is the speed."""
+    path = evolve(build, PATH)
+    build.variables.define(PATH, lambda: path, "evolved", "balance of the tangential tractions")
+    speed = build.name(VARIABLES["speed"], slip * symengine.Symbol(f"d{PATH}_dt"))
+    build.variables.define("speed", lambda: speed, "derived", "the path of sliding")
+
+
+def _rate_dependent(kinds: Sequence[Kind]) -> bool:
+    """Whether what resists sliding depends on its speed, in whichever direction."""
+    found = {kind.rate_dependent for kind in kinds}
+    if len(found) > 1:
+        raise InputError(
+            "something resists sliding along one direction in proportion to its rate, and nothing does along the "
+            "other, where sliding would have no speed. Give both a damper, or a mass `m`.",
+            PLACE,
+        )
+    return found == {True}
+
+
 def _same(expression: Expression) -> Expression:
     return expression
 
 
-def _unit_vector(build: Build) -> tuple[Expression, Expression]:
-    """The direction of sliding: that in which it began, turned. So a straight line stays one to the last digit."""
+def _began_along(build: Build) -> None:
+    """The direction in which sliding began."""
     text = {0.0: "component of the direction in which sliding began"}
     for axis, initial, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True):
         build.mode(str(axis), initial, text, given=partial(_began, v))
-    x, y = BEGAN
-    return x * cos(TURNED) - y * sin(TURNED), y * cos(TURNED) + x * sin(TURNED)
 
 
 def _given_as_velocities(build: Build) -> None:
@@ -118,127 +149,78 @@ def _began(v: str, values: Mapping[str, float]) -> float:
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
-@dataclass(frozen=True)
-class _Side:
-    """One of the two directions: what pulls, what resists sliding, and what sticking bears."""
-
-    kind: Kind
-    far: FarField
-    u: Expression
-    cosine: Expression
-    rate: Expression
-    resisted: Expression
-    needed: Expression
-    limit: Expression
-
-    @property
-    def driving(self) -> Expression:
-        return self.far.force(self.u, self.rate) - self.resisted - self.far.c_g * self.rate
-
-
-def _side(build: Build, kind: Kind) -> _Side:
-    assert kind.mount is not None
-    far, u = far_field(build, kind.mount), symengine.Symbol(kind.d.displacement)
-    motion = build.motion
-    resisted, limit = motion.sliding_tractions[kind.d.axis], motion.stick_limits[kind.d.axis]
-    rate = motion.gap_rates[kind.d.displacement]
-    cosine = derivative(build.expanded(rate), SPEED)
-    return _Side(kind, far, u, cosine, rate, resisted, far.force(u, NONE), limit)
-
-
 def motion(build: Build, kinds: Sequence[Kind]) -> None:
     """Balances along and across the direction of sliding, and the transitions between sticking and sliding."""
-    sides = [_side(build, kind) for kind in kinds]
-    slides = symengine.Symbol("slip")
+    sides = [side_of(build, kind) for kind in kinds]
     for side in sides:
         name = side.kind.d.displacement
         build.rows[name] = symengine.Symbol(f"d{name}_dt") - side.rate
         side.far.book(build, side.u, side.rate)
-        name_traction(build, side.kind.d, slides, side.resisted, side.needed)
-    # What rounding leaves of the balance in which sliding begins must not stop it.
-    if kinds[0].inertial:
-        _inertial(build, sides, slides)
-        still = SPEED + STILL / MOMENT * _least(build, sides)
-    else:
-        along = _steady(build, sides, slides)
-        still = along.subs({SPEED: 0}) + STILL * _largest(sides)
-    _transitions(build, sides, still)
+        name_traction(build, side.kind.d, SLIDES, side.resisted, side.needed)
+    _transitions(build, sides, _balance(build, sides))
 
 
-def _inertial(build: Build, sides: Sequence[_Side], slides: Expression) -> None:
+def _balance(build: Build, sides: Sequence[Side]) -> Expression:
+    """Rows of what slides; returns what is zero where it stops.
+
+    What rounding leaves of the balance in which sliding begins must not stop it.
+    """
+    kind = sides[0].kind
+    if kind.inertial:
+        _inertial(build, sides)
+        return SPEED + STILL / MOMENT * _least(build, sides)
+    refuse_rails(build, sides)
+    if rate_independent(kind):
+        on_springs(build, sides)
+        return SPEED
+    return _steady(build, sides).subs({SPEED: 0}) + STILL * largest(sides)
+
+
+def _inertial(build: Build, sides: Sequence[Side]) -> None:
     (ds, turn), m = symengine.symbols("dspeed_dt dturn_dt"), sides[0].far.m
     (x, y), (c, s), least = (side.driving for side in sides), (side.cosine for side in sides), _least(build, sides)
     along, across = c * x + s * y, c * y - s * x
-    build.rows["speed"] = ds - slides * along / m
-    build.rows["turn"] = where(slides > 0, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
+    build.rows["speed"] = ds - SLIDES * along / m
+    build.rows["turn"] = where(SLIDES > 0, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
 
 
-def _least(build: Build, sides: Sequence[_Side]) -> Expression:
+def _least(build: Build, sides: Sequence[Side]) -> Expression:
     """Speed that friction takes away within the rounding of time [m/s]."""
-    return MOMENT * _largest(sides) / sides[0].far.m * build.t + SLOWEST
+    return MOMENT * largest(sides) / sides[0].far.m * build.t + SLOWEST
 
 
-def _steady(build: Build, sides: Sequence[_Side], slides: Expression) -> Expression:
-    """Balances without inertia; returns that along the direction of sliding.
+def _steady(build: Build, sides: Sequence[Side]) -> Expression:
+    """Balances without inertia; returns that along the direction of sliding, which has a sign.
 
-    They are written about the direction in which sliding began: there their terms cancel, and what is left is exact.
+    What resists has to grow with the speed. The direction follows at once, so it has no part in that.
     """
-    (x, y), (size, other) = (side.needed for side in sides), (_resistance(build, side) for side in sides)
-    if size != other:
-        raise InputError(
-            "without a mass the direction of sliding by dry friction is that of the pull, unless what resists sliding "
-            "differs from direction to direction. Give the tangential mounting a mass `m`, or the same in both.",
-            PLACE,
-        )
-    c, s, (b, b_2) = cos(TURNED), sin(TURNED), BEGAN
-    ahead, aside = b * x + b_2 * y, b * y - b_2 * x
-    along, across = c * ahead + s * aside - size, c * aside - s * ahead
-    slope = derivative(size, SPEED)
+    pull, sizes = [side.needed for side in sides], [resistance(build, side) for side in sides]
+    along, across = (x - resisted for x, resisted in zip(turned(pull), against(sizes), strict=True))
+    signed = along
+    if sizes[0] != sizes[1]:
+        rubs = sum((size.subs({SPEED: 0}) for size in sizes), NONE)
+        along, across = (where(rubs > 0, *pair) for pair in zip(elliptic(pull, sizes), (along, across), strict=True))
+    slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
-    build.rows["speed"] = where(slides > 0, along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
-    build.rows["turn"] = where(slides > 0, across, TURNED)
+    along_row = -along.subs({SPEED: 0}) / slope - SPEED if linear else along
+    build.rows["speed"] = where(SLIDES > 0, along_row, SPEED)
+    build.rows["turn"] = where(SLIDES * norm(*pull) > 0, across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
-    rows = [build.expanded(row) for row in (along, across)]
-    stable = determinant([[-derivative(row, x) for x in (SPEED, TURNED)] for row in rows])
-    build.margins.append(Margin("stable speed", where(slides > 0, stable, 1), UNSTABLE))
-    return along
+    stable = -derivative(build.expanded(along), SPEED)
+    build.margins.append(Margin("stable speed", where(SLIDES > 0, stable, 1), UNSTABLE))
+    return signed
 
 
-def _resistance(build: Build, side: _Side) -> Expression:
-    """What resists sliding along one of the directions alone [Pa]."""
-    own = BEGAN[side.kind.d is ACROSS]
-    pointing = {b: symengine.Integer(b == own) for b in BEGAN}
-    friction = build.expanded(side.resisted).subs({**pointing, TURNED: NONE})
-    return friction + (side.far.c_b + side.far.c_g) * SPEED
-
-
-def _largest(sides: Sequence[_Side]) -> Expression:
-    """The larger half axis of what sticking bears."""
-    a, b = (side.limit for side in sides)
-    return a if a == b else where(a > b, a, b)
-
-
-def _scaled(sides: Sequence[_Side]) -> list[Expression]:
-    """The pull where the ellipse that sticking bears is stretched to a circle about its larger half axis."""
-    top = _largest(sides)
-    if all(side.limit == top for side in sides):
-        return [side.needed for side in sides]
-    known = [where(side.limit > NEXT_TO * top, side.limit, NEXT_TO * top) for side in sides]
-    return [side.needed * where(top > 0, top / limit, 1) for side, limit in zip(sides, known, strict=True)]
-
-
-def _transitions(build: Build, sides: Sequence[_Side], still: Expression) -> None:
-    slip = symengine.Symbol("slip")
-    pull, top = _scaled(sides), _largest(sides)
-    borne = top - norm(*pull)
-    aim = {b: x / where(norm(*pull) > 0, norm(*pull), 1) for b, x in zip(BEGAN, pull, strict=True)}
+def _transitions(build: Build, sides: Sequence[Side], still: Expression) -> None:
+    kind, left, aimed = sides[0].kind, borne(sides), aim(build, sides)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
-    jump = broken(build, breaking) if breaking is not None else {}
-    margin = where(slip > 0, 1, where(build.t < build.held_until, 1, borne))
-    reason = "sticking gives way and the interface slides"
-    modes = {slip: symengine.Integer(1), **aim}
-    build.transitions.append(Transition("slip", margin, reason, modes, {**jump, TURNED: NONE}, sinks="local"))
-    modes = {slip: where(borne < 0, 1, 0)} | {b: where(borne < 0, x, b) for b, x in aim.items()}
-    rest = {TURNED: NONE} | ({SPEED: NONE} if sides[0].kind.inertial else {})
-    reason = "sliding comes to a stop"
-    build.transitions.append(Transition("stop", where(slip > 0, still, 1), reason, modes, rest, sinks="local"))
+    jump = {**(broken(build, breaking) if breaking is not None else {}), TURNED: NONE}
+    margin = where(SLIDES > 0, 1, where(build.t < build.held_until, 1, left))
+    modes, reason = {SLIDES: symengine.Integer(1), **aimed}, "sticking gives way and the interface slides"
+    begins = Transition("slip", margin, reason, modes, jump, rate_independent(kind), "local", to_pass=True)
+    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    onward = {SLIDES: where(left < 0, 1, 0)} | {b: where(left < 0, x, b) for b, x in aimed.items()}
+    modes, rest = (onward, {SPEED: NONE}) if kind.inertial else ({SLIDES: NONE}, {})
+    margin, reason = where(SLIDES > 0, still, 1), "sliding comes to a stop"
+    ends = Transition("stop", margin, reason, modes, {TURNED: NONE, **rest}, sinks="local", to_pass=True)
+    build.transitions += [begins, ends]
