@@ -1,31 +1,41 @@
 """Sliding against friction that remembers: its traction is the variable, the velocity follows from it.
 
 At rest such friction creeps, by hundreds of decades slower than it slides, and a reversal passes through all of them
-twice. What balances there is smooth: the traction, here in units of the direct effect. With inertia the variable is the
-same: where the velocity is next to nothing so is its rate, and the tractions balance; where it is not, the variable is
-its logarithm.
+twice. What balances there is smooth: the traction, here in units of the direct effect. With inertia the same holds as
+long as creep bears what drives it; what slides faster, flies or swings through has its velocity for a variable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 import symengine
 
 from surfacechem.assembly.build import Build
-from surfacechem.expressions import Expression
+from surfacechem.assembly.exchange import pressed
+from surfacechem.expressions import Expression, absolute, where
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Given, State
 from surfacechem.terms import Friction, Varying, reads
+from surfacechem.transitions import Transition
 
 DRIVE = "drive"
 
+PACE = "pace"
+"""What stands for a velocity with inertia: the drive while it creeps, else the velocity in its unit."""
+
 EFFECT = 1e6
-"""Scale of the drive with inertia: tractions are resolved to a part of the direct effect, not of themselves."""
+"""Scale of both: tractions are resolved to a part of the direct effect, not of themselves."""
 
 STILL = 1e-20
 """Velocity [m/s] below which a mass only delays creep, which then is as swift whatever its velocity."""
+
+SLOW, FAST = 0.01, 0.1
+"""Velocities below which sliding becomes creep and above which creep becomes sliding, in the unit of the law."""
+
+WORDS = {0.0: "slides", 1.0: "creeps"}
+CREEPS = symengine.Symbol("creeps")
 
 
 def creeping_law(build: Build) -> Friction | None:
@@ -52,22 +62,32 @@ def _varying(law: Friction) -> dict[str, Varying]:
     return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
 
-def is_driven(build: Build) -> bool:
-    """Whether something stands for the velocity of sliding."""
-    return any(state.name == DRIVE for state in build.states)
+def stands_for_velocity(build: Build) -> str:
+    """The state that stands for the velocity of sliding, if there is one."""
+    return next((state.name for state in build.states if state.name in (DRIVE, PACE)), "")
 
 
 def driven_sliding(build: Build, law: Friction) -> Expression:
     """The state that stands for a velocity without inertia; what reads the velocity itself gets it from there."""
     build.motion.creeping = law
-    return _stand_for_velocity(build, law, partial(build.bound, law), algebraic=True)
+    symbol, dot = symengine.symbols(f"{DRIVE} d{DRIVE}_dt")
+    build.variables.define(DRIVE, lambda: symbol, "algebraic", "balance of the tangential tractions")
+    build.variables.define("v", partial(_velocity, build, law), "derived", f"{law.path}, from its traction")
+    given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), partial(_drive_at_start, build, law))
+    build.states.append(State(VARIABLES[DRIVE], symbol, dot, 0.0, 1.0, algebraic=True, given=given))
+    return symbol
 
 
-def driven_mass(build: Build, law: Friction) -> Expression:
-    """The state that stands for a velocity with inertia."""
+def driven_mass(build: Build, law: Friction) -> None:
+    """The state that stands for a velocity with inertia, and the mode that says for what in it."""
+    symbol, dot = symengine.symbols(f"{PACE} d{PACE}_dt")
+    build.mode("creeps", 0.0, WORDS, given=partial(_creeps_at_start, build, law))
     if not _varying(law):
         build.motion.creeping = law
-    return _stand_for_velocity(build, law, partial(_at_reference, build, law), algebraic=False)
+        build.variables.define(DRIVE, partial(_drive, build, law), "derived", law.path)
+    build.variables.define("v", partial(_velocity_of_mass, build, law), "evolved", "mechanics.tangential")
+    given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), partial(_pace_at_start, build, law))
+    build.states.append(State(VARIABLES[PACE], symbol, dot, 0.0, EFFECT, algebraic=False, given=given))
 
 
 def _at_reference(build: Build, law: Friction) -> Friction:
@@ -77,18 +97,22 @@ def _at_reference(build: Build, law: Friction) -> Friction:
     return bound.bind({name: symbols[f"{bound.path}.{name}"] for name in _varying(law)})
 
 
-def _stand_for_velocity(build: Build, law: Friction, bound: Callable[[], Friction], *, algebraic: bool) -> Expression:
-    symbol, dot = symengine.symbols(f"{DRIVE} d{DRIVE}_dt")
-    role, by = ("algebraic", "balance of the tangential tractions") if algebraic else ("evolved", law.path)
-    build.variables.define(DRIVE, lambda: symbol, role, by)
-    build.variables.define("v", partial(_velocity, build, law, bound), "derived", f"{law.path}, from its traction")
-    given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), partial(_at_start, build, law, bound))
-    build.states.append(State(VARIABLES[DRIVE], symbol, dot, 0.0, 1.0 if algebraic else EFFECT, algebraic, given=given))
-    return symbol
+def _drive(build: Build, law: Friction) -> Expression:
+    """Traction in units of the direct effect."""
+    pace, reference = symengine.Symbol(PACE), _at_reference(build, law)
+    sliding = build.variables.call(law, reference.drive, {**_own(law), "v": reference.velocity_unit() * pace})
+    return where(CREEPS > 0, pace, sliding)
 
 
-def _velocity(build: Build, law: Friction, bound: Callable[[], Friction]) -> Expression:
-    return build.name(VARIABLES["v"], build.variables.call(law, bound().velocity, _own(law)))
+def _velocity_of_mass(build: Build, law: Friction) -> Expression:
+    pace, reference = symengine.Symbol(PACE), _at_reference(build, law)
+    creeping = build.variables.call(law, reference.velocity, {**_own(law), "drive": pace})
+    return build.name(VARIABLES["v"], where(CREEPS > 0, creeping, reference.velocity_unit() * pace))
+
+
+def _velocity(build: Build, law: Friction) -> Expression:
+    bound = build.bound(law)
+    return build.name(VARIABLES["v"], build.variables.call(law, bound.velocity, _own(law)))
 
 
 def _own(law: Friction) -> dict[str, Expression]:
@@ -96,11 +120,32 @@ def _own(law: Friction) -> dict[str, Expression]:
     return {name: symengine.Symbol(name) for name in law.internal}
 
 
-def _at_start(build: Build, law: Friction, bound: Callable[[], Friction], values: Mapping[str, float]) -> float:
-    """The drive at the velocity given: the start with inertia, else where the search for the balance begins."""
-    drive = build.variables.call(law, bound().drive, {**_own(law), "v": values["initial.v"]})
+def _drive_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float:
+    """The drive at the velocity given, where the search for the balance begins."""
+    return _at_start(build, law, build.bound(law), values)
+
+
+def _pace_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float:
+    """What stands for the velocity given."""
+    if _creeps_at_start(build, law, values):
+        return _at_start(build, law, _at_reference(build, law), values)
+    return values["initial.v"] / _unit_at_start(build, law, values)
+
+
+def _creeps_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float:
+    return float(abs(values["initial.v"]) < SLOW * _unit_at_start(build, law, values))
+
+
+def _unit_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float:
     numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
-    numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
+    return float(symengine.sympify(_at_reference(build, law).velocity_unit()).subs(numbers))
+
+
+def _at_start(build: Build, law: Friction, bound: Friction, values: Mapping[str, float]) -> float:
+    drive = build.variables.call(law, bound.drive, {**_own(law), "v": values["initial.v"]})
+    numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
+    others = [state for state in build.states if state.name not in (DRIVE, PACE)]
+    numbers |= {state.symbol: state.from_given(values) for state in others}
     try:
         return float(build.expanded(drive).subs({**numbers, build.t: 0.0}))
     except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
@@ -109,5 +154,42 @@ def _at_start(build: Build, law: Friction, bound: Callable[[], Friction], values
 
 def inertia(build: Build, m: Expression) -> Expression:
     """Mass times the rate of the velocity [Pa], which counts what is next to none as a little."""
-    v, drive = symengine.symbols(f"v {DRIVE}")
-    return m * build.total_derivative(v + STILL * drive)
+    return m * build.total_derivative(symengine.Symbol("v") + CREEPS * STILL * symengine.Symbol(PACE))
+
+
+def between_creep_and_sliding(build: Build, law: Friction, driving: Expression, slides: Expression) -> None:
+    """Sliding that dies away where friction bears what drives it becomes creep, until it does not bear that any more.
+
+    ``driving`` [Pa] is what is left of all tractions.
+    """
+    v, reference = symengine.Symbol("v"), _at_reference(build, law)
+    slow, fast = SLOW * reference.velocity_unit(), FAST * reference.velocity_unit()
+    pull = absolute(driving + _borne(build, law, v))
+    left, room = _excess(absolute(v), slow), _excess(pull, _borne(build, law, slow))
+    dies = where(CREEPS > 0, 1, where(slides > 0, where(left > room, left, room), 1))
+    gives = where(CREEPS > 0, where(slides > 0, _borne(build, law, fast) - pull, 1), 1)
+    drive = build.variables.call(law, reference.drive, {**_own(law), "v": v})
+    pace = symengine.Symbol(PACE)
+    for name, margin, reason, creeps, becomes in (
+        ("creep", dies, "sliding dies away and the interface creeps", 1, drive),
+        (
+            "slide",
+            gives,
+            "creep does not bear what drives it and the interface slides",
+            0,
+            v / reference.velocity_unit(),
+        ),
+    ):
+        modes = {CREEPS: symengine.Integer(creeps)}
+        build.transitions.append(Transition(name, margin, reason, modes, {pace: becomes}, sinks="local"))
+
+
+def _borne(build: Build, law: Friction, v: Expression) -> Expression:
+    """Traction of the friction at a velocity [Pa]."""
+    bound = build.bound(law)
+    return build.stretch * build.variables.call(law, bound.statement, {**pressed(build, law), "v": v})
+
+
+def _excess(x: Expression, y: Expression) -> Expression:
+    """By how much x is above y, relative to both; neither is negative."""
+    return where(x + y > 0, (x - y) / (x + y), 1)

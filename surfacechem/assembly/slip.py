@@ -13,13 +13,15 @@ import symengine
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.creep import (
-    DRIVE,
+    CREEPS,
+    PACE,
+    between_creep_and_sliding,
     creeping_law,
     creeping_mass,
     driven_mass,
     driven_sliding,
     inertia,
-    is_driven,
+    stands_for_velocity,
 )
 from surfacechem.assembly.kinds import PLACE, Kind
 from surfacechem.assembly.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
@@ -178,9 +180,11 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         moves = symengine.Integer(1) if kind.elastic else slides
         build.rows[name] = du - rate
         driving = far.force(u, rate) - carried - far.c_g * rate
-        if _stands_for_v(build, kind):
-            held = symengine.Symbol(f"d{DRIVE}_dt")
-            build.rows[DRIVE] = moves * (inertia(build, far.m) - driving) + (1 - moves) * held
+        law = creeping_mass(build) if _has_pace(build, kind) else None
+        if law is not None:
+            held = symengine.Symbol(f"d{PACE}_dt")
+            build.rows[PACE] = moves * (inertia(build, far.m) - driving) + (1 - moves) * held
+            between_creep_and_sliding(build, law, driving, moves)
         else:
             dv = symengine.Symbol(f"d{kind.own_velocity}_dt")
             build.rows[kind.own_velocity] = dv - moves * driving / far.m
@@ -202,8 +206,8 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
 
 
-def _stands_for_v(build: Build, kind: Kind) -> bool:
-    return kind.own_velocity == "v" and is_driven(build)
+def _has_pace(build: Build, kind: Kind) -> bool:
+    return not kind.elastic and stands_for_velocity(build) == PACE
 
 
 def _held_by_friction(build: Build, name: str, driving: Expression) -> None:
@@ -302,7 +306,9 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if balanced else where(absolute(needed) <= limit, 0, sign(needed))
-    moving = v if balanced or not _stands_for_v(build, kind) else symengine.Symbol(DRIVE)
+    moving, onto = (symengine.Symbol(PACE), {CREEPS: symengine.Integer(1)}) if _has_pace(build, kind) else (v, {})
     stop = {} if balanced else {moving: NONE}
     stops = where(slip**2 > 0, slip * moving, 1)
-    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop, to_pass=True))
+    build.transitions.append(
+        Transition("stop", stops, "sliding comes to a stop", {slip: onward, **onto}, stop, to_pass=True)
+    )
