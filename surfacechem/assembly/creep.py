@@ -23,10 +23,13 @@ from surfacechem.transitions import Transition
 DRIVE = "drive"
 
 PACE = "pace"
-"""What stands for a velocity with inertia: the drive while it creeps, else the velocity in its unit."""
+"""What stands for a velocity with inertia: the drive while it creeps, else the velocity in grains."""
 
 EFFECT = 1e6
 """Scale of both: tractions are resolved to a part of the direct effect, not of themselves."""
+
+GRAIN = 1e-9
+"""What a velocity of sliding is counted in, in the unit of the law: a turn is a step of the friction, and is met."""
 
 STILL = 1e-20
 """Velocity [m/s] below which a mass only delays creep, which then is as swift whatever its velocity."""
@@ -100,14 +103,14 @@ def _at_reference(build: Build, law: Friction) -> Friction:
 def _drive(build: Build, law: Friction) -> Expression:
     """Traction in units of the direct effect."""
     pace, reference = symengine.Symbol(PACE), _at_reference(build, law)
-    sliding = build.variables.call(law, reference.drive, {**_own(law), "v": reference.velocity_unit() * pace})
+    sliding = build.variables.call(law, reference.drive, {**_own(law), "v": GRAIN * reference.velocity_unit() * pace})
     return where(CREEPS > 0, pace, sliding)
 
 
 def _velocity_of_mass(build: Build, law: Friction) -> Expression:
     pace, reference = symengine.Symbol(PACE), _at_reference(build, law)
     creeping = build.variables.call(law, reference.velocity, {**_own(law), "drive": pace})
-    return build.name(VARIABLES["v"], where(CREEPS > 0, creeping, reference.velocity_unit() * pace))
+    return build.name(VARIABLES["v"], where(CREEPS > 0, creeping, GRAIN * reference.velocity_unit() * pace))
 
 
 def _velocity(build: Build, law: Friction) -> Expression:
@@ -129,7 +132,7 @@ def _pace_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> 
     """What stands for the velocity given."""
     if _creeps_at_start(build, law, values):
         return _at_start(build, law, _at_reference(build, law), values)
-    return values["initial.v"] / _unit_at_start(build, law, values)
+    return values["initial.v"] / GRAIN / _unit_at_start(build, law, values)
 
 
 def _creeps_at_start(build: Build, law: Friction, values: Mapping[str, float]) -> float:
@@ -170,18 +173,15 @@ def between_creep_and_sliding(build: Build, law: Friction, driving: Expression, 
     gives = where(CREEPS > 0, where(slides > 0, _borne(build, law, fast) - pull, 1), 1)
     drive = build.variables.call(law, reference.drive, {**_own(law), "v": v})
     pace = symengine.Symbol(PACE)
-    for name, margin, reason, creeps, becomes in (
-        ("creep", dies, "sliding dies away and the interface creeps", 1, drive),
-        (
-            "slide",
-            gives,
-            "creep does not bear what drives it and the interface slides",
-            0,
-            v / reference.velocity_unit(),
-        ),
-    ):
-        modes = {CREEPS: symengine.Integer(creeps)}
-        build.transitions.append(Transition(name, margin, reason, modes, {pace: becomes}, sinks="local"))
+    falls = Transition(
+        "creep", dies, "sliding dies away and the interface creeps", {CREEPS: symengine.Integer(1)}, {pace: drive}
+    )
+    reason = "creep does not bear what drives it and the interface slides"
+    rises = {pace: v / (GRAIN * reference.velocity_unit())}
+    build.transitions += [
+        falls,
+        Transition("slide", gives, reason, {CREEPS: symengine.Integer(0)}, rises, to_pass=True),
+    ]
 
 
 def _borne(build: Build, law: Friction, v: Expression) -> Expression:
