@@ -207,3 +207,13 @@ def test_dampers_beside_it_do_their_work():
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M, c_b=1e6, c_g=1e6), load), 40.0)
     assert happened(trajectory) == ["slide", *["creep", "slide"] * 4]
+
+
+def test_an_impact_on_it_is_refused():
+    """What it takes from sliding varies with the velocity."""
+    interface = Interface(Hold(level=300.0), (), [RateAndStateAging(**STEADIED)])
+    loading = {"w_t": Hold(level=0.0), "F_n": Hold(level=-1e5)}
+    mounts = {"normal": Mounting(m=1.0), "tangential": Mounting(k=K, m=1.0)}
+    item = Scene(COLD, interface, (), loading, None, 300.0, {"theta": 1.0, "g_n": 1e-3}, **mounts)
+    with pytest.raises(InputError, match="varies with the sliding velocity"):
+        assemble(item)
