@@ -9,6 +9,7 @@ from surfacechem.assembly.bounds import released
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
 from surfacechem.assembly.conduction import conductors, profiles, slabs
+from surfacechem.assembly.creep import stands_for_velocity
 from surfacechem.assembly.equations import equations
 from surfacechem.assembly.exchange import friction, heat_paths
 from surfacechem.assembly.folds import folds
@@ -84,7 +85,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
-    if build.transitions or any(state.finest for state in build.states) or build.motion.creeping:
+    if build.transitions or any(state.finest for state in build.states) or stands_for_velocity(build):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}

@@ -25,9 +25,9 @@ def friction(build: Build) -> None:
         label = build.label(law)
         bound = build.bound(law)
         memory(build, law, bound)
-        pressed = _pressed(build, law)
-        resisted = resistance(build, law, bound, pressed)
-        build.law_margins(bound, {}, met=pressed)
+        met = pressed(build, law)
+        resisted = resistance(build, law, bound, met)
+        build.law_margins(bound, {}, met=met)
         power = symengine.Integer(0)
         for d, traction in resisted.items():
             across = " across v" if d is ACROSS else ""
@@ -42,10 +42,10 @@ def friction(build: Build) -> None:
             build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
             _reversal(build, resisted)
         else:
-            stick_limit(build, law, bound, pressed)
+            stick_limit(build, law, bound, met)
 
 
-def _pressed(build: Build, law: Friction) -> dict[str, Expression]:
+def pressed(build: Build, law: Friction) -> dict[str, Expression]:
     """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
 
     At zero it is one that grows or falls, not one that stays: so a contact begins and ends.

@@ -99,7 +99,7 @@ def _ratio(build: Build, law: Friction, velocity: str) -> Expression:
     bound, v = build.bound(law), symengine.Symbol(velocity)
     traction = build.variables.call(bound, bound.statement, {"p": P, "v": v, "direction": ONE})
     ratio = _at_infinity(build, law, traction)
-    if depends(build.expanded(ratio), v):
+    if depends(ratio, v) or depends(build.expanded(ratio), v):
         raise InputError(
             f"{law.name()}: what an impact takes from sliding is not known where the coefficient of friction varies "
             f"with the sliding velocity, which changes within the impact. {SOFTEN}",

@@ -12,7 +12,17 @@ import symengine
 
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.creep import creeping_law, driven_sliding
+from surfacechem.assembly.creep import (
+    CREEPS,
+    PACE,
+    between_creep_and_sliding,
+    creeping_law,
+    creeping_mass,
+    driven_mass,
+    driven_sliding,
+    inertia,
+    stands_for_velocity,
+)
 from surfacechem.assembly.kinds import PLACE, Kind
 from surfacechem.assembly.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
 from surfacechem.errors import InputError
@@ -82,12 +92,22 @@ def _displacement(build: Build, kind: Kind) -> None:
     build.variables.define(name, lambda: u, "evolved", place)
     rates[name] = symengine.Symbol(f"d{name}_dt")
     if kind.inertial:
-        v = kind.own_velocity
-        velocity = rates[name] = evolve(build, v)
-        build.variables.define(v, lambda: velocity, "evolved", place)
+        rates[name] = _own_velocity(build, kind, place)
     elif kind.elastic and kind.mount is not None and kind.mount.damped:
         rates[name] = symengine.Symbol("v_t")
         build.variables.define("v_t", partial(_yielding, build, kind.mount), "derived", place)
+
+
+def _own_velocity(build: Build, kind: Kind, place: str) -> Expression:
+    """A velocity with inertia, by itself or by what stands for it."""
+    v = kind.own_velocity
+    law = creeping_mass(build) if v == "v" and len(build.motion.slips) == 1 else None
+    if law is not None:
+        driven_mass(build, law)
+        return symengine.Symbol(v)
+    velocity = evolve(build, v)
+    build.variables.define(v, lambda: velocity, "evolved", place)
+    return velocity
 
 
 def _yielding(build: Build, mount: Held) -> Expression:
@@ -159,8 +179,15 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
     if kind.inertial:
         moves = symengine.Integer(1) if kind.elastic else slides
         build.rows[name] = du - rate
-        dv = symengine.Symbol(f"d{kind.own_velocity}_dt")
-        build.rows[kind.own_velocity] = dv - moves * (far.force(u, rate) - carried - far.c_g * rate) / far.m
+        driving = far.force(u, rate) - carried - far.c_g * rate
+        law = creeping_mass(build) if _has_pace(build, kind) else None
+        if law is not None:
+            held = symengine.Symbol(f"d{PACE}_dt")
+            build.rows[PACE] = moves * (inertia(build, far.m) - driving) + (1 - moves) * held
+            between_creep_and_sliding(build, law, driving, moves)
+        else:
+            dv = symengine.Symbol(f"d{kind.own_velocity}_dt")
+            build.rows[kind.own_velocity] = dv - moves * driving / far.m
     elif kind.elastic:
         follows = symengine.Integer(1) if kind.rate_dependent else 1 - slides
         _elastic_balance(build, far, u, du, carried, follows)
@@ -177,6 +204,10 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
         size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
         build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
+
+
+def _has_pace(build: Build, kind: Kind) -> bool:
+    return not kind.elastic and stands_for_velocity(build) == PACE
 
 
 def _held_by_friction(build: Build, name: str, driving: Expression) -> None:
@@ -275,6 +306,9 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if balanced else where(absolute(needed) <= limit, 0, sign(needed))
-    stop = {} if balanced else {symengine.Symbol("v"): NONE}
-    stops = where(slip**2 > 0, slip * v, 1)
-    build.transitions.append(Transition("stop", stops, "sliding comes to a stop", {slip: onward}, stop, to_pass=True))
+    moving, onto = (symengine.Symbol(PACE), {CREEPS: symengine.Integer(1)}) if _has_pace(build, kind) else (v, {})
+    stop = {} if balanced else {moving: NONE}
+    stops = where(slip**2 > 0, slip * moving, 1)
+    build.transitions.append(
+        Transition("stop", stops, "sliding comes to a stop", {slip: onward, **onto}, stop, to_pass=True)
+    )
