@@ -24,7 +24,9 @@ LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
 """Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
 
 SHALLOW = 1e-10
-"""Relative depth below zero, at most, that a margin must reach to pass where it turns round there."""
+"""Relative depth below zero that a margin must reach to pass where it turns round there. Less than the tolerance may be
+the error of the states; at loose tolerances this much counts all the same, since what is brief is shallow, too.
+"""
 
 NOISE = 4e-15
 """Relative to the largest value seen, a margin this small is zero."""
