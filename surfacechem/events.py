@@ -19,7 +19,7 @@ from surfacechem.rebounds import ENDLESS, MANY, MISSED, Rebounds
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
-from surfacechem.stretches import Part, across_kink, all_counters, all_events, all_steps, changed, joined, piece
+from surfacechem.stretches import Part, across_kink, changed, merged, piece
 from surfacechem.system import START, System
 from surfacechem.transitions import HELD, SLIP
 from surfacechem.watching import sizes, to_pass
@@ -116,7 +116,9 @@ class Hybrid:
             y, modes = ended.y, ended.parameters[self.jumper.mode_columns]
         if self.status is Status.MAX_STEPS and self.rebounds.count > MANY:
             self.status, self.reason = Status.FAILED, ENDLESS
-        return self._merged()
+        reached = self.parts[-1].end if self.parts else float(problem.segments[0])
+        end = max(reached, self.jumps[-1].t) if self.reason and self.jumps else reached
+        return merged(problem, self.parts, self.status, end, self.booked)
 
     def _begun(self, point: Point, before: Point | None) -> Point | None:
         """The start of a piece of time, where loads that jump there have moved what is in equilibrium with them."""
@@ -339,33 +341,3 @@ class Hybrid:
         before = self.jumps[-1].t if self.jumps else float(self.problem.segments[0])
         part = self.parts[-1] if self.parts else None
         return part.result.t + (t - part.end) if part is not None and part.start.t == before else t - before
-
-    # -- one result -----------------------------------------------------------------------------------------------
-
-    def _merged(self) -> Result:
-        parts, problem = self.parts, self.problem
-        last = parts[-1].result if parts else None
-        merged = changed(
-            problem,
-            segments=np.array([*(part.start.t for part in parts), problem.segments[-1]]) if parts else problem.segments,
-            parameters=np.array([part.start.parameters for part in parts]) if parts else problem.parameters,
-        )
-        n, q = problem.program.n, problem.program.n_ledger
-        reached = parts[-1].end if parts else float(problem.segments[0])
-        return Result(
-            problem=merged,
-            status=self.status,
-            t=max(reached, self.jumps[-1].t) if self.reason and self.jumps else reached,
-            y=last.y if last else problem.y0,
-            ydot=last.ydot if last else np.zeros(n),
-            ledger=self.booked,
-            margins=last.margins if last else np.zeros(0),
-            times=joined([part.times for part in parts], 0),
-            outputs=joined([part.result.outputs for part in parts], n),
-            ledger_outputs=joined([part.result.ledger_outputs + part.booked for part in parts], q),
-            events=all_events(parts, n, q),
-            counters=all_counters(parts),
-            steps=all_steps(parts) if problem.record_steps and parts else None,
-            stepping=sum(part.result.stepping for part in parts),
-            segment=np.repeat(np.arange(len(parts)), [len(part.times) for part in parts]) if parts else None,
-        )

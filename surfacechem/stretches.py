@@ -90,3 +90,31 @@ def all_counters(parts: Sequence[Part]) -> Counters:
     if not parts:
         return Counters()
     return Counters(*(int(sum(counts)) for counts in zip(*(part.result.counters for part in parts), strict=True)))
+
+
+def merged(problem: Problem, parts: Sequence[Part], status: Status, end: float, ledger: Array) -> Result:
+    """The stretches as one result, which ends at this time with this ledger."""
+    last = parts[-1].result if parts else None
+    whole = changed(
+        problem,
+        segments=np.array([*(part.start.t for part in parts), problem.segments[-1]]) if parts else problem.segments,
+        parameters=np.array([part.start.parameters for part in parts]) if parts else problem.parameters,
+    )
+    n, q = problem.program.n, problem.program.n_ledger
+    return Result(
+        problem=whole,
+        status=status,
+        t=end,
+        y=last.y if last else problem.y0,
+        ydot=last.ydot if last else np.zeros(n),
+        ledger=ledger,
+        margins=last.margins if last else np.zeros(0),
+        times=joined([part.times for part in parts], 0),
+        outputs=joined([part.result.outputs for part in parts], n),
+        ledger_outputs=joined([part.result.ledger_outputs + part.booked for part in parts], q),
+        events=all_events(parts, n, q),
+        counters=all_counters(parts),
+        steps=all_steps(parts) if problem.record_steps and parts else None,
+        stepping=sum(part.result.stepping for part in parts),
+        segment=np.repeat(np.arange(len(parts)), [len(part.times) for part in parts]) if parts else None,
+    )

@@ -36,7 +36,7 @@ from surfacechem.solvers.radau_advance import finish_step, store_polynomial
 from surfacechem.solvers.radau_stages import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solvers.radau_step import estimate_error
 from surfacechem.solvers.radau_tables import EDGE, SCANNED
-from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, noise, passed_by, update_sides
+from surfacechem.solvers.sides import crosses, falls_from_start, is_limit, kink_at, noise, passed_by, update_sides
 
 ALIKE = 1e3
 """Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
@@ -319,16 +319,6 @@ def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
 
 
 @compiled
-def _kink(w: Any, kinds: Any, first: int) -> int:
-    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
-    found = -1
-    for m in range(kinds.shape[0]):
-        if kinds[m, 0] == 0 and kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
-            found = m
-    return found
-
-
-@compiled
 def find_event(w: Any, h: float, kinds: Any) -> float:
     """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
@@ -342,7 +332,7 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     if size == 0.0:
         return 0.0
     _mark_coincident(w, h, size, kinds)
-    kink = _kink(w, kinds, first)
+    kink = kink_at(w, kinds, first)
     if kink >= 0:
         size = _short_of(w, h, kink, size)
         _mark_coincident(w, h, size, kinds)

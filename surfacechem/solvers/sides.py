@@ -114,3 +114,13 @@ def update_sides(w: Any, kinds: Any) -> None:
         if abs(moved) > (0.0 if abs(side) == 1.0 and kinds[m, 3] == 0 else noise(w, m)):
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
         w.margin[M_BEFORE, m] = value
+
+
+@compiled
+def kink_at(w: Any, kinds: Any, first: int) -> int:
+    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
+    found = -1
+    for m in range(kinds.shape[0]):
+        if kinds[m, 0] == 0 and kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
+            found = m
+    return found
