@@ -38,6 +38,7 @@ OF_BALANCES = [
     ["paces", "events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
     ["folds", "breaking", "bounds", "pulled", "media", "first_trials", "instants", "reactor", "evaluated"],
+    ["impact", "plane", "plane_springs", "creeping_mass", "load_jumps", "local_jumps", "neighbours"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],
