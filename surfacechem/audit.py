@@ -66,12 +66,16 @@ class Audit:
 
     @property
     def energy_error(self) -> float:
-        """Largest energy residual relative to the energy exchanged; to that stored where it is its rounding."""
+        """Largest energy residual, relative to the energy exchanged, or to that stored where it is no more than its
+        rounding.
+        """
         return _resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding)
 
     @property
     def entropy_error(self) -> float:
-        """Largest entropy residual relative to that exchanged or produced; to that stored where it is its rounding."""
+        """Largest entropy residual, relative to that exchanged or produced, or to that stored where it is no more than
+        its rounding.
+        """
         return _resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding)
 
     @property

@@ -76,7 +76,8 @@ def _rows(trajectory: Trajectory) -> list[Row]:
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
     """Times [s] of the events by name, in order; where physics stopped the run, also that of its end.
 
-    The last of endless rebounds are left out: how many of them there are is a matter of the tolerance.
+    Impacts slower than a thousandth of the fastest so far are left out, with what happens at their time but rest: of
+    endless rebounds, how many there are is a matter of the tolerance.
     """
     rows = _telling(trajectory, _rows(trajectory))
     found = {

@@ -54,7 +54,7 @@ VARIABLES = _table(
     ("v_n", "m/s", "opening velocity of the normal gap", r"\dot g_n"),
     ("v_t", "m/s", "tangential velocity of body 2 relative to body 1", r"\dot u_t"),
     ("v", "m/s", "sliding velocity of body 2 relative to body 1", "v"),
-    ("pace", "1", "drive of friction while the interface creeps, else v in units of 1e-9 v_0", "v / 1e-9 v_0"),
+    ("pace", "1", "drive of friction while the interface creeps, else v in units of 1e-9 v_0", "v / (1e-9 v_0)"),
     ("drive", "1", "friction traction in units of its direct effect, a p", r"t_t / a p"),
     ("v_2", "m/s", "sliding velocity across v, along the interface", "v_2"),
     ("speed", "m/s", "speed of sliding: magnitude of the velocity (v, v_2)", r"|v|"),

@@ -224,11 +224,10 @@ def test_a_load_that_jumps_lets_go_at_once():
     trajectory = solve(scene(Mounting(m=M), {"F_n": load}), 9.0)
     assert names(trajectory) == ["impact", "rest", "open", "impact", "rest"]
     # It rises for 1 s at 5 m/s^2 and falls at 7.5 m/s^2.
-    height, speed = 2.5, math.sqrt(5.0**2 + 2 * 7.5 * 2.5)
+    height = 2.5
+    speed = math.sqrt(5.0**2 + 2 * 7.5 * height)
     assert [jump.t for jump in trajectory.jumps[2:4]] == pytest.approx([3.0, 4.0 + (5.0 + speed) / 7.5], rel=1e-13)
-    assert made(trajectory, "impact")[1].released == pytest.approx(
-        20 * height + 30 * 0 + M * speed**2 / 2 - 20 * height
-    )
+    assert made(trajectory, "impact")[1].released == pytest.approx(M * speed**2 / 2)
 
 
 @pytest.mark.parametrize(
@@ -394,6 +393,7 @@ def test_what_slides_without_a_mass_or_behind_a_spring_sticks_for_an_instant(fri
     start = {"u_t": 0.0} | ({"v_t": 1.0} if potentials else {})
     given = scene(Mounting(m=M, e=0.5), PRESSED | {"w_t": Ramp(rate=0.5)}, start, interface=interface, tangential=held)
     trajectory = solve(given, 1.0)
+    assert made(trajectory, "impact")
     assert not made(trajectory, "rub")
     for jump in made(trajectory, "impact"):
         assert jump.after.y[2:-1].tolist() == jump.before.y[2:-1].tolist()

@@ -1,5 +1,7 @@
 """Kinks that fall on breakpoints of the loading are events like any other, once each."""
 
+import math
+
 import numpy as np
 import pytest
 from scenes import bodies
@@ -8,7 +10,7 @@ from surfacechem.assembly import assemble
 from surfacechem.event_table import event_columns
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.loading import Harmonic, Ramp, Table
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.scene import Interface, Mounting, Scene
 
@@ -49,3 +51,15 @@ def test_a_step_ends_where_a_given_gap_closes():
     assert trajectory.result.ledger[accounts.index("W_g_n")] == pytest.approx(work, rel=1e-10)
     (closes,) = trajectory.result.events.t
     assert closes == pytest.approx(7 / 3, rel=1e-14)
+
+
+def test_kinks_at_one_moment_are_events_once_each():
+    """Both components of a velocity reverse together."""
+    swing = {"amplitude": 1e-3, "frequency": 0.37, "phase": 0.3}
+    loading = {"p": Hold(level=1e5), "v": Harmonic(**swing), "v_2": Harmonic(**swing)}
+    scene = Scene(bodies("T", "T"), Interface("T", [], [Coulomb(mu=0.3)]), (), loading, None, 300.0, {"T": 300.0})
+    trajectory = Model(assemble(scene)).solve(Run([0.0, 6.0], 1e-11))
+    columns = {column.name: column.values for column in event_columns(trajectory)}
+    turns = [(k * math.pi - 0.3) / (2 * math.pi * 0.37) for k in range(1, 5)]
+    for name in ("v", "v_2"):
+        np.testing.assert_allclose(columns["event_time"][columns["event_name"] == name], turns, rtol=1e-13)

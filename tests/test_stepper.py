@@ -152,6 +152,19 @@ def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
     np.testing.assert_allclose(result.outputs[:, 0], [grown / (1 + grown), 1.0], rtol=1e-2)
 
 
+def test_what_is_nothing_and_is_driven_by_nothing_does_not_grow() -> None:
+    """y' = 1e30 y (1 - y) from y = 0 rests there, in no more steps than anything at rest."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y)])
+    problem = Problem(
+        program, np.zeros(1), np.array([1.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, 1e-14 * np.ones(1)
+    )
+    result = radau.solve(problem)
+    assert result.status == Status.FINISHED
+    assert result.outputs[0, 0] == 0.0
+    assert result.counters.steps < 20
+
+
 def test_vanishing_capacity_ends_at_zero_temperature() -> None:
     """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
     t, temperature, rate = se.symbols("t T dT")

@@ -89,7 +89,7 @@ def _rigid(build: Build, mount: Held) -> None:
             "a rigid interface under dead load has no opening. Give the mounting a stiffness k.", Place(path=mount.by)
         )
     far = far_field(build, mount)
-    pull = far.k * far.w + far.F
+    pull = far.force(symengine.Integer(0), symengine.Integer(0))
     closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, _starts_closed(build, pull))
     build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
     _carry(build, closed * pull)
@@ -171,7 +171,7 @@ def normal_motion(build: Build) -> None:
 
 def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -> None:
     """Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find."""
-    residual = far.k * (far.w - g) + far.F - t_n
+    residual = far.force(g, symengine.Integer(0)) - t_n
     size = far.k * (absolute(far.w) + absolute(g)) + absolute(far.F) + absolute(t_n)
     build.rows["g_n"] = -build.total_derivative(residual)
     build.equilibria.append(Equilibrium("g_n", residual, size))

@@ -28,8 +28,8 @@ NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 G, V = symengine.symbols("g_n v_n")
 
 NOTHING, SLOWEST = 0.1, 1e-11
-"""Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance, and a
-velocity [m/s] that does so in any case, in units of this."""
+"""Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
+speed [m/s] that the fastest impact has at least there."""
 
 BRIEF = 1e-13
 """Part of the time so far that one rebound must take to be told from none."""

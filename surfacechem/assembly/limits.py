@@ -60,7 +60,7 @@ def limits(build: Build) -> None:
 def _opening(build: Build, margin: Expression, closed: Expression) -> None:
     """A rigid interface without bonds opens under tension."""
     modes = {closed: symengine.Integer(0)}
-    # What has inertia bears a tension for no time.
+    # A pull that only touches zero does not part bodies that have inertia.
     to_pass = any(state.name == "v_n" for state in build.states)
     build.transitions.append(Transition("open", margin, "the interface opens", modes, settles=True, to_pass=to_pass))
 

@@ -41,10 +41,17 @@ from surfacechem.transitions import Equilibrium
 UNSEEN = 1e-18
 """Length [m] of sliding within which what nothing rubs against turns into the direction of the drive."""
 
-SWERVE, UNFELT, FAINT, HELD = 1e-4, 1e-6, 1e-8, 1e-3
-"""Tractions across the direction of sliding that the integration explains, relative to their size, to the parts that
-cancel in them, and to those that would over the length of the path; and the part of that where it sticks.
-"""
+SWERVE = 1e-4
+"""Traction across the direction of sliding that the integration explains, relative to friction."""
+
+UNFELT = 1e-6
+"""The same, relative to the parts that cancel in it."""
+
+FAINT = 1e-8
+"""The same, relative to what the springs would pull over the length of the path."""
+
+HELD = 1e-3
+"""Part of all this that the integration explains while the interface sticks."""
 
 WAYLESS = (
     "the traction is beyond what sticking bears, as after a jump, and where springs or friction differ from direction "

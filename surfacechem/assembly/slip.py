@@ -229,7 +229,7 @@ def _elastic_balance(
     if far.c_b != 0 or far.c_g != 0:
         build.rows["u_t"] = du - build.motion.gap_rates["u_t"]
         return
-    residual = far.k * (far.w - u) + far.F - t_e
+    residual = far.force(u, NONE) - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
     size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_e)
     build.equilibria.append(Equilibrium("u_t", residual, size, along={"g_t": follows}))

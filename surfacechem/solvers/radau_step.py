@@ -182,14 +182,17 @@ def choose_member(w: Any, slowest: float) -> bool:
 
 @compiled
 def growing_size(w: Any) -> float:
-    """Step in which what is still below the tolerance, where no error counts, grows no more than e-fold by its own.
+    """Step in which what is still below the tolerance, where no error counts, grows no more than e-fold by its own
+    derivative alone.
 
-    The method would damp what grows much faster, and never leave an equilibrium that is unstable.
+    The method would damp what grows much faster, and never leave an equilibrium that is unstable. What is nothing and
+    is driven by nothing does not grow.
     """
     mass, stiffness = w.jacobian[1], w.jacobian[0]
     fastest = 0.0
     for j in range(mass.shape[0]):
-        if mass[j, j] != 0.0 and abs(w.vector[Y, j]) < w.vector[ATOL, j]:
+        driven = w.vector[Y, j] != 0.0 or w.vector[YDOT, j] != 0.0
+        if driven and mass[j, j] != 0.0 and abs(w.vector[Y, j]) < w.vector[ATOL, j]:
             fastest = max(fastest, -stiffness[j, j] / mass[j, j])
     return 1.0 / fastest if fastest > 0.0 else np.inf
 

@@ -74,13 +74,17 @@ def _write_state(w: Any, row: Any, t: float) -> None:
 
 
 @compiled
-def _is_last(w: Any, events: Any, counts: Any, m: int) -> bool:
-    """Whether the last event written is of this margin and, but for digits, of now: a step ends just short of a kink,
-    and the next one passes it.
+def _is_known(w: Any, events: Any, counts: Any, m: int) -> bool:
+    """Whether an event of this margin is written that but for digits is of now: a step ends just short of a kink, and
+    the next one passes it.
     """
-    last = counts[EVENTS] - 1
     now = w.clock[BASE] + w.clock[TAU]
-    return bool(0 <= last < events.shape[0] and events[last, 0] == m and now - events[last, 1] <= SAME * now)
+    k = min(counts[EVENTS], events.shape[0]) - 1
+    while k >= 0 and now - events[k, 1] <= SAME * now:
+        if events[k, 0] == m:
+            return True
+        k -= 1
+    return False
 
 
 @compiled
@@ -89,7 +93,7 @@ def _write_events(w: Any, events: Any, kinds: Any, counts: Any) -> bool:
     terminal = False
     for m in range(kinds.shape[0]):
         if w.fired[m] != 0:
-            if kinds[m, 0] == 0 and _is_last(w, events, counts, m):
+            if kinds[m, 0] == 0 and _is_known(w, events, counts, m):
                 continue
             if counts[EVENTS] < events.shape[0]:
                 row = events[counts[EVENTS]]
