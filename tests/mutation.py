@@ -43,7 +43,7 @@ OF_BALANCES = [
 OF_LAWS = [
     ["laws", "tabulated"],
     ["bonds", "friction_memory", "heat_paths", "limits"],
-    ["tables_bonds", "tables_mechanics", "contact_laws", "media"],
+    ["tables_bonds", "tables_mechanics", "contact_laws", "media", "kinks_at_breaks"],
 ]
 
 

@@ -9,7 +9,7 @@ from scenes import bodies
 from surfacechem.assembly import assemble
 from surfacechem.event_table import event_columns
 from surfacechem.integrate import Model, Run
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.scene import Interface, Mounting, Scene
@@ -63,3 +63,16 @@ def test_kinks_at_one_moment_are_events_once_each():
     turns = [(k * math.pi - 0.3) / (2 * math.pi * 0.37) for k in range(1, 5)]
     for name in ("v", "v_2"):
         np.testing.assert_allclose(columns["event_time"][columns["event_name"] == name], turns, rtol=1e-13)
+
+
+def test_a_step_ends_where_tension_reaches_the_strength():
+    """Friction of Mohr and Coulomb falls with the pressure to p = -t_n_max and is nothing beyond."""
+    law = MohrCoulomb(mu=0.3, t_n_max=5e4)
+    loading = {"p": Ramp(start=1e5, rate=-1e5), "v": Hold(level=1e-3)}
+    scene = Scene(bodies("T", "T"), Interface("T", [], [law]), (), loading, None, 300.0, {"T": 300.0})
+    trajectory = Model(assemble(scene)).solve(Run([0.0, 4.0], 1e-9))
+    (bends,) = trajectory.result.events.t
+    assert bends == pytest.approx(1.5, rel=1e-14)
+    accounts = [account.quantity.name for account in trajectory.model.system.ledger]
+    work = trajectory.result.ledger[accounts.index("W_mohr_coulomb")]
+    assert work == pytest.approx(0.3 * 1e-3 * 1.5e5 * 1.5 / 2, rel=1e-10)
