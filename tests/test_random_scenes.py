@@ -18,6 +18,8 @@ from surfacechem.solvers.contract import REASONS, Status
 from surfacechem.substances import Property
 from surfacechem.terms import BodyEnergy, Factor, Load, reads
 
+pytestmark = pytest.mark.around
+
 CLOSED = 1e-9
 """Energy that may be missing, relative to what was exchanged."""
 
