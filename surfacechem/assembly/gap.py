@@ -172,6 +172,6 @@ def normal_motion(build: Build) -> None:
 def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -> None:
     """Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find."""
     residual = far.force(g, symengine.Integer(0)) - t_n
-    size = far.k * (absolute(far.w) + absolute(g)) + absolute(far.F) + absolute(t_n)
+    size = far.size(g) + absolute(t_n)
     build.rows["g_n"] = -build.total_derivative(residual)
     build.equilibria.append(Equilibrium("g_n", residual, size))

@@ -9,7 +9,7 @@ import symengine
 
 from surfacechem.assembly.build import Build
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, derivative, sqrt
+from surfacechem.expressions import Expression, absolute, derivative, sqrt
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
 from surfacechem.springs import stored
@@ -149,6 +149,10 @@ class FarField:
     def force(self, g: Expression, rate: Expression) -> Expression:
         """Traction with which the far field pulls the gap open [Pa]."""
         return self.carried(g) + self.c_b * (self.w_dot - rate) + self.F
+
+    def size(self, g: Expression) -> Expression:
+        """Size of the tractions that cancel where the far field is in balance [Pa]."""
+        return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
 
     def paces(self, text: str) -> list[Pace]:
         """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""

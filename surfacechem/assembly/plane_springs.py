@@ -96,8 +96,7 @@ def _settling(build: Build, sides: Sequence[Side], sizes: Sequence[Expression]) 
     """What jumps, with the loads or from a static limit, slips straight along the pull where no way is another."""
     pull = [side.needed for side in sides]
     (ahead, aside), (resisted, skew) = turned(pull), against(sizes)
-    parts = [absolute(side.far.k * x) for side in sides for x in (side.far.w, side.u)]
-    size = sum([*parts, *(absolute(side.far.F) for side in sides)], largest(sides))
+    size = sum((side.far.size(side.u) for side in sides), largest(sides))
     moved = {str(side.u): side.cosine for side in sides}
     balance = SLIDES * (ahead - resisted)
     build.equilibria.append(Equilibrium(PATH, balance, size, moved, active=SLIDES, slides=1))

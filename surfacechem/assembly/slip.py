@@ -202,7 +202,7 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
             _held_by_friction(build, name, driving)
             return
         build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
-        size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_f)
+        size = far.size(u) + absolute(t_f)
         build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
 
 
@@ -231,7 +231,7 @@ def _elastic_balance(
         return
     residual = far.force(u, NONE) - t_e
     build.rows["u_t"] = -build.total_derivative(residual)
-    size = far.k * (absolute(far.w) + absolute(u)) + absolute(far.F) + absolute(t_e)
+    size = far.size(u) + absolute(t_e)
     build.equilibria.append(Equilibrium("u_t", residual, size, along={"g_t": follows}))
 
 
