@@ -1,7 +1,9 @@
 """The folder that keeps the compiled stepper, and compiling with or without it.
 
 The folder's name holds a digest of the kernel's sources, the versions of Numba and Python and the processor, so that
-code is never reused where it does not fit. A cache that cannot be written or read costs compile time, never a result.
+code is never reused where it does not fit. What is kept is machine code: it is loaded only where its SHA-256 is the one
+noted when it was made, and where no other user could have written it. A cache that cannot be written, read or trusted
+costs compile time, never a result.
 """
 
 import gc
@@ -9,6 +11,7 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import sys
 import tempfile
 import warnings
@@ -17,6 +20,12 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+OTHERS = stat.S_IWGRP | stat.S_IWOTH
+"""Permission of others to write."""
+
+SUMS = "SHA256SUMS"
+"""File of the digests of the files beside it."""
 
 
 def cache_root() -> Path:
@@ -45,18 +54,101 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
     digest = hashlib.sha256()
     for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), _processor()):
         digest.update(text.encode())
-    for source in sources:
+    for source in (Path(__file__), *sources):  # this file, for the form in which code is kept
         digest.update(source.read_bytes())
     return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
 
 
 def is_filled(folder: Path) -> bool:
-    """Whether the folder holds machine code."""
-    return any(folder.glob("**/*.nbc"))
+    """Whether the folder holds machine code that would be loaded."""
+    return untrusted(folder) is None and any(_is_sound(part) for part in _parts(folder))
+
+
+def _parts(folder: Path) -> list[Path]:
+    """The folders in which Numba keeps code, one for each place that the sources are at."""
+    try:
+        return [part for part in folder.iterdir() if part.is_dir() and any(part.glob("*.nb[ci]"))]
+    except OSError:
+        return []
+
+
+def sealed(content: bytes) -> bytes:
+    """Content behind its SHA-256, so that it is known when it is damaged."""
+    return hashlib.sha256(content).hexdigest().encode() + b"\n" + content
+
+
+def unsealed(data: bytes) -> bytes | None:
+    """The content of sealed data; None where it is damaged."""
+    content = data[2 * hashlib.sha256().digest_size + 1 :]
+    return content if sealed(content) == data else None
+
+
+def _sums(part: Path) -> bytes:
+    """SHA-256 of each file of a folder, as `sha256sum` prints them."""
+    files = sorted(path for path in part.iterdir() if path.name != SUMS)
+    return b"".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n".encode() for path in files)
+
+
+def _is_sound(part: Path) -> bool:
+    try:
+        return (part / SUMS).read_bytes() == _sums(part)
+    except OSError:
+        return False
+
+
+def _seal(part: Path) -> None:
+    """Note the digests of what has just been written, once it is on the disk; nobody else may write there."""
+    for path in part.iterdir():
+        with path.open("rb") as file:
+            os.fsync(file.fileno())
+    keep_file(part / SUMS, _sums(part))
+    for path in (part.parent, part, *part.iterdir()):
+        path.chmod(path.stat().st_mode & ~OTHERS)
+
+
+def keep_file(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all, even where the machine stops meanwhile."""
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(handle)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def untrusted(folder: Path) -> str | None:
+    """Why code in this folder could be another user's; None where it cannot be, or the folder is not there."""
+    if not hasattr(os, "getuid"):
+        return None  # on Windows a user's folder is writable to that user alone
+    paths = [cache_root(), folder, *(path for path in folder.rglob("*") if folder.is_dir())]
+    for path in paths:
+        try:
+            found = path.stat() if path == paths[0] else path.lstat()
+        except OSError:
+            continue
+        if found.st_uid not in (os.getuid(), 0):
+            return f"{path} belongs to another user"
+        shared = path == paths[0] and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
+        if stat.S_ISLNK(found.st_mode) or (found.st_mode & OTHERS and not shared):
+            return f"{path} can be written by other users"
+    return None
+
+
+def discard(folder: Path) -> None:
+    """Remove what is kept in a folder, so that it is made anew."""
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _writable(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+    for path in (cache_root(), folder):
+        if not path.is_dir():
+            path.mkdir(parents=True, exist_ok=True)
+            path.chmod(path.stat().st_mode & ~OTHERS)
     with tempfile.TemporaryFile(dir=folder):
         pass
 
@@ -183,22 +275,24 @@ def _compile(function: Callable[..., None], signature: Any, folder: Path | None,
 
 
 def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
-    """The compiled function, from the cache if it is sound, else compiled anew, else compiled without a cache; parts
-    are the names of the compiled functions that it alone calls.
+    """The compiled function, from the cache if it is sound and ours, else compiled anew, else compiled without a cache;
+    parts are the names of the compiled functions that it alone calls.
     """
-    try:
-        return _compile(function, signature, folder, parts)
-    except OSError as error:
-        problem = error
-    except Exception:
-        if not is_filled(folder):
-            raise
-        shutil.rmtree(folder, ignore_errors=True)
+    problem = untrusted(folder)
+    if problem is None:
+        for part in _parts(folder):
+            if not _is_sound(part):
+                discard(part)
         try:
-            return _compile(function, signature, folder, parts)
+            kernel = _compile(function, signature, folder, parts)
+            if not kernel.stats.cache_hits:
+                _seal(Path(kernel.stats.cache_path))
+            return kernel
         except OSError as error:
-            problem = error
+            problem = str(error)
     warnings.warn(
-        f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process.", stacklevel=2
+        f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process. "
+        "SURFACECHEM_CACHE names another folder.",
+        stacklevel=2,
     )
     return _compile(function, signature, None, parts)

@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.kernelcache import discard, keep_file, sealed, unsealed, untrusted
+
 FILE = "kernel.object"
 
 HEAD = 64
@@ -48,6 +50,8 @@ assert load(Path(sys.argv[1])) is not None
 
 def keep(kernel: Any, folder: Path) -> None:
     """Keep the machine code of a kernel that Numba has just compiled; only if a process of its own can load it."""
+    if untrusted(folder) is not None:
+        return
     (made,) = kernel.overloads.values()
     try:
         _, _, (code, _) = made.library.serialize_using_object_code()
@@ -55,8 +59,8 @@ def keep(kernel: Any, folder: Path) -> None:
         return  # the kernel came from the cache, and its code with it
     with suppress(OSError, subprocess.SubprocessError):
         trial = folder / f"{FILE}.{os.getpid()}"
-        trial.mkdir()
-        (trial / FILE).write_bytes(made.fndesc.llvm_func_name.encode() + b"\n" + code)
+        trial.mkdir(mode=0o755)
+        keep_file(trial / FILE, sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code))
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         done = subprocess.run(
             [sys.executable, "-c", PROOF, str(trial)], env=environment, capture_output=True, timeout=60
@@ -69,11 +73,20 @@ def keep(kernel: Any, folder: Path) -> None:
 
 
 def load(folder: Path) -> Callable[..., None] | None:
-    """The kernel whose code is kept in a folder; None where there is none."""
+    """The kernel whose code is kept in a folder; None where there is none that can be trusted.
+
+    Code that is damaged goes with all that is kept beside it: it is made when the whole is compiled.
+    """
+    if untrusted(folder) is not None:
+        return None
     try:
-        name, _, code = (folder / FILE).read_bytes().partition(b"\n")
+        content = unsealed((folder / FILE).read_bytes())
     except OSError:
         return None
+    if content is None:
+        discard(folder)
+        return None
+    name, _, code = content.partition(b"\n")
     return Kernel(name.decode(), code)
 
 

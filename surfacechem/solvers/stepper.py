@@ -42,7 +42,7 @@ def _folder() -> Path:
 
 def is_compiled() -> bool:
     """Whether the stepper can be loaded instead of compiled (which takes some ten seconds, once)."""
-    return is_filled(_folder())
+    return _Loaded.kernel is not None or is_filled(_folder())
 
 
 def _compiled() -> Any:
