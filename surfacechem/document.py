@@ -17,14 +17,22 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place
 
-LARGEST = 1_000_000
-"""Bytes of a document."""
-
 DEEPEST = 24
 """Mappings and lists inside each other."""
 
-MOST = 50_000
-"""Values of a document, with what its aliases repeat."""
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a document may hold."""
+
+    largest: int = 1_000_000
+    """Bytes."""
+    most: int = 20_000
+    """Values, with what aliases repeat; they are read in some 2 s."""
+
+
+CASE = Limits()
+"""Of a case; longer tables belong into files of their own."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}")
@@ -60,7 +68,7 @@ class Tree:
             yield from child.places()
 
 
-def read(path: Path, name: str = "") -> str:
+def read(path: Path, name: str = "", limits: Limits = CASE) -> str:
     """The text of a file; ``name`` stands for it in messages."""
     place = Place(name or str(path))
     try:
@@ -68,11 +76,11 @@ def read(path: Path, name: str = "") -> str:
             kind = "a folder" if path.is_dir() else "no file" if not path.exists() else "no ordinary file"
             raise InputError(f"this is {kind}; a YAML file is needed.", place)
         with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
+            data = file.read(limits.largest + 1)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}.", place) from None
-    if len(data) > LARGEST:
-        raise InputError(f"larger than {LARGEST} bytes.", place)
+    if len(data) > limits.largest:
+        raise InputError(f"larger than {limits.largest} bytes.", place)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -94,9 +102,14 @@ def parse(text: str, file: str = "") -> Tree:
     >>> parse("bodies: {lower: {C: 1e3}}").plain()
     {'bodies': {'lower': {'C': 1000.0}}}
     """
-    if len(text) > LARGEST:
-        raise InputError(f"larger than {LARGEST} bytes.", Place(file))
-    return with_paths(_Builder(text, file).document())
+    return with_paths(build(text, file))
+
+
+def build(text: str, file: str = "", limits: Limits = CASE) -> Tree:
+    """The tree of a YAML document without paths."""
+    if len(text) > limits.largest:
+        raise InputError(f"larger than {limits.largest} bytes.", Place(file))
+    return _Builder(text, file, limits).document()
 
 
 def dump(tree: Tree) -> str:
@@ -132,8 +145,9 @@ def scalar(text: str) -> Any:
 class _Builder:
     """Builds a tree from the events of the parser, so that limits hold before anything is expanded."""
 
-    def __init__(self, text: str, file: str) -> None:
+    def __init__(self, text: str, file: str, limits: Limits) -> None:
         self.file = file
+        self.most = limits.most
         self.events = self._events(text)
         self.anchors: dict[str, Tree] = {}
         self.sizes: dict[str, int] = {}
@@ -174,7 +188,7 @@ class _Builder:
         return tree
 
     def _place(self, event: Any) -> Place:
-        return Place(self.file, event.start_mark.line + 1)
+        return Place(self.file, event.start_mark.line + 1, column=event.start_mark.column)
 
     def _value(self, event: Any, depth: int) -> Tree:
         place = self._place(event)
@@ -192,8 +206,11 @@ class _Builder:
 
     def _limits(self, event: Any, depth: int, place: Place) -> None:
         self.count += 1
-        if self.count > MOST:
-            raise InputError(f"more than {MOST} values.", place)
+        if self.count > self.most:
+            message = (
+                f"more than {self.most} values. A long table belongs into a CSV file: `table: {{file: NAME.csv}}`."
+            )
+            raise InputError(message, place)
         if depth > DEEPEST:
             raise InputError(f"nested deeper than {DEEPEST} levels.", place)
         if getattr(event, "tag", None) is not None:
@@ -227,8 +244,8 @@ class _Builder:
         if event.anchor not in self.anchors:
             raise InputError(f"the alias *{event.anchor} has no anchor before it.", place)
         self.count += self.sizes[event.anchor]
-        if self.count > MOST:
-            raise InputError(f"aliases repeat more than {MOST} values.", place)
+        if self.count > self.most:
+            raise InputError(f"aliases repeat more than {self.most} values.", place)
         return replace(self.anchors[event.anchor], place=place)
 
 

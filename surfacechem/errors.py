@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where in the input something stands: file, line (from 1) and the dotted path of keys."""
+    """Where in the input something stands: file, line (from 1), the dotted path of keys, and column (from 0)."""
 
     file: str = ""
     line: int = 0
     path: str = ""
+    column: int = field(default=0, compare=False)
 
     def __str__(self) -> str:
         location = f"{self.file}:{self.line}" if self.line else self.file

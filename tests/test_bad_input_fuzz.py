@@ -6,6 +6,7 @@ from functools import cache
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mutants import garbled, mutated
 
 from surfacechem import document
 from surfacechem.case import load, load_text, names
@@ -42,55 +43,6 @@ def sample(name):
     """The text of a case and its plain data, which nothing here changes."""
     text = load(name).text
     return text, document.parse(text).plain()
-
-
-def places_of(value, path=()):
-    """The path of every value of a document."""
-    yield path
-    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, child in entries:
-        yield from places_of(child, (*path, key))
-
-
-def changed(value, path, change):
-    """The document with the value at a path replaced; None removes it."""
-    if not path:
-        return change(value)
-    if isinstance(value, dict):
-        return {**value, path[0]: changed(value[path[0]], path[1:], change)}
-    return [changed(child, path[1:], change) if i == path[0] else child for i, child in enumerate(value)]
-
-
-def without(value, data):
-    """A mapping or list without one of its entries."""
-    if isinstance(value, dict) and value:
-        gone = data.draw(st.sampled_from(sorted(value)))
-        return {key: child for key, child in value.items() if key != gone}
-    return value[:-1] if isinstance(value, list) else value
-
-
-def renamed(value, data):
-    """A mapping with an entry under another key."""
-    if not isinstance(value, dict) or not value:
-        return value
-    old, new = data.draw(st.sampled_from(sorted(value))), data.draw(st.sampled_from(KEYS))
-    return {new if key == old else key: child for key, child in value.items()}
-
-
-def mutated(plain, data):
-    path = data.draw(st.sampled_from(list(places_of(plain))))
-    kind = data.draw(st.sampled_from(["replace", "remove", "rename", "add", "repeat"]))
-    if kind == "replace":
-        new = data.draw(VALUES)
-        return changed(plain, path, lambda _: new)
-    if kind == "remove":
-        return changed(plain, path, lambda value: without(value, data))
-    if kind == "rename":
-        return changed(plain, path, lambda value: renamed(value, data))
-    if kind == "add":
-        key, new = data.draw(st.sampled_from(KEYS)), data.draw(VALUES)
-        return changed(plain, path, lambda value: {**value, key: new} if isinstance(value, dict) else value)
-    return changed(plain, path, lambda value: value * 2 if isinstance(value, list) else value)
 
 
 def refusal(text):
@@ -134,7 +86,7 @@ def test_a_message_is_one_line_whatever_it_quotes(text, message):
 def test_mutated_documents(name, data):
     _, plain = sample(name)
     for _ in range(data.draw(st.integers(1, 3))):
-        plain = mutated(plain, data)
+        plain = mutated(plain, KEYS, VALUES, data)
     loads_or_is_refused(document.dump(document.from_plain(plain, Place())))
 
 
@@ -142,11 +94,7 @@ def test_mutated_documents(name, data):
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
 def test_mutated_texts(name, data):
     text, _ = sample(name)
-    for _ in range(data.draw(st.integers(1, 4))):
-        start = data.draw(st.integers(0, len(text)))
-        end = min(len(text), start + data.draw(st.integers(0, 12)))
-        text = text[:start] + data.draw(st.text("aT0 .:-[]{}#&*!|>'\"%@\n\t\0e", max_size=6)) + text[end:]
-    loads_or_is_refused(text)
+    loads_or_is_refused(garbled(text, data))
 
 
 @given(st.text())

@@ -114,7 +114,7 @@ REFUSED = {
         f"reactions:\n{REACTION.replace('A(s) + B(s) <=> AB(s)', 'AB(s) => A(s) + B(s)').replace('m^2/mol', '1')}- eq",
         "duplicate reactions",
     ),
-    "a key twice": ("b: 0, Ea: 0}", "b: 0, b: 1, Ea: 0}", "duplicate key"),
+    "a key twice": ("b: 0, Ea: 0}", "b: 0, b: 1, Ea: 0}", "the key 'b' is given twice"),
     "a unit of the wrong kind": ("1.0e-4 mol/m^2", "1.0e-4 mol/m^3", "Cantera: "),
     "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "no species 'D(s)'"),
     "lost sites": ("  sites: 2\n", "", "Cantera: "),
@@ -207,7 +207,7 @@ def test_keys_of_a_rate_type_are_those_of_its_class(old, new, words, tmp_path):
         ("{stiffness: 1}", "species AB(s): bond: stiffness: 1 has no unit"),
         ("{stiffness: 1 pN/nm, rest-length: 20}", "species AB(s): bond: rest-length: 20 has no unit"),
         ("{rest-length: 20 nm}", "needs `stiffness`"),
-        ("5 pN/nm", "species AB(s): bond is not a mapping"),
+        ("5 pN/nm", "bond: this must be a mapping, not '5 pN/nm'"),
     ],
 )
 def test_a_bond_s_elasticity_is_checked(bond, words, tmp_path):

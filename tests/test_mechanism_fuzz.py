@@ -1,15 +1,20 @@
-"""A key that is misspelt anywhere in a mechanism is an error that names it; nothing is ignored."""
+"""A key that is misspelt anywhere in a mechanism is an error that names it; whatever stands in a file, it is read and
+assembled, or refused where it stands.
+"""
 
 import io
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mutants import garbled, mutated
 from ruamel.yaml import YAML
 
+from surfacechem import document
+from surfacechem.case import load_text
 from surfacechem.data import mechanisms
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.kinds import kinds
@@ -150,3 +155,94 @@ def siblings(name, path):
     """What may stand there: the key itself, and other keys that would mean something."""
     words = set(re.findall(r"[\w()-]+", TEXTS["every rate type"] + TEXTS[name]))
     return words | {"cp0", "note", "P", "T", *FREE}
+
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 400),
+    st.floats(),
+    st.sampled_from([10**400, -1e308, 5e-324, "1e18", "", "A(s)", "300 K", "1 kJ/mol", "-1 mol/m^2", "NASA7", "all"]),
+    st.sampled_from(["A(s) => A(s)", "=> B(s)", "A(s) + B(s) =>", "1e9 A(s) <=> B(s)", "A(s)", "Bell", "sticking"]),
+    st.text(max_size=6),
+    st.sampled_from([[], {}, [[]], [1, 2], {"A": 1}, {"model": "NASA7", "data": [[1]]}, ["A(s)"], [{"x": "all"}]]),
+)
+KEYS = sorted({str(key) for plain in PLAIN.values() for path in keys(plain) for key in path if isinstance(key, str)})
+ODD = {
+    "a control character": b"phases: \x07",
+    "no text": b"\x89PNG\r\n\x1a\n\x00\x00",
+    "deep nesting": b"phases: " + b"[" * 1000,
+    "too many values": b"phases: [" + b"1, " * 300_000 + b"]",
+    "an alias of itself": b"phases: &a [*a]",
+    "aliases that repeat": b"".join(
+        b"%c: &%c [%s]\n" % (c, c, b", ".join([b"*%c" % (c - 1)] * 9) if c > 97 else b"1") for c in range(97, 110)
+    ),
+    "a tag": b"phases: !!python/object:os.system [ls]",
+    "two documents": b"phases: []\n---\nphases: []",
+    "nothing": b"",
+    "a list": b"- 1",
+    "a number of reactions": RICH[: RICH.index("reactions:\n")].encode() + b"reactions: 5\n",
+    "a number of phases": b"phases: 5",
+    "a phase that is a text": b"phases: [surface]",
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_what_is_no_mechanism_is_refused(name, file):
+    file.write_bytes(ODD[name])
+    with pytest.raises(InputError) as caught:
+        load_mechanism(file)
+    assert caught.value.place.file == str(file)
+    assert len(str(caught.value)) < 1000
+
+
+SOLVERS = st.sampled_from(["radau", "cantera"])
+CASE = """\
+T_0: 300 K
+bodies: {{one: {{temperature: T, C: 1}}, two: {{temperature: T, C: 1}}}}
+interface: {{temperature: T, mechanism: {{file: {}, phase: {}}}}}
+initial: {{T: 300 K, coverages: {{{}: 1}}}}
+run: {{until: 1 s, solver: {}}}
+"""
+
+
+def is_read_or_refused(text, file, solver):
+    file.write_text(text, encoding="utf-8", errors="surrogatepass")
+    phase, species = re.search(r"- name: (\S+)", text), re.search(r"[\w*]+\(s\)", text)
+    names = (phase[1] if phase else "surface", species[0] if species else "A(s)")
+    error = refusal(CASE.format(file.name, *names, solver), str(file.parent))
+    if error is not None:
+        assert error.place.file
+        assert str(error).isprintable()
+        assert len(str(error)) < 2000
+
+
+def refusal(case, folder):
+    try:
+        load_text(case, "fuzz", folder).system()
+    except InputError as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize("examples", [150, pytest.param(3000, marks=pytest.mark.slow)])
+def test_mutated_documents(examples, file):
+    @given(name=st.sampled_from(list(TEXTS)), data=st.data())
+    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    def run(name, data):
+        plain = PLAIN[name]
+        for _ in range(data.draw(st.integers(1, 3))):
+            plain = mutated(plain, KEYS, VALUES, data)
+        is_read_or_refused(document.dump(document.from_plain(plain, Place())), file, data.draw(SOLVERS))
+
+    run()
+
+
+@pytest.mark.parametrize("examples", [150, pytest.param(3000, marks=pytest.mark.slow)])
+def test_mutated_texts(examples, file):
+    @given(name=st.sampled_from(list(TEXTS)), data=st.data())
+    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    def run(name, data):
+        is_read_or_refused(garbled(TEXTS[name], data), file, data.draw(SOLVERS))
+
+    run()

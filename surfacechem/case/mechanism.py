@@ -31,7 +31,6 @@ def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: 
     file, phase, bonds, neighbours = _choice(tree)
     if content is None:
         path = _find(file, Path(base), tree)
-        document.read(path)
         return _load(path, phase, bonds, tree, evaluate, neighbours)
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name

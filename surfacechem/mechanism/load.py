@@ -7,10 +7,11 @@ import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from surfacechem import data
+from surfacechem import data, document
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.dependence import interactions
 from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
@@ -21,7 +22,7 @@ from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpai
 from surfacechem.mechanism.neighbours import Neighbour, hold, remarks
 from surfacechem.mechanism.rates import KILO, plain
 from surfacechem.mechanism.remedies import is_evaluated
-from surfacechem.mechanism.source import Source, sides
+from surfacechem.mechanism.source import LIMITS, Source, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.scene import BondingVariable, Engine, Sites
 from surfacechem.terms import Potential, RateLaw
@@ -82,7 +83,7 @@ def load_mechanism(
     phases beside the surface are held.
     """
     path = _find(Path(path), place)
-    source = Source(str(path), path.read_text(encoding="utf-8"))
+    source = Source(str(path), document.read(path, limits=LIMITS))
     entry = source.phase(phase, place)
     check(source, entry, evaluate)
     surface, said = _cantera(source, entry)
@@ -141,14 +142,23 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
 
 def _plain_text(source: Source, phase: Any) -> str:
     """The file with our own rate types called Arrhenius, so that Cantera needs no extension to read the rest."""
-    lines = source.text.splitlines(keepends=True)
-    entries = {entry.lc.value("type"): str(entry["type"]) for entry in source.reactions(phase) if "type" in entry}
-    for (line, column), kind in sorted(entries.items(), reverse=True):  # from the end, so that columns stay
-        law = kind_of(kind)
-        if law is not None and not law.native:
-            before, after = lines[line][:column], lines[line][column:]
-            lines[line] = before + re.sub(rf"""^(["']?){re.escape(kind)}""", r"\1interface-Arrhenius", after)
-    return "".join(lines)
+    starts = list(accumulate((len(line) for line in source.text.splitlines(keepends=True)), initial=0))
+    text = source.text
+    own = [entry for entry in source.reactions(phase) if "type" in entry and not _is_native(str(entry["type"]))]
+    places = {(place.line, place.column): entry for entry in own for place in (source.place(entry, "type"),)}
+    for (line, column), entry in sorted(places.items(), reverse=True):  # from the end, so that places stay
+        start, kind = starts[line - 1] + column, re.escape(str(entry["type"]))
+        renamed, found = re.subn(rf"""\A(\S+\s*:\s*["']?){kind}""", r"\1interface-Arrhenius", text[start:], count=1)
+        if not found:
+            raise InputError(f"type: write `type: {entry['type']}` on one line.", source.place(entry, "type"))
+        text = text[:start] + renamed
+    return text
+
+
+def _is_native(kind: str) -> bool:
+    """Whether Cantera itself knows a rate type, or nobody here does."""
+    law = kind_of(kind)
+    return law is None or law.native
 
 
 def _translated(text: str, source: Source) -> InputError:

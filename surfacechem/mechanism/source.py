@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from typing import Any
 
+from surfacechem import document
+from surfacechem.document import Limits, Tree
 from surfacechem.errors import InputError, Place, suggestion
+
+LIMITS = Limits(largest=10_000_000, most=200_000)
+"""A mechanism may be that of a large gas beside the surface."""
 
 ARROWS = ("<=>", "=>", "=")
 """What stands between the sides of an equation; only the second is one way."""
@@ -20,25 +24,111 @@ CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-e
 """What numbers in such a file count in where it does not say otherwise."""
 
 
+NUMBER, NAME = (int, float), (str, int, float)
+ENTRY: Mapping[str, tuple[type, ...]] = {"units": (dict,), "name": NAME, "thermo": (str, dict)}
+PHASE: Mapping[str, tuple[type, ...]] = {
+    **ENTRY,
+    "thermo": (str,),
+    "species": (str, list),
+    "reactions": (str, list),
+    "elements": (list,),
+    "state": (dict,),
+    "adjacent-phases": (list,),
+    "site-density": NAME,
+    "reference-state-coverage": NUMBER,
+}
+SPECIES: Mapping[str, tuple[type, ...]] = {
+    **ENTRY,
+    "composition": (dict,),
+    "bond": (dict,),
+    "sites": NUMBER,
+    "size": NUMBER,
+    "charge": NUMBER,
+}
+REACTION: Mapping[str, tuple[type, ...]] = {
+    **ENTRY,
+    "equation": (str,),
+    "type": (str,),
+    "orders": (dict,),
+    "coverage-dependencies": (dict,),
+    "duplicate": (bool,),
+    "id": NAME,
+}
+"""What kind of value each key has, where it matters before Cantera reads it."""
+
+KINDS = {dict: "a mapping", list: "a list", str: "a text", float: "a number", bool: "true or false"}
+
+
+class Mapped(dict[str, Any]):
+    """A mapping of the file, with the place of each key."""
+
+    def __init__(self, tree: Tree) -> None:
+        super().__init__((key, _placed(child)) for key, child in tree.value.items())
+        self.place = tree.place
+        self.places = {key: child.place for key, child in tree.value.items()}
+
+
+class Listed(list[Any]):
+    """A list of the file, with the place of each item."""
+
+    def __init__(self, tree: Tree) -> None:
+        super().__init__(map(_placed, tree.value))
+        self.place = tree.place
+        self.places = dict(enumerate(item.place for item in tree.value))
+
+
+def _placed(tree: Tree) -> Any:
+    """A value whose mappings and lists know their places."""
+    kinds: Mapping[type, Any] = {dict: Mapped, list: Listed}
+    made = kinds.get(type(tree.value))
+    return made(tree) if made else tree.value
+
+
 class Source:
-    """The text of a mechanism with the line of every entry."""
+    """The text of a mechanism with the place of every entry."""
 
     def __init__(self, file: str, text: str) -> None:
         self.file = file
         self.text = text
-        self.data = _parse(file, text)
+        self.data = _placed(document.build(text, file, LIMITS))
+        if not isinstance(self.data, Mapped):
+            raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
+        self._check(self.data, {"units": (dict,), "phases": (list,), "elements": (list,)})
+        for name in ("phases", "elements"):
+            self._entry_list(name, PHASE if name == "phases" else ENTRY, self.data, name)
 
     def place(self, node: Any, key: Any = None, path: str = "") -> Place:
         """Place of a mapping or list, or of one of its entries."""
-        marks = getattr(node, "lc", None)
-        if marks is None:
+        if not isinstance(node, Mapped | Listed):
             return Place(self.file, 0, path)
-        where = (marks.data or {}).get(key)
-        return Place(self.file, (where[0] if where else marks.line) + 1, path)
+        place = node.places.get(key, node.place)
+        return Place(self.file, place.line, path, place.column)
+
+    def _check(self, node: Any, kinds: Mapping[str, tuple[type, ...]]) -> None:
+        """InputError where a key does not hold the kind of value that it must."""
+        for key, allowed in kinds.items():
+            value = node.get(key)
+            if key in node and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
+                wanted = " or ".join(KINDS[kind] for kind in allowed if kind in KINDS)
+                raise InputError(f"{key}: this must be {wanted}, not {_shown(value)}.", self.place(node, key))
+
+    def _entry_list(self, name: str, kinds: Mapping[str, tuple[type, ...]], node: Any, key: str) -> list[Any]:
+        """The mappings of a section; InputError at what is none."""
+        entries = self.data.get(name)
+        if entries is None:
+            return []
+        if not isinstance(entries, Listed):
+            raise InputError(f"{name}: this must be a list, not {_shown(entries)}.", self.place(self.data, name))
+        for i, entry in enumerate(entries):
+            if not isinstance(entry, Mapped):
+                message = f"{name}: an entry is a mapping, not {_shown(entry)}."
+                raise InputError(message, self.place(entries, i))
+            self._check(entry, kinds)
+        return list(entries)
 
     def phases(self) -> list[Any]:
         """The phase entries."""
-        return [entry for entry in self.data.get("phases") or [] if isinstance(entry, Mapping)]
+        return list(self.data.get("phases") or [])
 
     def phase(self, name: str | None, place: Place | None) -> Any:
         """The phase of that name, or the only one."""
@@ -65,7 +155,7 @@ class Source:
                 f"no section '{name}' in this file.{suggestion(name, known)} A mechanism is one file.",
                 self.place(node, key, key),
             )
-        return list(self.data[name] or [])
+        return self._entry_list(name, SPECIES if key == "species" else REACTION, node, key)
 
     def species(self, phase: Any) -> Iterator[Any]:
         """The species entries that the phase may use."""
@@ -146,15 +236,7 @@ def _mapping(node: Any) -> Mapping[str, Any]:
     return node if isinstance(node, Mapping) else {}
 
 
-def _parse(file: str, text: str) -> Any:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError
-
-    try:
-        data = YAML(typ="rt").load(io.StringIO(text))
-    except MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 0
-        raise InputError(f"{error.problem}.", Place(file, line)) from None
-    if not isinstance(data, Mapping):
-        raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
-    return data
+def _shown(value: Any) -> str:
+    """A value as it stands in a message."""
+    kind = next((text for kind, text in KINDS.items() if kind in (dict, list) and isinstance(value, kind)), "")
+    return kind or ("nothing" if value is None else f"'{str(value)[:40]}'")
