@@ -180,11 +180,14 @@ class HeatTransfer(Law):
 
     between: tuple[str, str] = option("the two ends: body names, 'interface' or 'surroundings'")
     closure: Literal["direct", "medium", "mean"] = option(
-        "'direct' from end to end, 'medium' through the interface with twice the conductance on each side, or 'mean' "
-        "from the interface into both bodies alike, driven by T_c over the harmonic mean of their temperatures",
+        "'direct' from end to end, 'medium' through the interface with twice the conductance on each side (through a "
+        "film as heat made across it leaves it), or 'mean' from the interface into both bodies alike, driven by T_c "
+        "over the harmonic mean of their temperatures: it may heat the hotter body from a cooler interface",
         default="direct",
     )
     conductance: ClassVar[Callable[..., Expression]]
+    resistances: ClassVar[Callable[..., tuple[Expression, Expression, Expression]]]
+    """Resistances of the first wall, the film and the second wall [m^2 K/W]; absent where heat is not made across."""
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """The conductances in parallel that the whole is the sum of, by what carries the heat."""

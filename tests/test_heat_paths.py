@@ -217,6 +217,22 @@ def test_mean_influx_against_its_exact_solution():
     assert values["q_t"] == pytest.approx(np.zeros(4), abs=1e-9)
 
 
+def test_mean_influx_into_a_hotter_body_is_told():
+    """From 400 K it heats a body of 500 K beside one of 300 K; both together produce entropy."""
+    mean = Conductance(between=ENDS, h=10.0, closure="mean")
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=100.0)])
+    scene = dataclasses.replace(
+        direct([mean], {}, interface=interface), initial={"T_1": 300.0, "T_2": 500.0, "T_c": 400.0}
+    )
+    (warning,) = assemble(scene).warnings
+    assert "upper also from an interface that is cooler than itself, between 375 K and 500 K" in warning
+    values = computed(solved(scene, 0.0, 0.1))
+    assert values["q_2"][0] == pytest.approx(250.0)
+    assert values["sigma_q_c12"][0] == pytest.approx(10.0 * 25.0 * (1 / 300 + 1 / 500 - 2 / 400), rel=1e-12)
+    alike = dataclasses.replace(scene, initial={"T_1": 300.0, "T_2": 300.0, "T_c": 400.0})
+    assert assemble(alike).warnings == ()
+
+
 def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
     mean = Conductance(between=("lower", "surroundings"), h=1.0, closure="mean")
     with pytest.raises(InputError, match="`closure: mean` belongs to a path between the two bodies"):

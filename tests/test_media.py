@@ -6,6 +6,8 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson, solve_bvp
+from scipy.optimize import brentq
 
 import surfacechem
 from surfacechem import case, fits, simulation
@@ -15,11 +17,16 @@ from surfacechem.audit import audit
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.bulk import Constant
+from surfacechem.laws.contact import ConstantInterfaceCapacity
+from surfacechem.laws.factors import Exponential
 from surfacechem.laws.films import Film, FilmCapacity, FilmShear, RarefiedFilm
+from surfacechem.laws.friction import Viscous
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
+from surfacechem.references.couette_flow import CouetteFlow
 from surfacechem.scene import Body, Interface, Medium, Scene
+from surfacechem.terms import Varying
 
 pytestmark = pytest.mark.around
 
@@ -114,6 +121,125 @@ def test_films_close_energy_and_entropy():
         assert books.violations == ()
 
 
+# -- heat made across a film ------------------------------------------------------------------------------------------
+
+K_M, ETA, D_M = 0.13, 0.01, 5e-6
+
+
+def between_walls(T_1, T_2, v, viscosity=ETA, law=Film, given=None, **parameters) -> Scene:
+    """A film of constant conductivity that is sheared between walls of constant temperature."""
+    properties = {"k_m": K_M, "rho_m": 860.0, "cp_m": 2000.0, "eta_m": ETA} if given is None else given
+    friction = FilmShear() if viscosity is ETA else Viscous(eta=viscosity)
+    found = Medium(None, properties, D_M)
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=8.6)], [friction], medium=found)
+    walls = Body("lower", Hold(level=T_1)), Body("upper", Hold(level=T_2))
+    heat = [law(between=("lower", "upper"), closure="medium", **parameters)]
+    loading = {"v": Hold(level=v)} | ({} if viscosity is ETA else {"g_n": Hold(level=D_M)})
+    return Scene(walls, interface, heat, loading, T_0=300.0, initial={"T_c": 300.0})
+
+
+def steady(scene: Scene) -> dict[str, float]:
+    return {name: values[-1] for name, values in computed(solved(scene, 0.0, 0.02)).items()}
+
+
+@pytest.mark.parametrize(("T_1", "T_2", "v"), [(300.0, 300.0, 10.0), (300.0, 340.0, 30.0), (390.0, 310.0, 0.5)])
+def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
+    """The parabola on a line that solves k T'' + eta (v/d)^2 = 0."""
+    values, heat = steady(between_walls(T_1, T_2, v)), ETA * v**2 / D_M
+    across = K_M / D_M * (T_2 - T_1)
+    assert values["T_c"] == pytest.approx((T_1 + T_2) / 2 + ETA * v**2 / (12 * K_M), rel=1e-11)
+    assert values["q_1"] == pytest.approx(heat / 2 + across, rel=1e-9)
+    assert values["q_2"] == pytest.approx(heat / 2 - across, rel=1e-9)
+    profile = np.linspace(0.0, 1.0, 20001)
+    T = T_1 + (T_2 - T_1) * profile + ETA * v**2 / (2 * K_M) * profile * (1 - profile)
+    assert values["T_c"] == pytest.approx(np.trapezoid(T, profile), rel=1e-8)
+
+
+@pytest.mark.parametrize("alphas", [(1.0, 1.0), (0.9, 0.2)])
+def test_heat_made_across_a_gas_passes_the_jump_at_each_wall(alphas):
+    T_1, T_2, d = 300.0, 320.0, 1e-7
+    given = {"alpha_1": alphas[0], "alpha_2": alphas[1]}
+    scene = between_walls(T_1, T_2, 200.0, law=RarefiedFilm, given={}, **given)
+    scene = dataclasses.replace(
+        scene, interface=dataclasses.replace(scene.interface, medium=medium("Nitrogen", 1e5, d))
+    )
+    values = steady(scene)
+    fluid, T_c = CoolPropFluid("Nitrogen", 1e5), values["T_c"]
+    gas = {name: float(fluid.values(name, np.array([T_c]))[0]) for name in ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m")}
+    law = RarefiedFilm(between=("lower", "upper"), **given)
+    r_1, r, r_2 = law.resistances(**gas, p_m=1e5, d_m=d)
+    # T = level + slope y - heat r y^2 / 2 across the film; at each wall the flux passes the resistance of the jump.
+    heat = gas["eta_m"] * 200.0**2 / d
+    jumps = [[1.0, -r_1 / r], [1.0, 1.0 + r_2 / r]]
+    level, slope = np.linalg.solve(jumps, [T_1, T_2 + heat * (r / 2 + r_2)])
+    assert T_c == pytest.approx(level + slope / 2 - heat * r / 6, rel=1e-8)
+    assert values["q_1"] == pytest.approx(slope / r, rel=1e-6)
+    assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
+
+
+@pytest.mark.parametrize("Na", [0.01, 1.0, 18.2, 1e4])
+def test_couette_flow_solves_its_boundary_value_problem(Na):
+    """By SciPy, with the temperature in 1/beta, the velocity in v and the traction in eta v / d."""
+    beta, T_w = 0.04, 300.0
+    v = np.sqrt(Na * K_M / (beta * ETA))
+    exact = CouetteFlow(T_w=T_w, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v).solution(0.0)
+
+    def film(_, z):
+        shear = z[3] * np.exp(z[0])
+        return np.vstack([z[1], -Na * z[3] * shear, shear, 0 * shear])
+
+    y = np.linspace(0.0, 1.0, 401)
+    rise, traction = beta * (exact["T_max"] - T_w), exact["t_t"] * D_M / (ETA * v)
+    start = np.vstack([4 * rise * y * (1 - y), 4 * rise * (1 - 2 * y), y, 0 * y + traction])
+    ends = lambda a, b: np.array([a[0], b[0], a[2], b[2] - 1])  # noqa: E731
+    found = solve_bvp(film, ends, y, start, tol=1e-9, max_nodes=200000)
+    assert found.success
+    fine = np.linspace(0.0, 1.0, 8001)
+    assert traction == pytest.approx(found.sol(0.5)[3], rel=1e-7)
+    assert rise == pytest.approx(found.sol(0.5)[0], rel=1e-7)
+    assert beta * (exact["T_c"] - T_w) == pytest.approx(simpson(found.sol(fine)[0], x=fine), rel=1e-6)
+
+
+def test_couette_flow_bears_most_at_the_nahme_fold():
+    """At the fold lambda tanh lambda = 1, beta (tau d)^2 / (k eta) = 8 lambda^2 / cosh^2 lambda."""
+    fold = brentq(lambda x: x * np.tanh(x) - 1, 1.0, 2.0)
+    v = np.sqrt(8 * K_M / (0.04 * ETA)) * np.sinh(fold) * np.array([0.99, 1.0, 1.01])
+    films = [CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=0.04, v=x) for x in v]
+    before, most, beyond = (float(film.solution(0.0)["t_t"]) for film in films)
+    assert before < most > beyond
+    assert films[1].nahme == pytest.approx(18.2, abs=0.02)
+    assert 0.04 * (most * D_M) ** 2 / (K_M * ETA) == pytest.approx(8 * fold**2 / np.cosh(fold) ** 2, rel=1e-13)
+
+
+@pytest.mark.parametrize(("Na", "rise", "traction"), [(1e-3, 2e-5, 1e-8), (1.0, 0.014, 0.0017), (18.2, 0.043, 0.097)])
+def test_a_film_that_thins_stays_near_couette_flow_up_to_the_nahme_fold(Na, rise, traction):
+    """The film has one temperature, and its viscosity; the solution across it has both everywhere."""
+    beta = 0.04
+    v = np.sqrt(Na * K_M / (beta * ETA))
+    thinning = Varying(ETA, (Exponential(beta=beta),))
+    values = steady(between_walls(300.0, 300.0, v, thinning))
+    exact = CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v).solution(0.0)
+    assert values["T_c"] - 300.0 == pytest.approx(exact["T_c"] - 300.0, rel=rise)
+    assert values["t_viscous"] == pytest.approx(exact["t_t"], rel=traction)
+
+
+@pytest.mark.parametrize("T_c", [250.0, 320.0, 340.0, 345.0, 352.0, 700.0])
+def test_a_film_produces_entropy_whatever_its_temperature(T_c):
+    scene = dataclasses.replace(between_walls(250.0, 450.0, 0.0), initial={"T_c": T_c})
+    assert np.all(computed(solved(scene, 0.0, 1e-6, 1e-4, 1e-2))["sigma_film"] > 0)
+
+
+def test_a_film_on_one_wall_in_perfect_contact():
+    """With the mean temperature of the film at that of one wall the profile reaches the other by 4 k/d."""
+    scene = between_walls(300.0, 310.0, 10.0)
+    pair = Body("lower", "T_1", Constant(C=1e3)), scene.bodies[1]
+    interface = dataclasses.replace(scene.interface, temperature="T_1")
+    joined = dataclasses.replace(scene, bodies=pair, interface=interface, initial={"T_1": 300.0})
+    values = computed(solved(joined, 0.0, 0.1))
+    assert values["q_2"] == pytest.approx(4 * K_M / D_M * (values["T_1"] - 310.0), rel=1e-9)
+    assert audit(solved(joined, 0.0, 0.1)).energy_error < 1e-9
+
+
 # -- runs that leave the range ----------------------------------------------------------------------------------------
 
 
@@ -132,7 +258,7 @@ def test_a_run_that_leaves_the_range_goes_on_with_a_wider_one(monkeypatch):
 
 
 def test_an_algebraic_temperature_beyond_the_first_range_is_found():
-    scene = lubricated(medium("Nitrogen", thickness=5e-4), v=500.0, capacity=False)
+    scene = lubricated(medium("Nitrogen", thickness=5e-4), v=870.0, capacity=False)
     trajectory = solved(scene, 0.0, 1.0)
     values = computed(trajectory)
     assert values["T_c"][0] > 340.0

@@ -67,6 +67,8 @@ def heat_paths(build: Build) -> None:
     """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
     for paths in _by_ends(build):
         _between(build, paths)
+    for law in (law for law in build.scene.heat if _made_across(law)):
+        _through_film(build, law)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
             _external_heat(build, member, Q)
@@ -128,21 +130,66 @@ def _by_ends(build: Build) -> list[list[_Path]]:
     """The heat paths, those between the same two ends together."""
     groups: dict[frozenset[str], list[_Path]] = {}
     for law in build.scene.heat:
-        if law.closure == "mean":
+        if law.closure == "mean" or _made_across(law):
             continue
         for path in _paths(build, law):
             groups.setdefault(frozenset(path.ends), []).append(path)
     return list(groups.values())
 
 
+def _two_temperatures(build: Build, law: HeatTransfer) -> None:
+    """A path between two bodies that share one temperature carries nothing."""
+    first, second = (end_node(build, end, law.place) for end in law.between)
+    if first is second:
+        a, b = law.between
+        raise InputError(f"the heat path between {a} and {b} has one temperature, {first.name}; remove it.", law.place)
+
+
+def _made_across(law: HeatTransfer) -> bool:
+    """Whether a law carries heat through a film in which it is also made, all across."""
+    return law.closure == "medium" and hasattr(law, "resistances")
+
+
+def _through_film(build: Build, law: HeatTransfer) -> None:
+    r"""Heat that a film at the mean temperature T_c gives its walls.
+
+    Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
+    walls, beyond which the temperatures are :math:`T_k`,
+
+    .. math:: q_1 = \frac{6 (r + 2 r_2) (T_c - T_1) - 2 r (T_2 - T_1)}{r^2 + 4 r (r_1 + r_2) + 12 r_1 r_2}
+
+    and :math:`q_2` likewise. Without a film, r = 0, each wall would have its own path; without resistance of the walls
+    the first coefficient is 6/r, and the second takes back what the two paths in series conduct beyond 1/r.
+    """
+    check_closure(build, law)
+    _two_temperatures(build, law)
+    centre, ends = end_node(build, "interface", law.place), [end_node(build, end, law.place) for end in law.between]
+    bound = build.variables.bind(law, f"heat.{law.name()}")
+    r_1, r, r_2 = build.variables.call(bound, bound.resistances)
+    build.law_ranges(law)
+    build.law_margins(law, {})
+    scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
+    beside = -2 * r / scale * (ends[1].T - ends[0].T)
+    production = symengine.Integer(0)
+    for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
+        h = 6 * (r + 2 * wall) / scale
+        build.conductances["interface", end] = [*build.conductances.get(("interface", end), []), h]
+        text = f"heat flux from the film into {end}"
+        flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
+        q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
+        node.inflow.append(q)
+        centre.inflow.append(-q)
+        receive(build, end, q, law.channel)
+        receive(build, "interface", -q, law.channel)
+        production += q * (centre.T - node.T) / (centre.T * node.T)
+    # Booked as one: heat that a wall takes from a film colder than itself has come through it from the other wall.
+    build.production(build.unique("film"), "heat flow through the film", production)
+
+
 def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
     """The path of a law, or through the medium two paths of twice the conductance."""
     a, b = law.between
-    from_node, to_node = (end_node(build, end, law.place) for end in law.between)
-    if from_node is to_node:
-        raise InputError(
-            f"the heat path between {a} and {b} has one temperature, {from_node.name}; remove it.", law.place
-        )
+    _two_temperatures(build, law)
     channels = conductances(build, law)
     if law.closure == "direct":
         yield _Path((a, b), channels)

@@ -1,4 +1,12 @@
-"""Heat that goes from the interface into both bodies alike."""
+r"""Heat that goes from the interface into both bodies alike.
+
+Its driving force is the temperature of the interface over the harmonic mean of the bodies, so that the production of
+both fluxes is a square,
+
+.. math:: \sigma = h_m \left( T_c - \frac{2 T_1 T_2}{T_1 + T_2} \right)^2 \frac{T_1 + T_2}{T_1 T_2 T_c} \ge 0,
+
+though one of the two alone may run uphill: into the hotter body, from an interface between both temperatures.
+"""
 
 from __future__ import annotations
 
@@ -38,5 +46,18 @@ def _into_both(build: Build, channels: dict[str, Expression]) -> None:
         for end, share in ((bodies[0], heat), (bodies[1], heat), ("interface", -2 * heat)):
             receive(build, end, share, channel)
     sum_h = symengine.Add(*channels.values())
+    _warn_of_uphill(build, bodies)
     production = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
     build.production(flux.name, "heat flow from interface to each body", production)
+
+
+def _warn_of_uphill(build: Build, bodies: list[str]) -> None:
+    """Say where an interface heats a body that is hotter than itself."""
+    (cold, _), (hot, name) = sorted((build.at_start(build.node_of[body].T), body) for body in bodies)
+    if hot > cold:
+        harmonic = 2 * cold * hot / (cold + hot)
+        build.warnings.append(
+            f"`closure: mean` heats both bodies alike: as they start, {name} also from an interface that is cooler "
+            f"than itself, between {harmonic:.6g} K and {hot:.6g} K. Their entropy production together is positive. "
+            "Where no heat should flow uphill, give paths from each body to the interface."
+        )

@@ -16,6 +16,16 @@ class Film(HeatTransfer):
     The conductivity is that of the medium at :math:`T_c`. Source: Fourier's law. Films that are thick against the mean
     free path, and thin enough not to convect.
 
+    With ``closure: medium`` :math:`T_c` is the mean temperature of the film and heat is made all across it, as by
+    shear: the profile is a parabola on a line, and the film gives the wall k
+
+    .. math:: q_k = \frac{6 k_m}{d_m} \left( T_c - \frac{T_1 + T_2}{2} \right) + \frac{k_m}{d_m} (T_l - T_k),
+              \quad l \ne k
+
+    exact in the steady state where heat is made evenly. Its entropy production is positive while the ratio of the two
+    temperatures is below 7. Source: plane Couette flow with viscous heating (Bird, Stewart & Lightfoot, Transport
+    Phenomena, 2002, section 10.4).
+
     >>> round(Film(between=("lower", "upper")).conductance(k_m=0.026, d_m=1e-5), 9)
     2600.0
     """
@@ -26,6 +36,10 @@ class Film(HeatTransfer):
     def conductance(self, k_m: Expression, d_m: Expression) -> Expression:
         """Conductance [W/(m^2 K)]."""
         return k_m / d_m
+
+    def resistances(self, k_m: Expression, d_m: Expression) -> tuple[Expression, Expression, Expression]:
+        """Thermal resistances of walls and film [m^2 K/W]."""
+        return 0, d_m / k_m, 0
 
 
 class RarefiedFilm(HeatTransfer):
@@ -64,10 +78,24 @@ class RarefiedFilm(HeatTransfer):
         d_m: Expression,
     ) -> Expression:
         """Conductance [W/(m^2 K)]."""
-        walls = (2 - self.alpha_1) / self.alpha_1 + (2 - self.alpha_2) / self.alpha_2
+        return 1 / sum(self.resistances(k_m, eta_m, rho_m, cp_m, gamma_m, p_m, d_m))
+
+    def resistances(
+        self,
+        k_m: Expression,
+        eta_m: Expression,
+        rho_m: Expression,
+        cp_m: Expression,
+        gamma_m: Expression,
+        p_m: Expression,
+        d_m: Expression,
+    ) -> tuple[Expression, Expression, Expression]:
+        """Thermal resistances of the jump at each wall, and of the gas between [m^2 K/W]."""
         mean_free_path = eta_m * sqrt(math.pi / (2 * p_m * rho_m))
         prandtl = eta_m * cp_m / k_m
-        return k_m / (positive(d_m) + self.Y + walls * 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl)
+        jump = 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl
+        first, second = ((2 - alpha) / alpha * jump / k_m for alpha in (self.alpha_1, self.alpha_2))
+        return first, (positive(d_m) + self.Y) / k_m, second
 
 
 class FilmShear(Friction):
