@@ -42,6 +42,11 @@ class Node:
         """Free energy of the node [J/m^2]."""
         return sum(self.energies.values(), symengine.Integer(0))
 
+    @property
+    def takes_heat(self) -> bool:
+        """Whether heat stays in it, or is taken from outside; what stores none passes it on at once."""
+        return self.prescribed or second(self.free_energy, self.T) != 0
+
     def capacity(self) -> Expression:
         """Heat capacity -T F_TT [J/(m^2 K)]; zero where nothing stores heat."""
         return -self.T * second(self.free_energy, self.T)

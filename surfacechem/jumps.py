@@ -18,7 +18,7 @@ from surfacechem.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.springs import stored
 from surfacechem.system import Account, System
-from surfacechem.transitions import HELD, Transition
+from surfacechem.transitions import HELD, INTERFACE, Sink, Transition
 
 Array = NDArray[np.float64]
 
@@ -138,18 +138,65 @@ class Jumper:
         books = [system.jump_energy, system.find("S_total").expression, *system.given.values()]
         return compile_function(system.inputs, [system.expand(item) for item in books])
 
-    def _sink_function(self, kind: str) -> Function:
-        """What a jump conserves; then temperature, share, energy and capacity of each sink."""
-        if kind not in self._sink_functions:
-            sinks = self.system.sinks[kind]
-            columns = [item for s in sinks for item in (s.T, s.share, s.energy, derivative(s.energy, s.T))]
-            expressions = [self.system.expand(item) for item in (self.system.jump_energy, *columns)]
-            self._sink_functions[kind] = compile_function(self.system.inputs, expressions)
-        return self._sink_functions[kind]
+    @cached_property
+    def _energy(self) -> Function:
+        """What a jump conserves."""
+        return compile_function(self.system.inputs, [self.system.expand(self.system.jump_energy)])
 
     @cached_property
-    def _sink_functions(self) -> dict[str, Function]:
-        return {}
+    def _nodes(self) -> dict[str, Sink]:
+        """Everything that takes heat of jumps, by the name of the node."""
+        return {sink.node: sink for sinks in self.system.sinks.values() for sink in sinks}
+
+    @cached_property
+    def _takers(self) -> Function:
+        """Temperature, energy and capacity of each node, and its part of the heat that each maker makes."""
+        shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
+        columns = [
+            item
+            for name, s in self._nodes.items()
+            for item in (s.T, s.energy, derivative(s.energy, s.T), *(share.get(name, 0) for share in shares))
+        ]
+        return compile_function(self.system.inputs, [self.system.expand(item) for item in columns])
+
+    @cached_property
+    def _stages(self) -> list[tuple[str, list[int]]]:
+        """The axes along which gaps move in a jump, and the columns of their states: the normal goes ahead."""
+        moved: dict[str, set[str]] = {}
+        for e in sorted(self.system.equilibria, key=lambda e: e.axis):
+            moved.setdefault(e.axis, set()).update((e.state, *e.along))
+        return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
+
+    def _made(self, rows: Array, item: Transition, start: Point, energy: float) -> Array:
+        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers).
+
+        The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
+        the normal gap is where it goes to.
+        """
+        makers = list(self.system.sinks)
+        made = np.zeros((len(rows), len(makers)))
+
+        def maker(axis: str) -> int:
+            return makers.index(axis if axis in makers and item.sinks != "snap" else INTERFACE)
+
+        level = self._energy(start.inputs())[0]
+        made[:, maker("n" if item.sinks == "joint" else INTERFACE)] += energy - level
+        here = np.repeat(start.inputs()[None], len(rows), axis=0)
+        here[:, 1 + 2 * len(start.y) :] = rows[:, 1 + 2 * len(start.y) :]
+        for axis, columns in self._stages:
+            here[:, columns] = rows[:, columns]
+            now = self._energy(here)[:, 0]
+            slides = self._slides(rows) & (axis != "n")
+            with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
+                fall = level - now
+            made[~slides, maker(axis)] += fall[~slides]
+            made[slides, maker(INTERFACE)] += fall[slides]
+            level = now
+        return made
+
+    def _slides(self, rows: Array) -> NDArray[np.bool_]:
+        slip = self.equilibria.slip
+        return np.zeros(len(rows), dtype=bool) if slip is None else rows[:, 1 + 2 * len(self.states) + slip] != 0
 
     def make(
         self,
@@ -181,12 +228,12 @@ class Jumper:
         if item.settles:
 
             def heat(rows: Array) -> Array:
-                return self._temperatures(rows, item.sinks, energy)[0]
+                return self._temperatures(rows, self._made(rows, item, start, energy))
 
             after = self._rested(index, start, lost, heat, balanced)
             after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
         beyond = self._beyond(item, after)
-        heated = self._heated(after, item.sinks, energy) if after is not None and not beyond else None
+        heated = self._heated(after, item, start, energy) if after is not None and not beyond else None
         if heated is None:
             obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
@@ -288,50 +335,53 @@ class Jumper:
         entropies = self._books(rows)[:, 1]
         return float(np.sum(np.abs(entropies[1:] - entropies[0])))
 
-    def _heated(self, point: Point, kind: str, energy: float) -> tuple[Point, float, float, float] | None:
-        """The point with the released energy in its sinks: point, energy, heat and entropy passed to reservoirs."""
+    def _heated(
+        self, point: Point, item: Transition, start: Point, energy: float
+    ) -> tuple[Point, float, float, float] | None:
+        """The point with the heat made in its nodes: point, energy, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
-        heated, released = self._temperatures(rows, kind, energy)
+        made = self._made(rows, item, start, energy)
+        made[np.abs(made) <= self._rounding(point, energy)] = 0.0
+        if not np.any(made):
+            return point, 0.0, 0.0, 0.0
+        heated = self._temperatures(rows, made)
         if not np.all(np.isfinite(heated)):
             return None
-        heat, entropy, total = 0.0, 0.0, float(released[0])
-        if abs(total) <= self._rounding(point, kind):
-            return point, 0.0, 0.0, 0.0
-        if any(s.prescribed for s in self.system.sinks[kind]):
-            values = self._sink_function(kind)(rows)[0, 1:].reshape(-1, 4)
-            for s, (T, share, _, _) in zip(self.system.sinks[kind], values.tolist(), strict=True):
-                heat += share * total if s.prescribed else 0.0
-                entropy += share * total / T if s.prescribed else 0.0
-        return Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters), total, heat, entropy
+        T, _, _, taken = self._taken(rows, made)
+        passed = np.array([node.prescribed for node in self._nodes.values()])
+        heat, entropy = float(np.sum(taken[0, passed])), float(np.sum((taken / T)[0, passed]))
+        after = Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters)
+        return after, float(np.sum(made)), heat, entropy
 
-    def _rounding(self, point: Point, kind: str) -> float:
-        """Energy that the last digits of the states and of the energy itself stand for [J/m^2]."""
+    def _rounding(self, point: Point, energy: float) -> float:
+        """Energy that the last digits of the states and of the energies themselves stand for [J/m^2]."""
         rows = np.repeat(point.inputs()[None], 1 + len(point.y), axis=0)
         states = slice(1, 1 + len(point.y))
         rows[1:, states] *= 1 + DIGITS * np.eye(len(point.y))
-        energies = self._sink_function(kind)(rows)[:, 0]
-        return float(np.sum(np.abs(energies[1:] - energies[0])) + DIGITS * abs(energies[0]))
+        energies = self._energy(rows)[:, 0]
+        return float(np.sum(np.abs(energies[1:] - energies[0])) + DIGITS * max(abs(energies[0]), abs(energy)))
 
-    def _temperatures(self, rows: Array, kind: str, energy: float) -> tuple[Array, Array]:
-        """Inputs with the temperatures that take up what is missing from the energy, and the energy released."""
-        sinks, function = self.system.sinks[kind], self._sink_function(kind)
-        free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(sinks) if not s.prescribed]
-        values = function(rows)
-        now = values[:, 1:].reshape(len(rows), -1, 4)
-        with np.errstate(invalid="ignore", over="ignore"):  # far away from where it begins a search may see no number
-            released = energy - values[:, 0]
-            target = now[:, :, 2] + now[:, :, 1] * released[:, None]
-        rows = rows.copy()
+    def _taken(self, rows: Array, made: Array) -> tuple[Array, Array, Array, Array]:
+        """Temperature, energy and capacity of each node, and the heat that it takes, each of shape (rows, nodes)."""
+        values = self._takers(rows).reshape(len(rows), len(self._nodes), -1)
+        T, U, C = (values[:, :, i] for i in range(3))
+        return T, U, C, np.einsum("ijk,ik->ij", values[:, :, 3:], made)
+
+    def _temperatures(self, rows: Array, made: Array) -> Array:
+        """Inputs with the temperatures of the nodes after they have taken the heat that is made."""
+        free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(self._nodes.values()) if not s.prescribed]
+        _, U, C, taken = self._taken(rows, made)
+        target, rows = U + taken, rows.copy()
         for _ in range(NEWTON if free else 0):
             done = True
             for j, column in free:
                 T = rows[:, column]
-                change = (target[:, j] - now[:, j, 2]) / now[:, j, 3]
+                change = (target[:, j] - U[:, j]) / C[:, j]
                 moved = T + change
                 done = done and not np.any(np.abs(change) > 4e-16 * np.abs(T))
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
                 rows[:, column] = np.where(moved > 0, moved, np.nan)
             if done:
                 break
-            now = function(rows)[:, 1:].reshape(len(rows), -1, 4)
-        return rows, released
+            _, U, C, _ = self._taken(rows, made)
+        return rows

@@ -228,7 +228,7 @@ class System:
     transitions: tuple[Transition, ...] = ()
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
-    """Who takes the energy that a jump releases, by the kind of the jump."""
+    """Who takes the heat of a jump, by what makes it: the interface, or the support of an axis."""
     given: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps, and what impacts rub off a drive [J/m^2], by account of the work."""
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)

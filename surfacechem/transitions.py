@@ -14,6 +14,9 @@ SIDE = "mode.side"
 SLIP = "mode.slip"
 """Path of the mode that says whether the interface sticks or slides, and in which direction."""
 
+INTERFACE = "interface"
+"""Who makes heat in a jump, where it is not the support of an axis."""
+
 HELD = "run.held_until"
 """Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
 
@@ -56,7 +59,7 @@ class Transition:
     """Something that must stay positive in the present modes; where it reaches zero, modes and state jump.
 
     ``modes`` and ``jump`` give new values as expressions of the old state. Then the gaps in ``settles`` find the next
-    equilibrium, and the energy that this releases goes into the nodes of ``sinks``, in their shares.
+    equilibrium, and the energy that this releases is heat where ``sinks`` says.
     """
 
     name: str
@@ -66,7 +69,10 @@ class Transition:
     jump: Mapping[Any, Expression] = field(default_factory=dict)
     settles: bool = False
     sinks: str = "joint"
-    """'joint': the bodies take the released energy; 'local': the interface does."""
+    """Who makes heat of what it releases before gaps move: 'joint', what supports the bodies along the normal; 'local',
+    the interface. Then each gap that moves is damped by its own support, and what slides makes the heat of friction. In
+    a 'snap' the interface, which has given way, makes it all.
+    """
     fold: Fold | None = None
     """What makes it a fold, where it is one."""
     passes: bool = False
@@ -99,10 +105,15 @@ class Equilibrium:
     slides: int = 0
     """Direction in which the interface slides where it opens, 1 or -1; 0 where it is balanced in any mode."""
 
+    @property
+    def axis(self) -> str:
+        """The axis along which it moves."""
+        return self.state.partition("_")[2]
+
 
 @dataclass(frozen=True)
 class Sink:
-    """A temperature node that takes part of the energy released in a jump; a prescribed one passes it on."""
+    """A temperature node that takes part of the heat made in a jump; a prescribed one passes it on."""
 
     node: str
     T: Expression

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import symengine
 
-from surfacechem.assembly.build import NOTHING, Build
+from surfacechem.assembly.build import BOTH, NOTHING, Build
 from surfacechem.assembly.memory import memory
 from surfacechem.assembly.mounting import ACROSS, Direction
 from surfacechem.assembly.resistance import resist, resistance, stick_limit
@@ -83,6 +83,34 @@ def _shares_margin(build: Build) -> None:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
         build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
+
+
+def takers(build: Build) -> list[tuple[Node, Expression]]:
+    """Who takes the heat that the interface makes in no time, and which part of it.
+
+    The interface itself, the ends of its heat without a medium, or, where it stores none, the ends of its paths: its
+    temperature rises until these carry off all of it, in proportion to their conductances.
+    """
+    centre = build.node_of.get("interface")
+    if centre is None:
+        return [(build.node_of[end], share) for end, share in build.shares().items()]
+    if centre.takes_heat:
+        return [(centre, symengine.Integer(1))]
+    ways = [
+        (build.node_of[end], _area(build, pair) * h)
+        for pair, channels in build.conductances.items()
+        if "interface" in pair
+        for end in (build.into_body if pair == BOTH else set(pair) - {"interface"})
+        for h in channels
+    ]
+    whole = symengine.Add(*(h for _, h in ways))
+    conducts = where(whole > 0, whole, 1)
+    return [(node, where(whole > 0, h / conducts, symengine.Rational(1, len(ways)))) for node, h in ways]
+
+
+def _area(build: Build, ends: Collection[str]) -> Expression:
+    """Area of a path over the reference area: heat leaves to the surroundings through the latter."""
+    return symengine.Integer(1) if "surroundings" in ends else build.stretch
 
 
 def _share(build: Build, heat: Expression, channel: str) -> None:
@@ -205,7 +233,7 @@ def _between(build: Build, paths: list[_Path]) -> None:
     """All paths between two ends: a flux of each channel where there are several, and their sum."""
     a, b = paths[0].ends
     from_node, to_node = end_node(build, a), end_node(build, b)
-    area = symengine.Integer(1) if "surroundings" in (a, b) else build.stretch
+    area = _area(build, (a, b))
     channels: dict[str, Expression] = {}
     for path in paths:
         for channel, h in path.channels.items():

@@ -45,6 +45,7 @@ def folds(build: Build) -> None:
             _bounded(tangent - FOLD),
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
             settles=True,
+            sinks="snap",
             fold=Fold(tangent, falls, relative, warming, str(_temperature(build))),
         )
     )

@@ -23,13 +23,11 @@ def load_steps(build: Build) -> None:
         return
     reason = f"{' or '.join(steps)} jumps"
     times = tuple(sorted({t for load in steps.values() for t in load.jumps()}))
-    # What moves along the interface alone rubs on it; a gap that opens leaves the bodies swinging.
-    sinks = "joint" if any(e.state == "g_n" for e in build.equilibria) else "local"
     never = symengine.Integer(1)
     known = {mode.symbol for mode in build.modes}
     modes = _closing(build) | {x: value for x, value in build.motion.jolted.items() if x in known}
     jump = {x: value for x, value in build.motion.jolted.items() if x not in known}
-    build.transitions.append(Transition("load", never, reason, modes, jump, settles=True, sinks=sinks, times=times))
+    build.transitions.append(Transition("load", never, reason, modes, jump, settles=True, times=times))
 
 
 def _histories(build: Build, name: str) -> set[Expression]:

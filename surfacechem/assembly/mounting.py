@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import symengine
 
 from surfacechem.assembly.build import Build
+from surfacechem.balances import Node
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
 from surfacechem.quantities import Quantity
@@ -166,6 +167,14 @@ class FarField:
             return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
 
+    def shares(self, build: Build) -> list[tuple[str, Expression]]:
+        """The bodies, and which part of what the support dissipates each takes."""
+        return list(zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True))
+
+    def takers(self, build: Build) -> list[tuple[Node, Expression]]:
+        """The same over the volume of the bodies."""
+        return [(node, share * part) for body, share in self.shares(build) for node, part in build.volume(body)]
+
     def yielding(self, g: Expression, traction: Expression) -> Expression:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
@@ -210,12 +219,12 @@ def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
         Account(Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}"), symbol, "dissipation", label)
     )
     produced = []
-    for body, share in zip(build.scene.bodies, (far.beta_1, 1 - far.beta_1), strict=True):
-        for node, part in build.volume(body.name):
-            node.inflow.append(share * part * symbol)
-            produced.append(share * part * symbol / node.T)
-        contact = build.volume(body.name)[0][1]
-        build.into_body[body.name].append(share * contact * symbol)
+    for node, share in far.takers(build):
+        node.inflow.append(share * symbol)
+        produced.append(share * symbol / node.T)
+    for body, share in far.shares(build):
+        contact = build.volume(body)[0][1]
+        build.into_body[body].append(share * contact * symbol)
     build.production(label, text, symengine.Add(*produced))
 
 

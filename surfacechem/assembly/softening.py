@@ -34,7 +34,7 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
     margin = where(mode > 0, (k + slope) / (k + absolute(slope)), 1)
     lost, none = -symengine.Integer(1), symengine.Integer(0)
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True)]
+    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True, sinks="snap")]
 
 
 def softening_mode(build: Build) -> None:

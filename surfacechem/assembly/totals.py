@@ -6,6 +6,7 @@ import symengine
 
 from surfacechem import balances
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.exchange import takers
 from surfacechem.assembly.sources import by_channel, by_source
 from surfacechem.balances import Node
 from surfacechem.errors import InputError
@@ -13,7 +14,7 @@ from surfacechem.expressions import Expression
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
 from surfacechem.system import Account
-from surfacechem.transitions import Sink
+from surfacechem.transitions import INTERFACE, Sink
 
 
 def totals(build: Build) -> None:
@@ -111,19 +112,15 @@ def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
 
 
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
-    """Who takes the energy that a jump releases: the bodies in a joint one, the interface in a local one."""
+    """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
     if not build.transitions:
         return {}
     _jump_accounts(build)
-    mounts = list(build.motion.far_fields.values())
-    first = mounts[0].beta_1 if mounts else symengine.Rational(1, 2)
-    halves = zip(build.scene.bodies, (first, 1 - first), strict=True)
-    bodies = _merged([(node, s * part) for b, s in halves for node, part in build.volume(b.name)])
     centre = build.node_of.get("interface")
-    stores = centre is not None and (centre.prescribed or balances.second(centre.free_energy, centre.T) != 0)
-    if not stores:
+    if centre is None or not centre.takes_heat:
         _refuse_local(build)
-    return {"joint": bodies, "local": _merged([(centre, symengine.Integer(1))]) if centre and stores else bodies}
+    supports = {axis: _merged(far.takers(build)) for axis, far in build.motion.far_fields.items()}
+    return {INTERFACE: _merged(takers(build)), **supports}
 
 
 def _refuse_local(build: Build) -> None:
