@@ -74,7 +74,11 @@ def test_a_local_jump_that_destroys_entropy_may_be_refused():
 
 
 def test_together_the_springs_pay():
-    (jump,) = run(release="joint").trajectory.jumps
+    trajectory = run(release="joint").trajectory
+    (jump,) = trajectory.jumps
+    states = [state.name for state in trajectory.model.system.states]
+    rises = dict(zip(states, jump.after.y - jump.before.y, strict=True))
+    assert [1.2 * rises["T_1"], 0.9 * rises["T_2"]] == pytest.approx([jump.released / 4, 3 * jump.released / 4])
     assert jump.released == pytest.approx(SPRING + 16 - bonds(90), rel=1e-9)
     assert jump.verdict == "admissible"
 
