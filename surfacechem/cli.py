@@ -85,6 +85,7 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Run a case, write its dataset and print a summary."""
+    from surfacechem.netcdf import dataset_path
     from surfacechem.simulation import load
 
     simulation = load(case, changes or ())
@@ -92,7 +93,7 @@ def run(
     target = output or Path(f"{simulation.case.name}.nc")
     if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
-    refuse_unwritable(target)
+    refuse_unwritable(dataset_path(target))
     solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
     solution.write(target)
     _conclude(solution, target, quiet)
@@ -131,12 +132,13 @@ def sweep(
     quiet: Quiet = False,
 ) -> None:
     """Run a case over values of its parameters and write one dataset."""
+    from surfacechem.netcdf import dataset_path
     from surfacechem.overrides import assignments
     from surfacechem.report import sweep_summary
     from surfacechem.simulation import load
 
     simulation = load(case, changes or ())
-    target = output or Path(f"{simulation.case.name}-sweep.nc")
+    target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
     solution = solved(lambda: simulation.sweep(values, end), quiet)
@@ -267,14 +269,14 @@ def plot(
     changes: Changes = None,
 ) -> None:
     """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
-    is_file = source.endswith((".nc", ".nc4", ".cdf"))
+    from surfacechem import plots
+    from surfacechem.netcdf import SUFFIXES, replacing
+
+    is_file = source.endswith(SUFFIXES)
     target = output or Path(f"{Path(source).stem}.png")
     kind = picture_kind(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    from surfacechem import plots
-    from surfacechem.netcdf import replacing
-
     refuse_unwritable(target)
     solution = None if is_file else _solved_case(source, changes)
     names = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
@@ -297,6 +299,8 @@ def _figure(dataset: Dataset, variables: list[str] | None, against: str | None) 
     from surfacechem import plots, sweep_plots
 
     swept = "sweep" in dataset.attrs
+    if swept and against:
+        raise InputError("a sweep is plotted over what it sweeps; runs have other axes.", Place(path="--against"))
     return sweep_plots.figure(dataset, variables) if swept else plots.figure(dataset, variables, against)
 
 
@@ -325,10 +329,11 @@ def rerun(
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""
     from surfacechem import rerun as again
+    from surfacechem.netcdf import dataset_path
 
     record = again.read(file)
     if output:
-        refuse_unwritable(output)
+        refuse_unwritable(dataset_path(output))
     solution = solved(lambda: again.run_again(record), quiet, brief=True)
     if output:
         solution.write(output)

@@ -32,7 +32,7 @@ Exit codes:
   0    finished
   1    rerun: the new values are not bit for bit those of the file
   2    bad input; nothing was computed
-  3    the run was stopped by physics; what it reached is written, with the reason
+  3    the run was stopped by physics, of a sweep every run; what it reached is written, with the reason
   4    the run failed numerically; what it reached is written
   130  interrupted; nothing was written
 """

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from surfacechem.compile import Program
 from surfacechem.pacing import too_fast
 from surfacechem.solvers.contract import REASONS, Points, Result, Status
+from surfacechem.starting import STABLE
 from surfacechem.system import Margin, State, System
 
 Array = NDArray[np.float64]
@@ -40,15 +41,18 @@ def cause(
 ) -> tuple[str, str]:
     """Status of a run that could not go on, and why, in words."""
     where = f"t = {result.t:.9g} s"
+    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
+    inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
     shrunk = closest_margin(program, margins, result)
     if shrunk is not None:
-        return "stopped", f"{shrunk} near {where}"
+        return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
         names = " and ".join(state.at_start[0].name for state in algebraic)
         reason = f"no {names} satisfies the balances that have no inertia or capacity"
         if all(state.quantity.unit == "K" for state in algebraic):
-            reason = f"ignition: no temperature {names} balances the heat that the interface produces"
+            stable = next(margin for margin in system.margins if margin.name == f"{STABLE}{algebraic[0].name}")
+            reason = system.reason(stable, np.nan_to_num(inputs))
         elif any(state.quantity.unit == "K" for state in algebraic):
             reason += ": ignition, or sliding that nothing steadies"
         return "stopped", f"{reason} at {where}"
@@ -57,15 +61,15 @@ def cause(
     return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
 
 
-def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> str | None:
-    """Reason of the margin that is closed, or all but closed and goes on closing, where a run could not go on."""
+def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
+    """The margin that is closed, or all but closed and goes on closing, where a run could not go on."""
     if program.margins is None or not margins:
         return None
     count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
     terminal = np.array([margin.terminal for margin in margins])
     last = _values(program, result, end, side="right")[0, :count]
     if np.any(closed := terminal & (last <= 0)):
-        return margins[int(np.argmax(closed))].reason
+        return margins[int(np.argmax(closed))]
     if result.steps is None or len(result.steps.t) < 2:
         return None
     seen, t = _values(program, result, result.steps)[:, :count], result.steps.t
@@ -75,7 +79,7 @@ def closest_margin(program: Program, margins: Sequence[Margin], result: Result) 
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
     closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < GONE))
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
-    return margins[nearest].reason if closing[nearest] and shrink[nearest] < STALLED else None
+    return margins[nearest] if closing[nearest] and shrink[nearest] < STALLED else None
 
 
 def _values(program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:

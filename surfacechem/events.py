@@ -304,7 +304,8 @@ class Hybrid:
         closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < least[i]]
         closed += [i for i in self.limits if now[i] <= NOISE * self.largest[i]]
         if closed and self.jumps:
-            self.status, self.reason = Status.EVENT, margins[closed[0]].reason
+            reason = self.system.reason(margins[closed[0]], self.jumps[-1].after.inputs())
+            self.status, self.reason = Status.EVENT, reason
         return bool(closed and self.jumps)
 
     def _due(self, now: Array, point: Point) -> int | None:

@@ -80,6 +80,15 @@ class Trajectory:
     seconds: float
     jumps: tuple[Jump, ...] = ()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but machine code, which is made again from the system."""
+        return {**vars(self), "result": replace(self.result, problem=self.result.problem.with_program(None))}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Give the problem the machine code that the model has made anew."""
+        problem = state["result"].problem.with_program(state["model"].program)
+        vars(self).update(state, result=replace(state["result"], problem=problem))
+
     @cached_property
     def rates(self) -> Array:
         """Time derivatives of the states at the output times, shape (times, states)."""
@@ -163,6 +172,10 @@ class Model:
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
         """Time to compile the equations, and the code of jumps once one has happened."""
+
+    def __reduce__(self) -> tuple[type[Model], tuple[System]]:
+        """Machine code is not pickled but made again from the system."""
+        return type(self), (self.system,)
 
     def _filler(self, inputs: list[Any]) -> Filler | None:
         outside = self.system.outside
@@ -321,7 +334,11 @@ class Model:
         if result.status is Status.EVENT:
             margin, fit = self.margins[int(result.events.index[-1])], self.system.fit
             fitted = fit is not None and margin.name == fit.margin
-            why = fit.reason(values, self._visited(result, fit.temperature)[-1]) if fit and fitted else margin.reason
+            if fit and fitted:
+                why = fit.reason(values, self._visited(result, fit.temperature)[-1])
+            else:
+                at = np.array([result.t])
+                why = self.system.reason(margin, self.inputs(result, at, result.y[None], result.ydot[None])[0])
             return "stopped", f"{why} at {where}"
         return cause(self.system, self.program, self.margins, result, values)
 

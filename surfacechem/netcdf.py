@@ -20,6 +20,9 @@ from surfacechem.errors import InputError, Place
 
 CONVENTIONS = "CF-1.11"
 
+SUFFIXES = (".nc", ".nc4", ".cdf")
+"""What names of netCDF files end with."""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -58,6 +61,19 @@ def versions() -> str:
     """Versions of what a result depends on."""
     names = ("surfacechem", "numpy", "numba", "symengine")
     return ", ".join(f"{name} {version(name)}" for name in names)
+
+
+def dataset_path(path: str | Path) -> Path:
+    """The path of a file that is to hold a dataset; InputError where its suffix is that of another format.
+
+    >>> dataset_path("run.nc").name
+    'run.nc'
+    """
+    target = Path(path)
+    if target.suffix and target.suffix.lower() not in SUFFIXES:
+        remedy = f"{', '.join(SUFFIXES)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
+        raise InputError(f"datasets are written as netCDF, not as '{target.suffix}': {remedy}", Place(str(path)))
+    return target
 
 
 @contextmanager

@@ -2,7 +2,8 @@ r"""The equations of an assembled scene as readable Python that runs, and as LaT
 
 The Python form is a module of four functions with the signature of the compiled ones: ``residual``, ``outputs``,
 ``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code returns NaN, this
-one raises at the line of the quantity concerned.
+one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed with its time, and
+the functions use those of the piece in which t lies unless they are given others.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def python(system: System, title: str = "") -> str:
     """The equations as the source of a Python module."""
     printer = _Python()
     functions = [_function(system, printer, name, text, rows) for name, (text, rows) in _functions(system).items()]
-    return "\n\n".join([_head(system, title), _parameters(system), *functions])
+    return "\n\n".join([_head(system, title), _parameters(system), *_pieces(system), *functions])
 
 
 def executable(system: System) -> ModuleType:
@@ -115,6 +116,48 @@ def _parameters(system: System) -> str:
     return "\n".join(["PARAMETERS = (", *lines, ")\n"])
 
 
+def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:
+    """Times [s] from which numbers of histories hold, and these numbers, in the order of :func:`changing`.
+
+    At its time a piece does not hold yet; the first one holds from the start.
+    """
+    loads = [system.parameters[j] for j in changing(system)]
+    found: list[tuple[float, tuple[float, ...]]] = []
+    for start in [0.0, *(t for t in system.breakpoints if t > 0)] if loads else []:
+        numbers = tuple(float(p.at(start)) for p in loads)
+        if not found or found[-1][1] != numbers:
+            found.append((start, numbers))
+    return found if len(found) > 1 else []
+
+
+def changing(system: System) -> list[int]:
+    """Places of the parameters that change from piece to piece of a history."""
+    return [j for j, p in enumerate(system.parameters) if p.load is not None]
+
+
+def _pieces(system: System) -> list[str]:
+    """The pieces of histories, and the function that finds the parameters of a time."""
+    found = pieces(system)
+    if not found:
+        return []
+    names = ", ".join(str(system.parameters[j].symbol) for j in changing(system))
+    rows = [f"    ({start!r}, {list(numbers)!r})," for start, numbers in found]
+    head = ["# From which time on [s], that time not included, histories have which numbers:", f"# {names}."]
+    table = "\n".join([*head, f"CHANGING = {changing(system)!r}", "PIECES = (", *rows, ")\n"])
+    return [table, PARAMETERS_AT]
+
+
+PARAMETERS_AT = '''\
+def parameters_at(t):
+    """The parameters of the piece in which a time lies, or which it ends."""
+    values = list(PARAMETERS)
+    numbers = next((numbers for start, numbers in reversed(PIECES) if start < t), PIECES[0][1])
+    for place, number in zip(CHANGING, numbers):
+        values[place] = number
+    return values
+'''
+
+
 def _parameter_text(parameter: Parameter) -> str:
     return _safe(f"[{parameter.spec.unit}] {parameter.spec.text} ({parameter.path})")
 
@@ -122,7 +165,10 @@ def _parameter_text(parameter: Parameter) -> str:
 def _function(system: System, printer: _Python, name: str, text: str, rows: Sequence[Row]) -> str:
     states = [state.name for state in system.states]
     rates = [str(state.dot) for state in system.states]
-    lines = [f"def {name}(t, y, ydot, parameters=PARAMETERS):", f'    """{text}"""']
+    pieced = bool(pieces(system))
+    usual = "None" if pieced else "PARAMETERS"
+    lines = [f"def {name}(t, y, ydot, parameters={usual}):", f'    """{text}"""']
+    lines += ["    parameters = parameters_at(t) if parameters is None else parameters"] if pieced else []
     for names, source in (
         (states, "y"),
         (rates, "ydot"),
@@ -264,6 +310,10 @@ def latex(system: System, title: str = "") -> str:
     printer = _Latex({"mul_symbol": r"\,", "fold_short_frac": False})
     heading = f"{title}: {system.regime}" if title else system.regime
     values = [f"%   {p.symbol} = {float(p.at(0.0))!r} {_parameter_text(p)}" for p in system.parameters]
+    names = [str(system.parameters[j].symbol) for j in changing(system)]
+    for start, numbers in pieces(system)[1:]:
+        then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
+        values.append(f"%   from {start!r} s on: {then}")
     wanted = needed(system.named, system.rows.values())
     others = [item for item in system.outputs if item not in wanted]
     lines = [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in wanted]

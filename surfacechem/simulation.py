@@ -57,6 +57,7 @@ class Simulation:
         self._sweep_models: dict[str, Model] = {}
         self._finer: dict[int, Simulation] = {}
         self._tightened: dict[float | None, Simulation] = {}
+        self._freed: dict[frozenset[str], Simulation] = {}
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -83,6 +84,9 @@ class Simulation:
         check_way(error)
         settings = run or self.case.run
         values = self._values(changes or {})
+        if (freed := self._with_freed(values)) is not self:
+            return freed.run(values, settings, error)
+        values = {path: value for path, value in values.items() if path not in self.system.constants}
         chosen, trajectory, errors = self._as_accurate(settings)._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
@@ -175,15 +179,22 @@ class Simulation:
         """Run a plan whose values are in SI."""
         from surfacechem import sweeping
 
+        constants = self.system.constants
+        values = self._values(changes or {})
+        swept = {axis.path: axis.values for axis in plan.axes if axis.path in constants}
+        others = {path: _besides(constants[path][1], xs) for path, xs in swept.items()}
+        if (freed := self._with_freed({**values, **others})) is not self:
+            return freed.sweep_plan(plan, values, threads)
+        values = {path: value for path, value in values.items() if path not in constants}
         if spatial.wanted(self.case.scene) is not None:
-            chosen = self._as_accurate(self.case.run)._resolved(self.case.run, self._values(changes or {}))[0]
+            chosen = self._as_accurate(self.case.run)._resolved(self.case.run, values)[0]
             if chosen is not self:
-                return chosen.sweep_plan(plan, changes, threads)
+                return chosen.sweep_plan(plan, values, threads)
         key = plan.until[0] if plan.until else ""
         try:
             if key not in self._sweep_models:
                 self._sweep_models[key] = Model(sweeping.prepared(self.system, plan)) if key else self.model
-            return sweeping.sweep(self.case, self._sweep_models[key], plan, self._values(changes or {}), threads)
+            return sweeping.sweep(self.case, self._sweep_models[key], plan, values, threads)
         except InputError as error:
             raise self.case.located(error) from None
 
@@ -202,15 +213,37 @@ class Simulation:
 
     @cached_property
     def _units(self) -> dict[str, str]:
-        return self.system.changeable
+        """Units of all that a run may change, by path, parameters at their defaults among them."""
+        system = self.system
+        return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
+
+    def _with_freed(self, values: Mapping[str, float]) -> Simulation:
+        """The simulation in whose equations stand symbols for the defaults that values depart from: the case with these
+        values, assembled anew; itself where no default is departed from.
+        """
+        constants = self.system.constants
+        departing = {path: x for path, x in values.items() if path in constants and x != constants[path][1]}
+        if not departing:
+            return self
+        paths = frozenset(departing)
+        if paths not in self._freed:
+            case = self.case
+            freed = cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides=departing)
+            self._freed[paths] = Simulation(replace(freed, run=case.run, file=case.file))
+        return self._freed[paths]
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
         units = self._units
         changes = {parameter_path(path, units): value for path, value in changes.items()}
         unknown = next((path for path in changes if path not in units), None)
         if unknown is not None:
-            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, units)}")
+            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
+
+
+def _besides(default: float, values: Sequence[float]) -> float:
+    """The first value that is not the default, else the next number."""
+    return next((value for value in values if value != default), math.nextafter(default, math.inf))
 
 
 def _listed(values: object) -> object:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.event_table import event_columns
-from surfacechem.netcdf import CONVENTIONS, Column, replacing, versions, write_netcdf
+from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, replacing, versions, write_netcdf
 from surfacechem.quantities import Quantity
 from surfacechem.solution import DATASET_NAMES
 from surfacechem.sweeps import Axis, Plan, Sweep
@@ -72,8 +72,13 @@ class SweepSolution:
 
     @property
     def status(self) -> str:
-        """'failed' if a run failed numerically, else 'finished'; that physics stops a run is a result of a sweep."""
-        return "failed" if any(status == "failed" for status, _ in self.sweep.ends) else "finished"
+        """'failed' if a run failed numerically, 'stopped' if physics stopped all of them, else 'finished'.
+
+        That physics stops some runs is a result of a sweep; that all bonds break is what a spectrum is made for.
+        """
+        every = {status for status, _ in self.sweep.ends}
+        stopped = every == {"stopped"} and not self.sweep.statistics
+        return "failed" if "failed" in every else "stopped" if stopped else "finished"
 
     @cached_property
     def axes(self) -> dict[str, Axis]:
@@ -241,7 +246,7 @@ class SweepSolution:
 
     def write(self, path: str | Path) -> Path:
         """Save as netCDF; the file appears whole or not at all."""
-        target = Path(path)
+        target = dataset_path(path)
         with replacing(target) as temporary:
             write_netcdf(temporary, self.columns, self.attributes)
         return target

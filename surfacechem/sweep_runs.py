@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,16 +33,17 @@ def prepared(system: System, plan: Plan) -> System:
     """The system that a sweep compiles: with statistics of rupture where a load grows until bonds break."""
     if plan.until is None:
         return system
+    origin = partial(prepared, system, plan)
     if (holding := system.holding) is not None:
         again = replace(holding, again=lambda sides: prepared(holding.again(sides), plan))
         system = replace(system, holding=again)
     spectrum.history(system, plan.until[0])
     if spectrum.breaks_bonds(system):
-        return spectrum.with_rupture(system, plan.until[0])
+        return replace(spectrum.with_rupture(system, plan.until[0]), origin=origin)
     if spectrum.evolves_bonds(system):
         warning = "bonds can form again, so that their loss is no spectrum of rupture forces: none is given."
-        return replace(system, warnings=(*system.warnings, warning))
-    return system
+        return replace(system, warnings=(*system.warnings, warning), origin=origin)
+    return replace(system, origin=origin)
 
 
 def solve(

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,15 @@ class Sweep:
     seconds: float
     """Run time of the whole batch."""
     exact: Mapping[str, Array] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but machine code, which is made again from the system."""
+        return {**vars(self), "problems": [problem.with_program(None) for problem in self.problems]}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Give the problems the machine code that the model has made anew."""
+        program = state["model"].program
+        vars(self).update(state, problems=[problem.with_program(program) for problem in state["problems"]])
 
     def __len__(self) -> int:
         """Number of runs."""

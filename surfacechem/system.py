@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from surfacechem.refit import Fit
 from surfacechem.scene import Engine
 from surfacechem.terms import Load, Spec
 from surfacechem.transitions import Equilibrium, Mode, Sink, Transition
+
+Array = NDArray[np.float64]
 
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
@@ -143,6 +146,8 @@ class Margin:
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
     domain: bool = False
     """Whether a law ends there, so that no equilibrium lies beyond."""
+    below: tuple[Expression, str] | None = None
+    """An expression, and the reason where it is below zero as the margin closes."""
 
 
 @dataclass(frozen=True)
@@ -244,6 +249,17 @@ class System:
     outside: Outside | None = None
     holding: Holding | None = None
     """How the bonding state is held at its bounds, where a law could carry it there."""
+    constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
+    """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
+    unless they are assembled with another value."""
+    origin: partial[System] | None = None
+    """What makes it anew, to the last bit: a pickle keeps this and no expressions."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Expressions are not pickled but made again, in the same order."""
+        if self.origin is None:
+            raise PicklingError("a system that was not assembled from a scene cannot be pickled.")
+        return self.origin.func, self.origin.args
 
     @cached_property
     def definitions(self) -> dict[Any, Expression]:
@@ -289,6 +305,14 @@ class System:
     def outputs(self) -> tuple[Named, ...]:
         """The named quantities that go into the dataset."""
         return tuple(item for item in self.named if item.output)
+
+    def reason(self, margin: Margin, inputs: Array) -> str:
+        """Why a margin closed, at the arguments of compiled functions there."""
+        if margin.below is None:
+            return margin.reason
+        sign, other = margin.below
+        value = symengine.Lambdify(self.inputs, [self.expand(sign)], backend="lambda")(inputs)[0]
+        return other if value < 0 else margin.reason
 
     def residual(self) -> list[Expression]:
         """The equations, expanded, in the order of the rows."""

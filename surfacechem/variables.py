@@ -53,6 +53,8 @@ class Parameters:
 
     def __init__(self, reserved: Iterable[str] = ()) -> None:
         self.items: list[Parameter] = []
+        self.constants: dict[str, tuple[Spec, float]] = {}
+        """Specification and value of parameters of laws that are at their defaults, hence numbers in formulas."""
         self._taken = {*VARIABLES, *reserved}
 
     def add(
@@ -167,6 +169,7 @@ class Variables:
         if value is None:
             return None
         if law.is_default(name):
+            self.parameters.constants[path] = (spec, float(value))
             return int(value) if float(value).is_integer() else value
         return self.parameters.add(name + suffix, path, spec, value)
 

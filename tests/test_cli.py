@@ -323,3 +323,36 @@ def test_a_case_is_not_overwritten_by_its_own_dataset(call, tmp_path):
     assert result.exit_code == 2
     assert "is the case itself" in result.stderr
     assert case.read_text().startswith("title")
+
+
+def test_a_link_that_leads_nowhere_is_called_that(call, tmp_path):
+    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
+    done = call("run", "loop.yaml")
+    assert done.exit_code == 2
+    assert done.stderr == "surfacechem: loop.yaml: is a link to loop.yaml, where no file is.\n"
+
+
+@pytest.mark.parametrize("command", [("run", "bonding.yaml"), ("sweep", "bonding.yaml", "--over", "initial.T=[300]")])
+def test_other_formats_than_netcdf_are_refused(call, tmp_path, command):
+    done = call(*command, "-o", "x.csv")
+    assert done.exit_code == 2
+    assert "x.csv: datasets are written as netCDF, not as '.csv': .nc, .nc4, .cdf. Give x.nc" in done.stderr
+    assert files(tmp_path) == set()
+
+
+def test_a_sweep_has_no_other_axis(call, tmp_path):
+    assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0
+    done = call("plot", "s.nc", "--against", "phi")
+    assert done.exit_code == 2
+    assert "--against: a sweep is plotted over what it sweeps" in done.stderr
+    assert files(tmp_path) == {"s.nc"}
+
+
+def test_a_sweep_all_of_whose_runs_stop_is_stopped(call):
+    done = call("sweep", "cooling.yaml", "--over", "initial.T=[280, 300]", "-o", "s.nc")
+    assert done.exit_code == 3
+    assert "2 runs: 2 stopped" in done.output
+    some = call("sweep", "cooling.yaml", "--over", "initial.T=[300, 900]", "-o", "s.nc")
+    assert some.exit_code == 0
+    with netCDF4.Dataset("s.nc") as file:
+        assert file.status == "finished"

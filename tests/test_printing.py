@@ -12,6 +12,8 @@ import pytest
 import scenes
 import symengine
 
+import surfacechem
+from surfacechem import case as cases
 from surfacechem import printing
 from surfacechem.assembly import assemble
 from surfacechem.integrate import Model
@@ -135,3 +137,40 @@ def test_latex_is_balanced():
         assert text.count("{") == text.count("}")
         assert text.count(r"\begin{cases}") == text.count(r"\end{cases}")
         assert text.count("&=") == text.count("&& ")
+
+
+WITH_TABLES = [name for name in cases.names() if any(p.load and p.field for p in cases.load(name).system().parameters)]
+
+
+def test_there_are_cases_with_tables():
+    assert len(WITH_TABLES) >= 8
+
+
+@pytest.mark.parametrize("name", WITH_TABLES)
+def test_every_piece_of_a_history_is_printed(name):
+    """The printed module finds the numbers that the compiled code is given, on both sides of every breakpoint."""
+    case = cases.load(name)
+    model = Model(case.system())
+    module, system = printing.executable(model.system), model.system
+    problem = model.problem(case.run, model.values())
+    breaks = problem.segments
+    times = np.concatenate([breaks, breaks[:-1] + np.diff(breaks) * 0.3, np.nextafter(breaks[:-1], np.inf)])
+    for t in times.tolist():
+        row = problem.parameters[np.searchsorted(breaks[1:-1], t)].tolist()
+        at = module.parameters_at(t)
+        assert [at[j] for j in module.CHANGING] == [row[j] for j in module.CHANGING]
+        y, ydot = problem.y0.tolist(), [0.0] * len(problem.y0)
+        assert module.residual(t, y, ydot) == module.residual(t, y, ydot, at)
+    text = printing.latex(system)
+    assert all(f"from {start!r} s on" in text for start, _ in module.PIECES[1:])
+
+
+def test_the_printed_velocity_steps_are_those_of_the_run():
+    solution = surfacechem.run("rate-and-state-velocity-steps")
+    system, result = solution.trajectory.model.system, solution.trajectory.result
+    module, names = printing.executable(system), [item.name for item in system.outputs]
+    for t, y, ydot, row in zip(
+        result.times, result.outputs, solution.trajectory.rates, solution.trajectory.outputs, strict=True
+    ):
+        printed = module.outputs(t, y.tolist(), ydot.tolist())
+        np.testing.assert_allclose(printed, row, rtol=1e-13, atol=1e-13 * np.max(np.abs(row)), err_msg=str(names))

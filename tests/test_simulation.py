@@ -1,6 +1,7 @@
 """Running a loaded case with changed parameters, times and tolerances."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -74,3 +75,54 @@ def test_a_table_has_no_numbers_to_change():
 
 def test_a_case_may_drop_its_exact_solution():
     assert surfacechem.run("exothermic", ["reference="]).accuracy.source.startswith("estimate")
+
+
+M = "interface.bonding.kamal-sourour.m"
+
+
+@pytest.fixture(scope="module")
+def cure():
+    """A cure whose case gives the default of the order m."""
+    return surfacechem.load("epoxy-cure-isothermal", {M: 1.0, "reference": ""})
+
+
+def test_a_parameter_at_its_default_is_changed(cure):
+    changed = cure.run({M: 1.3})
+    given = surfacechem.run("epoxy-cure-isothermal", {M: 1.3, "reference": ""})
+    assert np.array_equal(changed.dataset.phi, given.dataset.phi)
+    assert np.array_equal(cure.run({M: 1.0}).dataset.phi, cure.run().dataset.phi)
+    assert not np.array_equal(changed.dataset.phi, cure.run().dataset.phi)
+
+
+def test_a_parameter_at_its_default_is_swept(cure, tmp_path):
+    swept = cure.sweep({M: [1.0, 1.3]}, changes={"interface.bonding.kamal-sourour.E_1": "1 kJ/mol"})
+    singly = [cure.run({M: m}).dataset.phi for m in (1.0, 1.3)]
+    np.testing.assert_allclose(swept.dataset.phi, singly, rtol=1e-9)
+    assert [c.sweep({M: [1.0]}).dataset.phi.shape for c in (cure,)] == [(1, len(cure.case.run.times))]
+    record = rerun.read(swept.write(tmp_path / "swept.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+@pytest.mark.parametrize("name", ["exothermic", "stick-slip", "rate-and-state-stick-slip", "sudden-contact"])
+def test_a_solution_comes_back_from_a_pickle_as_it_was(name):
+    solution = surfacechem.run(name, ["run.outputs=21"])
+    again = pickle.loads(pickle.dumps(solution))
+    assert again.dataset.drop_attrs().identical(solution.dataset.drop_attrs())
+    assert {**again.attributes, "compile_seconds": 0} == {**solution.attributes, "compile_seconds": 0}
+    repeated = again.trajectory.model.solve(again.trajectory.run)
+    assert np.array_equal(repeated.result.outputs, solution.trajectory.result.outputs)
+
+
+@pytest.mark.parametrize(("name", "over"), [("force-spectroscopy", None), ("debonding", {"initial.T": [300, 310]})])
+def test_a_sweep_comes_back_from_a_pickle_as_it_was(name, over):
+    swept = surfacechem.load(name).sweep(over)
+    again = pickle.loads(pickle.dumps(swept))
+    assert again.dataset.drop_attrs().identical(swept.dataset.drop_attrs())
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".txt"])
+def test_a_dataset_is_written_under_the_name_of_its_format_only(simulation, tmp_path, suffix):
+    target = tmp_path / f"run{suffix}"
+    with pytest.raises(InputError, match=r"written as netCDF, not as '\.\w+': \.nc, \.nc4, \.cdf\. Give run\.nc"):
+        simulation.run().write(target)
+    assert not target.exists()

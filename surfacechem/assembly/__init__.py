@@ -5,6 +5,8 @@ Each stage is a module, in the order of STAGES.
 
 from __future__ import annotations
 
+from functools import partial
+
 from surfacechem.assembly.bounds import released
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.chemistry import reactions
@@ -95,6 +97,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         t=build.t,
         states=tuple(build.states),
         parameters=tuple(build.parameters.items),
+        constants=dict(build.parameters.constants),
         named=tuple(build.named),
         rows={state.name: build.rows[state.name] for state in build.states},
         ledger=tuple(build.ledger),
@@ -123,6 +126,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         ),
         outside=_outside(build),
         holding=_holding(build),
+        origin=partial(assemble, scene, sides),
     )
 
 
@@ -131,7 +135,7 @@ def _holding(build: Build) -> Holding | None:
     if decision is None:
         return None
     sides = decision.usual if build.sides is None else build.sides
-    return Holding(sides, decision.paths, decision.needed, lambda others: assemble(build.scene, others))
+    return Holding(sides, decision.paths, decision.needed, partial(assemble, build.scene))
 
 
 def _is_there(build: Build, role: Role) -> bool:

@@ -177,9 +177,13 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
             Place(path="interface.temperature"),
         )
     reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
+    other = f"runaway cooling: no temperature {node.name} balances the heat that the interface takes up"
+    fluxes = {symengine.Symbol(item.name): 0 for item in build.named if item.name.startswith("q_")}
+    produced = -build.expanded(row.subs(explicit).subs(fluxes))
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
-    build.margins.append(Margin(f"stable {node.name}", slope, reason))
+        other = reason
+    build.margins.append(Margin(f"stable {node.name}", slope, reason, below=(produced, other)))
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:

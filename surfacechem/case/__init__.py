@@ -141,6 +141,8 @@ def _find(name: str) -> tuple[Path, str]:
     with suppress(OSError, ValueError):  # no name is too odd to be looked for
         if path.exists():
             return path, name
+        if path.is_symlink():
+            raise InputError(f"is a link to {path.readlink()}, where no file is.", Place(name))
         beside = [file.name for file in path.parent.glob("*.yaml")]
     guess = nearest(path.name, beside) or nearest(path.stem, [*names(), *beside])
     raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")

@@ -7,8 +7,9 @@ is then the reactor's, and what flows into it the reactor receives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import cantera
@@ -84,6 +85,10 @@ def _replaced(body: Body, reactor: Any) -> Body:
 def with_multipliers(system: System) -> tuple[System, tuple[str, ...]]:
     """The system with a factor on each reaction rate, and the labels of the reactions in the order of the scene."""
     labels = tuple(item.name[2:] for item in system.named if item.quantity.tag == "e:R")
+    return _multiplied(system, labels), labels
+
+
+def _multiplied(system: System, labels: Sequence[str]) -> System:
     symbols = {f"R_{label}": symengine.Symbol(f"multiplier_{label}") for label in labels}
     named = tuple(
         replace(item, expression=symbols[item.name] * item.expression) if item.name in symbols else item
@@ -93,7 +98,8 @@ def with_multipliers(system: System) -> tuple[System, tuple[str, ...]]:
         Parameter(symbol, f"multiplier.{name[2:]}", Spec("1", "factor on a rate"), 1.0)
         for name, symbol in symbols.items()
     )
-    return replace(system, named=named, parameters=(*system.parameters, *factors)), labels
+    origin = partial(_multiplied, system, labels)
+    return replace(system, named=named, parameters=(*system.parameters, *factors), origin=origin)
 
 
 class Port:

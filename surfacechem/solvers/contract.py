@@ -5,6 +5,7 @@ parameters. Time breakpoints end a step; margins that cross zero stop the run or
 is integrated beside the state, outside the error norm. A result always carries a status and its reason in words.
 """
 
+import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -132,6 +133,12 @@ class Problem:
             0.0 < self.rtol < 1.0 and bool((self.atol >= 0.0).all()),
             "rtol must lie in (0, 1) and atol must not be negative.",
         )
+
+    def with_program(self, program: Program | None) -> "Problem":
+        """The same with other machine code; without any it is no more than data, as a pickle needs it."""
+        other = copy.copy(self)
+        object.__setattr__(other, "program", program)
+        return other
 
     def _require(self, condition: bool, message: str) -> None:
         """Raise ValueError; the message is made up only then, as a run may be brief."""
