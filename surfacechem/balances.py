@@ -53,8 +53,9 @@ class Node:
 
 
 def internal_energy(F: Expression, T: Expression) -> Expression:
-    """U = F - T F_T."""
-    return F - T * derivative(F, T)
+    """U = F - T F_T, term by term: what is in proportion to T has no energy, whatever the size of its derivatives."""
+    whole = symengine.sympify(F)
+    return symengine.Add(*(term - T * derivative(term, T) for term in (whole.args if whole.is_Add else (whole,))))
 
 
 def entropy(F: Expression, T: Expression) -> Expression:

@@ -203,8 +203,11 @@ def compile_program(
     _check_counts(states, derivatives, residual)
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    own = residual[:core]
-    by_state, by_rate = ([derivative(g, x) for g in own for x in over[:core]] for over in (states, derivatives))
+    own = [(g, symengine.sympify(g).free_symbols) for g in residual[:core]]
+    by_state, by_rate = (
+        [derivative(g, x) if x in read else symengine.Integer(0) for g, read in own for x in over[:core]]
+        for over in (states, derivatives)
+    )
     places = list(_linked(core, chains))
     border, bands = places[: core * len(chains)], places[core * len(chains) :]
     linked = [

@@ -81,6 +81,70 @@ def exp(x: Expression) -> Expression:
     return where(x < EXPONENT_CAP, symengine.exp(x), top * (x + (1 - EXPONENT_CAP)))
 
 
+LITERAL = 250.0
+"""Exponent up to which a product with an exponential is multiplied as it stands; well below EXPONENT_CAP."""
+
+
+def scaled_exp(factor: Expression, exponent: Expression) -> Expression:
+    """Product factor * exp(exponent) with one exponential, so that what is tiny may have a large exponent.
+
+    Beyond LITERAL the logarithm of a factor below one is part of the exponent, and with it of what is capped;
+    exponentials in the factor are taken by their exponents.
+
+    >>> scaled_exp(2.0, 0.0), round(scaled_exp(1e-239, 560.0), 6)
+    (2.0, 16029.126851)
+    """
+    if not is_symbolic(factor, exponent):
+        if exponent < LITERAL or not 0 < factor < 1:
+            return factor * exp(exponent)
+        return exp(exponent + math.log(factor))
+    import symengine
+
+    rest, own = _exponential(factor)
+    exponent = symengine.sympify(exponent + own)
+    if rest == 0 or exponent == 0:
+        return rest
+    inside = where(rest > 0, where(rest < 1, rest, 1), 1)
+    far = rest / inside * exp(exponent + symengine.log(inside))
+    return where(exponent < LITERAL, rest * symengine.exp(exponent), far)
+
+
+def product(*factors: Expression) -> Expression:
+    """Product of which all exponentials are one, see :func:`scaled_exp`.
+
+    >>> product(2.0, 3.0)
+    6.0
+    """
+    if not is_symbolic(*factors):
+        return math.prod(factors)
+    parts = [_exponential(factor) for factor in factors]
+    return scaled_exp(math.prod(rest for rest, _ in parts), sum(exponent for _, exponent in parts))
+
+
+def _exponential(factor: Expression) -> tuple[Expression, Expression]:
+    """What a product has beside exponentials, guarded ones included, and their exponents."""
+    import symengine
+
+    node = symengine.sympify(factor)
+    rest, exponent = symengine.Integer(1), symengine.Integer(0)
+    for part in node.args if node.is_Mul else (node,):
+        if isinstance(part, symengine.Piecewise) and _is_guard(part.args[1]):
+            inner, own = _exponential(part.args[0])
+            rest, exponent = rest * inner, exponent + own
+        elif part.is_Pow and part.args[0] == symengine.E:
+            exponent += part.args[1]
+        elif part.is_Pow and part.args[1].is_Number:
+            inner, own = _exponential(part.args[0])
+            rest, exponent = rest * inner ** part.args[1], exponent + part.args[1] * own
+        else:
+            rest *= part
+    return rest, exponent
+
+
+def _is_guard(condition: Any) -> bool:
+    return len(condition.args) == 2 and condition.args[1] in (LITERAL, EXPONENT_CAP)
+
+
 def exponents(expression: Expression) -> list[Expression]:
     """The exponents of an expression that :func:`exp` and :func:`expm1` cap.
 
@@ -107,6 +171,24 @@ def expm1(x: Expression) -> Expression:
     # 2 e^(x/2) sinh(x/2) is exact near zero; the outer pieces are where one of its factors would over- or underflow.
     middle = 2 * symengine.exp(x / 2) * symengine.sinh(x / 2)
     return symengine.Piecewise((symengine.exp(x) - 1, x < -30.0), (middle, x < EXPONENT_CAP), (exp(x), True))
+
+
+def scaled_expm1(factor: Expression, x: Expression, shift: Expression = 0) -> Expression:
+    """Product factor * exp(shift) * (exp(x) - 1) with one exponential, see :func:`scaled_exp`.
+
+    >>> scaled_expm1(2.0, -1e-20), round(scaled_expm1(1e-239, 560.0), 6)
+    (-2e-20, 16029.126851)
+    """
+    if not is_symbolic(factor, x, shift):
+        return -scaled_exp(factor, shift + x) * math.expm1(-x) if x > 0 else scaled_exp(factor, shift) * math.expm1(x)
+    return where(x > 0, -scaled_exp(factor, shift + x) * _falling(-x), scaled_exp(factor, shift) * _falling(x))
+
+
+def _falling(x: Expression) -> Expression:
+    """exp(x) - 1 for x <= 0, of a symbolic x."""
+    import symengine
+
+    return where(x < -30.0, symengine.exp(x) - 1, 2 * symengine.exp(x / 2) * symengine.sinh(x / 2))
 
 
 def decay(x: Expression) -> Expression:
@@ -142,6 +224,21 @@ def log_fraction(x: Expression) -> Expression:
     return where(x > FRACTION_FLOOR, symengine.log(x), math.log(FRACTION_FLOOR))
 
 
+def mixing(x: Expression) -> Expression:
+    """Fraction times its logarithm, x ln x, with derivatives ln x + 1 and 1/x.
+
+    Those of a product with a guarded ln x hold x/x^2, which is not finite near zero.
+
+    >>> mixing(1.0), mixing(0.5) == -0.5 * math.log(2.0)
+    (0.0, True)
+    """
+    if not is_symbolic(x):
+        return x * log_fraction(x)
+    import symengine
+
+    return where(x > FRACTION_FLOOR, x * symengine.log(x), math.log(FRACTION_FLOOR) * x)
+
+
 def log_sum(logarithms: Iterable[Expression]) -> Expression:
     """Logarithm of a sum of which only the logarithms are known.
 
@@ -150,7 +247,7 @@ def log_sum(logarithms: Iterable[Expression]) -> Expression:
     """
 
     def add(a: Expression, b: Expression) -> Expression:
-        return where(a > b, a + log(1 + exp(b - a)), b + log(1 + exp(a - b)))
+        return where(a > b, a + log(1 + decay(a - b)), b + log(1 + decay(b - a)))
 
     return reduce(add, logarithms)
 

@@ -180,10 +180,10 @@ class LoadedRate(cantera.ExtensibleRate):
     def _warn_of_cap(self, coefficient: float, T: float) -> None:
         """Say once that an exponent was too large to be taken literally."""
         assert self.bound is not None
-        if not self.capped and coefficient > self.bound.A * T**self.bound.b * math.exp(EXPONENT_CAP):
+        if not self.capped and coefficient > max(self.bound.A * T**self.bound.b, 1.0) * math.exp(EXPONENT_CAP):
             self.capped = True
             warnings.warn(
-                f"reaction {self.bound.equation}: an exponent of its rate of type {self.kind} is above "
+                f"reaction {self.bound.equation}: the logarithm of its rate of type {self.kind} is above "
                 f"{EXPONENT_CAP:g}; beyond that the rate goes on along its tangent.",
                 RuntimeWarning,
                 stacklevel=2,

@@ -1,4 +1,4 @@
-"""Rates so fast that no run resolves them: exponentials whose exponents were capped are never used silently."""
+"""Rates so fast that no run resolves them: those that were capped are never used silently."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from surfacechem.integrate import Trajectory
 
 
 def capped_rates(trajectory: Trajectory) -> list[str]:
-    """Laws that have met an exponent above EXPONENT_CAP at an output or a step of a run, in words."""
+    """Laws whose rate was beyond exp(EXPONENT_CAP) at an output or a step of a run, in words."""
     system = trajectory.model.system
     if not system.capped:
         return []
@@ -26,8 +26,8 @@ def capped_rates(trajectory: Trajectory) -> list[str]:
         largest = float(np.nanmax(values, initial=-np.inf))
         if largest > EXPONENT_CAP:
             found.append(
-                f"{law.title}: an exponent of its rate reached {largest:.4g}; above {EXPONENT_CAP:g} the rate goes on "
-                "along its tangent: it is instantaneous, but not the one stated"
+                f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}; above "
+                f"{EXPONENT_CAP:g} the rate goes on along its tangent: it is instantaneous, but not the one stated"
             )
     return found
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import symengine
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, product
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Parameter, Role
 from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads, resolved_unit
@@ -159,8 +159,8 @@ class Variables:
         path = f"{law.path}.{name}"
         if isinstance(value, Varying):
             symbol = self.parameters.add(name + suffix, path, spec, value.value)
-            for factor in value.factors:
-                symbol *= self._factor(self.bind(factor, f"{path}.{factor.name()}", unit=unit_of(factor.of)))
+            bound = [self.bind(item, f"{path}.{item.name()}", unit=unit_of(item.of)) for item in value.factors]
+            symbol = product(symbol, *map(self._factor, bound))
             low = max(spec.above, spec.at_least)
             bounded = low > 0 or math.isfinite(spec.at_most)
             if bounded or not all(factor.keeps_sign for factor in value.factors):

@@ -100,12 +100,15 @@ def _substitutions(build: Build, phi: float) -> dict[Any, Expression]:
 def _put(expression: Expression, at: Mapping[Any, Expression]) -> Expression:
     """The expression at the bound, its logarithms of nothing by name."""
     found = symengine.sympify(expression)
-    logarithms = {piece: VANISHED for piece in found.atoms(symengine.Piecewise) if _floored(piece.subs(at))}
+    values = {piece: piece.subs(at) for piece in found.atoms(symengine.Piecewise)}
+    logarithms = {piece: sign * VANISHED for piece, value in values.items() if (sign := _floored(value))}
     return found.xreplace(logarithms).subs(at)
 
 
-def _floored(piece: Expression) -> bool:
-    return bool(piece.is_Number) and float(piece) == math.log(FRACTION_FLOOR)
+def _floored(value: Expression) -> int:
+    """The sign with which a value is the logarithm of nothing; 0 where it is not."""
+    size = float(value) / math.log(FRACTION_FLOOR) if value.is_Number else 0.0
+    return int(size) if size in (1.0, -1.0) else 0
 
 
 def _in_range(known: Known, value: Expression, spec: Spec) -> Known:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, log_fraction
+from surfacechem.expressions import Expression, mixing
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import Potential, parameter
 
@@ -70,8 +70,7 @@ class LatticeGas(Potential):
 
     def energy(self, phi: Expression, T_c: Expression, N_c: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        mixing = phi * log_fraction(phi) + (1 - phi) * log_fraction(1 - phi)
-        return N_c * (BOLTZMANN * T_c * mixing - self.epsilon * phi)
+        return N_c * BOLTZMANN * T_c * (mixing(phi) + mixing(1 - phi)) - N_c * self.epsilon * phi
 
 
 class BondSprings(Potential):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from surfacechem.expressions import Expression, exp, expm1, log_fraction, where
+from surfacechem.expressions import Expression, log_fraction, scaled_exp, scaled_expm1
 from surfacechem.laws.forces import (
     BellFactor,
     DemboFactor,
@@ -42,8 +42,8 @@ class Bell(StatedBothWays):
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        on = self.k_on * exp(BellFactor(x_beta=self.x_on).log_factor(f, T_c))
-        off = self.k_off * exp(BellFactor(x_beta=self.x_off).log_factor(f, T_c))
+        on = scaled_exp(self.k_on, BellFactor(x_beta=self.x_on).log_factor(f, T_c))
+        off = scaled_exp(self.k_off, BellFactor(x_beta=self.x_off).log_factor(f, T_c))
         return n_c * (on * (1 - phi) - off * phi)
 
 
@@ -66,9 +66,7 @@ class ReversibleBell(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         breaking = BellFactor(x_beta=self.x_off).log_factor(f, T_c) + log_fraction(phi)
-        affinity = -mu / (BOLTZMANN * T_c)
-        forming = -exp(breaking + affinity) * expm1(-affinity)
-        return n_c * self.k_off * where(affinity > 0, forming, exp(breaking) * expm1(affinity))
+        return n_c * scaled_expm1(self.k_off, -mu / (BOLTZMANN * T_c), breaking)
 
 
 class DemboSpring(StatedBothWays):
@@ -103,8 +101,8 @@ class DemboSpring(StatedBothWays):
         bond, transition = self.stiffness, self.transition_stiffness
         formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
         rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
-        on = self.k_on * exp(formation.log_factor(f, T_c))
-        off = self.k_off * exp(rupture.log_factor(f, T_c))
+        on = scaled_exp(self.k_on, formation.log_factor(f, T_c))
+        off = scaled_exp(self.k_off, rupture.log_factor(f, T_c))
         return n_c * (on * (1 - phi) - off * phi)
 
 
@@ -135,10 +133,9 @@ class TwoPathway(StatedBothWays):
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        ratio = self.k_catch / self.k_slip
-        factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
-        off = self.k_slip * exp(factor.log_factor(f, T_c))
-        return n_c * (self.k_on * (1 - phi) - off * phi)
+        slip = scaled_exp(self.k_slip, BellFactor(x_beta=self.x_slip).log_factor(f, T_c))
+        catch = scaled_exp(self.k_catch, BellFactor(x_beta=-self.x_catch).log_factor(f, T_c))
+        return n_c * (self.k_on * (1 - phi) - (slip + catch) * phi)
 
 
 class DudkoHummerSzabo(StatedBothWays):
@@ -174,7 +171,7 @@ class DudkoHummerSzabo(StatedBothWays):
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
-        off = self.k_off * exp(factor.log_factor(f, T_c))
+        off = scaled_exp(self.k_off, factor.log_factor(f, T_c))
         return n_c * (self.k_on * (1 - phi) - off * phi)
 
 
@@ -202,4 +199,4 @@ class GapAttachment(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, g_n: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         factor = GapFactor(stiffness=self.stiffness, rest_length=self.rest_length)
-        return n_c * self.k_on * exp(factor.log_factor(g_n, T_c)) * (1 - phi)
+        return n_c * scaled_exp(self.k_on, factor.log_factor(g_n, T_c)) * (1 - phi)

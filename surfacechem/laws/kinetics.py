@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, exp, expm1, power
+from surfacechem.expressions import Expression, power, product, scaled_exp, scaled_expm1
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.terms import RateLaw, parameter
 
@@ -31,7 +31,7 @@ class ExponentialAffinity(RateLaw):
     .. math:: R = C_r k_B T_c \left( 1 - e^{\mu / k_B T_c} \right)
 
     Source: Sauer, Duong & Mandadapu (2021), the equation after e:R, with the Boltzmann constant because mu is an energy
-    per bond. Always admissible for C_r >= 0; tends to the linear law for small mu. Exponents above 300 count as an
+    per bond. Always admissible for C_r >= 0; tends to the linear law for small mu. A rate beyond e^300 counts as an
     instantaneous reaction.
 
     >>> ExponentialAffinity(C_r=2.5e38).rate(mu=-1e-19, T_c=310.0)
@@ -43,7 +43,7 @@ class ExponentialAffinity(RateLaw):
     def rate(self, mu: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         thermal = BOLTZMANN * T_c
-        return -self.C_r * thermal * expm1(mu / thermal)
+        return -scaled_expm1(self.C_r * thermal, mu / thermal)
 
 
 class Relaxation(RateLaw):
@@ -65,7 +65,7 @@ class Relaxation(RateLaw):
 
     def rate(self, mu: Expression, dmu_dphi: Expression, n_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        return -n_c / self.tau * mu / dmu_dphi
+        return -n_c * product(1 / self.tau) * mu / dmu_dphi
 
 
 class Arrhenius(RateLaw):
@@ -87,7 +87,7 @@ class Arrhenius(RateLaw):
 
     def rate(self, phi: Expression, n_c: Expression, T_c: Expression, T_0: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        k = self.A * (T_c / T_0) ** self.b * exp(-self.E_a / (GAS_CONSTANT * T_c))
+        k = scaled_exp(self.A * (T_c / T_0) ** self.b, -self.E_a / (GAS_CONSTANT * T_c))
         return n_c * k * power(1 - phi, self.n)
 
 
@@ -153,5 +153,5 @@ class KamalSourour(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         thermal = GAS_CONSTANT * T_c
-        k_1, k_2 = self.A_1 * exp(-self.E_1 / thermal), self.A_2 * exp(-self.E_2 / thermal)
+        k_1, k_2 = scaled_exp(self.A_1, -self.E_1 / thermal), scaled_exp(self.A_2, -self.E_2 / thermal)
         return n_c * (k_1 + k_2 * power(phi, self.m)) * power(1 - phi, self.n)

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from surfacechem.expressions import Expression, log_fraction
+from surfacechem.expressions import Expression, mixing
 from surfacechem.mechanism.interaction import SAME, Interaction
 from surfacechem.mechanism.thermo import StandardGibbs
 from surfacechem.quantities import BOLTZMANN
@@ -108,9 +108,11 @@ class IdealMixture(Potential):
         total: Expression = 0
         for species in self.species:
             theta = values[species.variable]
-            mixing = BOLTZMANN * T * (log_fraction(theta) - 1)
+            amount = values[species.amount]
             elastic = species.spring.energy(values["g_n"]) if species.spring else 0
-            total += values[species.amount] * theta * (species.standard(T) + elastic + mixing)
+            # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
+            total += amount * theta * (species.standard(T) + elastic)
+            total += amount * BOLTZMANN * T * (mixing(theta) - theta)
         if any(species.interactions for species in self.species):
             total += _interactions(self.species, values)
         return total

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from surfacechem.expressions import Expression, exp, log, log_fraction, power, where
+from surfacechem.expressions import Expression, log, log_fraction, power, scaled_exp, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.terms import RateLaw, Spec, option, parameter
@@ -253,7 +253,7 @@ class InterfaceArrhenius(SurfaceReaction):
 
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
         """The rate coefficient times exp(shift)."""
-        return self.A * values["T_c"] ** self.b * exp(self.exponent(values) + shift)
+        return scaled_exp(self.A * values["T_c"] ** self.b, self.exponent(values) + shift)
 
 
 def _coverage_term(variable: str, terms: Mapping[str, Any]) -> CoverageTerm:

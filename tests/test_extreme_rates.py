@@ -1,0 +1,228 @@
+"""Rates far from one per second: tiny prefactors with large exponents, stiff pairs, orders below one, long chains.
+
+Every expectation is computed here from the rate laws alone, with SciPy or mpmath, and not by what is tested.
+"""
+
+import mpmath
+import numpy as np
+import pytest
+import scipy.linalg
+
+import surfacechem
+from surfacechem.expressions import EXPONENT_CAP
+
+BOLTZMANN, GAS = mpmath.mpf("1.380649e-23"), mpmath.mpf("8.31446261815324")
+
+CAPPED = "the rate goes on along its tangent"
+
+CASE = """
+T_0: {T_0} K
+bodies: {{one: {{temperature: {T} K}}, two: {{temperature: {T} K}}}}
+interface: {{temperature: {T} K, {interface}}}
+{more}
+run: {{times: {times}, rtol: {rtol}}}
+"""
+
+
+def solve(folder, interface, times, T=300, T_0=300, more="", mechanism=None, rtol=1e-11):
+    """A run of a case with bodies held at T; ``mechanism`` is the text of mech.yaml."""
+    if mechanism:
+        (folder / "mech.yaml").write_text(mechanism)
+    text = CASE.format(T=T, T_0=T_0, interface=interface, more=more, times=list(map(float, times)), rtol=rtol)
+    (folder / "case.yaml").write_text(text)
+    return surfacechem.run(folder / "case.yaml")
+
+
+def bonded(solution):
+    return solution.dataset["phi"].values
+
+
+MECHANISM = """
+units: {{length: m, quantity: mol, energy: kJ, activation-energy: kJ/mol}}
+phases:
+- name: p
+  thermo: ideal-surface
+  kinetics: surface
+  species: [{names}]
+  reactions: all
+  site-density: 1e14 molec/m^2
+species:
+{species}
+reactions:
+{reactions}
+"""
+
+
+def mechanism(enthalpies, reactions):
+    """Text of a mechanism of species with these enthalpies [kJ/mol] and reactions as YAML."""
+    species = (
+        f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp, h0: {h!r}, s0: 0}}}}"
+        for name, h in enthalpies.items()
+    )
+    return MECHANISM.format(
+        names=", ".join(enthalpies), species="\n".join(species), reactions="\n".join(f"- {{{r}}}" for r in reactions)
+    )
+
+
+# -- a large exponent of something tiny ------------------------------------------------------------------------------
+
+COLD, SPEED, LENGTH = 4, 20e-12, 0.3e-9
+TINY = "1e-239"
+"""A barrier of 0.2 eV at 4 K: 1e13 1/s exp(-0.2 eV / k_B T)."""
+
+
+def pulled(rate, times):
+    """Bonds left when pulled at SPEED, with ``rate`` [1/s] a function of the force."""
+    with mpmath.workdps(30):
+        return [float(mpmath.exp(-mpmath.quad(lambda t: rate(SPEED * t), mpmath.linspace(0, t, 9)))) for t in times]
+
+
+def work(f, length=LENGTH):
+    return mpmath.mpf(f) * length / (BOLTZMANN * COLD)
+
+
+def dudko(f, barrier=1e-18):
+    nu = mpmath.mpf(1) / 2
+    s = 1 - nu * mpmath.mpf(f) * LENGTH / barrier
+    return s ** (1 / nu - 1) * mpmath.exp(barrier / (BOLTZMANN * COLD) * (1 - s ** (1 / nu)))
+
+
+LOADED = {
+    "bell: {k_off: 1e-239, x_off: 0.3 nm}": lambda f: mpmath.exp(work(f)),
+    "two-pathway: {k_slip: 1e-239, x_slip: 0.3 nm, k_catch: 1e-200, x_catch: 1 nm}": lambda f: mpmath.exp(work(f)),
+    "dudko-hummer-szabo: {k_off: 1e-239, x_off: 0.3 nm, barrier: 1e-18, nu: 0.5}": dudko,
+    "dembo-spring: {k_off: 1e-239, stiffness: 2 N/m, transition_stiffness: 1.3 N/m}": (
+        lambda f: mpmath.exp(mpmath.mpf("0.7") * mpmath.mpf(f) ** 2 / (8 * BOLTZMANN * COLD))
+    ),
+}
+RANGE = dict.fromkeys(LOADED, (100e-12, 106e-12))
+RANGE[next(name for name in LOADED if "dembo" in name)] = (580e-12, 591e-12)
+
+
+@pytest.mark.parametrize("law", LOADED)
+def test_a_bond_breaks_where_its_barrier_is_gone_however_cold(tmp_path, law):
+    """1e-239 1/s at rest breaks at about 102 pN at 20 pN/s, though the exponent of the load is beyond 500 there."""
+    times = [0.0, *(np.linspace(*RANGE[law], 8) / SPEED)]
+    loading = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
+    solution = solve(tmp_path, f"sites: 1e14, bonding: [{law}]", times, T=COLD, more=loading)
+    exact = [1.0, *pulled(lambda f: mpmath.mpf(TINY) * LOADED[law](f), times[1:])]
+    assert max(exact[1:]) > 0.2
+    assert min(exact) < 0.9
+    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
+    assert not any(CAPPED in text for text in solution.warnings)
+
+
+@pytest.mark.parametrize("A", ["1e-239, b: 0, Ea: 0", "1e13, b: 0, Ea: 18.3 kJ/mol"])
+def test_the_same_bond_in_a_mechanism(tmp_path, A):
+    text = mechanism(
+        {"free": 0, "bond": 0}, [f"equation: bond => free, type: Bell, rate-constant: {{A: {A}}}, x-beta: 0.3 nm"]
+    )
+    prefactor = mpmath.mpf(TINY) if "239" in A else mpmath.mpf(10) ** 13 * mpmath.exp(-mpmath.mpf(18300) / (GAS * COLD))
+    times = [0.0, *np.linspace(4.9, 5.3, 9)]
+    more = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {coverages: {bond: 1}}"
+    solution = solve(tmp_path, "mechanism: {file: mech.yaml, bonds: [bond]}", times, COLD, more=more, mechanism=text)
+    exact = [1.0, *pulled(lambda f: prefactor * mpmath.exp(work(f)), times[1:])]
+    assert min(exact) < 0.1
+    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
+
+
+def test_the_warning_is_of_the_rate_and_not_of_its_exponent(tmp_path):
+    """At 16 s the exponent is 1739, but only 1189 of the rate; at 10 s 1087 and 537, at 5 s 543 and -7."""
+    law, loading = next(iter(LOADED)), "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
+    for end, said in ((5.0, False), (7.5, False), (16.0, True)):
+        solution = solve(tmp_path, f"sites: 1e14, bonding: [{law}]", [0.0, end], T=COLD, more=loading)
+        reached = float(work(SPEED * end)) + float(mpmath.log(mpmath.mpf(TINY)))
+        assert (reached > EXPONENT_CAP) == said
+        texts = [text for text in solution.warnings if CAPPED in text]
+        assert bool(texts) == said
+        assert all(f"reached {reached:.4g}" in text for text in texts)
+
+
+ACTIVATED = "times: [activated: {E_a: 20 kJ/mol}]"
+"""exp(+593.4) from the T_0 of 4 K to 300 K would be exp(+593); from 300 K to 4 K exp(-593)."""
+
+
+@pytest.mark.parametrize("law", ["mass-action: {k_on: 0 1/s,", "bell: {"])
+@pytest.mark.parametrize("energies", [(20,), (12, 8), (30, -10)])
+def test_factors_of_a_rate_are_one_exponential(tmp_path, law, energies):
+    """A rate known at 4 K, taken to 300 K: e^593 times 1e-257."""
+    factors = ", ".join(f"activated: {{E_a: {energy} kJ/mol}}" for energy in energies)
+    law = f"{law} k_off: {{value: 1e-257 1/s, times: [{factors}]}}}}"
+    times = [0.0, 0.1, 0.2, 0.5]
+    solution = solve(
+        tmp_path, f"sites: 1e14, bonding: [{law}]", times, T=300, T_0=4, more="loading: {f: 0 N}\ninitial: {phi: 1}"
+    )
+    with mpmath.workdps(30):
+        k = mpmath.mpf("1e-257") * mpmath.exp(-20000 / GAS * (mpmath.mpf(1) / 300 - mpmath.mpf(1) / 4))
+        exact = [float(mpmath.exp(-k * t)) for t in times]
+    assert 0.1 < exact[1] < 0.9
+    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
+    assert not any(CAPPED in text for text in solution.warnings)
+
+
+def test_a_factor_and_a_load_that_undo_each_other(tmp_path):
+    """3e9 1/s at 300 K is e^-593 of that at 4 K, which a force of 109 pN makes good."""
+    law = f"bell: {{k_off: {{value: 3.2945e9 1/s, {ACTIVATED}}}, x_off: 0.3 nm}}"
+    times = [0.0, *np.linspace(5.2, 5.5, 7)]
+    loading = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
+    solution = solve(tmp_path, f"sites: 1e14, bonding: [{law}]", times, T=COLD, T_0=300, more=loading)
+    k = mpmath.mpf("3.2945e9") * mpmath.exp(-20000 / GAS * (mpmath.mpf(1) / COLD - mpmath.mpf(1) / 300))
+    exact = [1.0, *pulled(lambda f: k * mpmath.exp(work(f)), times[1:])]
+    assert min(exact) < 0.5
+    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
+
+
+def test_a_relaxation_time_of_the_cold_is_taken_to_room_temperature(tmp_path):
+    law = "relaxation: {tau: {value: 1e257 s, times: [activated: {E_a: -20 kJ/mol}]}}"
+    interface = f"sites: 1e14, potential: [bond-energy: {{K_0: 1}}], bonding: [{law}]"
+    times = [0.0, 0.5, 1.0]
+    solution = solve(tmp_path, interface, times, T=300, T_0=4, more="initial: {phi: 0}")
+    rate = mpmath.mpf("1e-257") * mpmath.exp(-20000 / GAS * (mpmath.mpf(1) / 300 - mpmath.mpf(1) / 4))
+    np.testing.assert_allclose(bonded(solution), [1 - float(mpmath.exp(-rate * t)) for t in times], atol=1e-10)
+
+
+def test_an_affinity_in_the_cold_drives_a_slow_reaction(tmp_path):
+    """exp(-mu / k_B T) = e^724 of a bond of 0.25 eV at 4 K."""
+    energy, slow = mpmath.mpf("4e-20"), mpmath.mpf("1e-280")
+    law = f"exponential-affinity: {{C_r: {float(slow)!r}}}"
+    interface = f"sites: 1e14, potential: [linear-enthalpy: {{H_r: {float(-energy * 10**14)!r}}}], bonding: [{law}]"
+    thermal = BOLTZMANN * COLD
+    rate = slow * thermal * mpmath.expm1(energy / thermal) / mpmath.mpf("1e14")
+    end = float(mpmath.mpf("0.9") / rate)
+    solution = solve(tmp_path, interface, [0.0, 0.5 * end, end], T=COLD, more="initial: {phi: 1}")
+    np.testing.assert_allclose(bonded(solution), [1.0, 0.55, 0.1], atol=1e-9)
+
+
+# -- long chains ------------------------------------------------------------------------------------------------------
+
+
+def test_a_long_chain_of_reversible_steps_warms_its_bodies(tmp_path):
+    """Coverages of 1e-150 behind the front: mixing entropy has an infinite slope there, the energy has none."""
+    length = 60
+    names = [f"s{i}" for i in range(length + 1)]
+    enthalpies = {name: float(i % 3) for i, name in enumerate(names)}
+    A = [1.0 + 0.1 * (i % 5) for i in range(length)]
+    steps = [
+        f"equation: {a} <=> {b}, rate-constant: {{A: {k}, b: 0, Ea: 0}}"
+        for a, b, k in zip(names[:-1], names[1:], A, strict=True)
+    ]
+    (tmp_path / "mech.yaml").write_text(mechanism(enthalpies, steps))
+    (tmp_path / "case.yaml").write_text(
+        """
+T_0: 300 K
+bodies: {l: {temperature: T, C: 1e9}, u: {temperature: T, C: 1e9}}
+interface: {temperature: T, mechanism: mech.yaml}
+initial: {T: 300 K, coverages: {s0: 1}}
+run: {times: [0, 1e-3, 10, 100]}
+"""
+    )
+    solution = surfacechem.run(tmp_path / "case.yaml")
+    assert solution.status == "finished"
+    matrix = np.zeros((length + 1, length + 1))
+    for i, k in enumerate(A):
+        back = k * np.exp((enthalpies[names[i + 1]] - enthalpies[names[i]]) * 1e3 / (float(GAS) * 300))
+        matrix[[i, i + 1], [i, i]] += -k, k
+        matrix[[i, i + 1], [i + 1, i + 1]] += back, -back
+    found = np.array([solution.dataset[f"theta_{name}"].values for name in names])
+    for j, t in enumerate((0.0, 1e-3, 10.0, 100.0)):
+        np.testing.assert_allclose(found[:, j], scipy.linalg.expm(matrix * t)[:, 0], atol=1e-9)
