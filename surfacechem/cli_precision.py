@@ -19,7 +19,8 @@ Exit codes:
   0    finished; solves that failed are in the report
   2    bad input; nothing was computed
   4    a case has no reference on which two methods agree; all else is written
-  130  interrupted; nothing was written
+  5    what was computed could not be written where it should be
+  130  interrupted, or 128 and the number of another signal; nothing was written
 """
 
 

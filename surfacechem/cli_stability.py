@@ -14,7 +14,8 @@ CODES = """\b
 Exit codes:
   0    finished; what failed or is wrong is in the report
   2    bad input; nothing was computed
-  130  interrupted; nothing was written
+  5    what was computed could not be written where it should be
+  130  interrupted, or 128 and the number of another signal; nothing was written
 """
 
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 from typer.core import TyperGroup
 
-from surfacechem.errors import InputError, Place, SurfacechemError, suggestion
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
 from surfacechem.guard import interruptible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from surfacechem.integrate import Run
     from surfacechem.simulation import Simulation
@@ -25,7 +28,7 @@ S = TypeVar("S")
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 """Exit code of each way in which a run ends."""
 
-BAD_INPUT, DIFFERENT, INTERRUPTED = 2, 1, 130
+BAD_INPUT, DIFFERENT, UNWRITTEN, SIGNALLED = 2, 1, 5, 128
 
 EXIT_CODES = """\b
 Exit codes:
@@ -34,8 +37,44 @@ Exit codes:
   2    bad input; nothing was computed
   3    the run was stopped by physics, of a sweep every run; what it reached is written, with the reason
   4    the run failed numerically; what it reached is written
-  130  interrupted; nothing was written
+  5    what was computed could not be written where it should be
+  130  interrupted, or 128 and the number of another signal; nothing was written
 """
+
+
+class SignalledError(BaseException):
+    """A signal asks the process to end."""
+
+
+def _end(number: int, _frame: object) -> None:
+    raise SignalledError(number)
+
+
+@contextmanager
+def _signals_raised() -> Iterator[None]:
+    """Signals that end the process are exceptions meanwhile, so that files that are not finished are removed.
+
+    What the process was told to ignore, as by nohup, it ignores.
+    """
+    wanted = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        wanted = []
+    usual = {number: signal.getsignal(number) for number in wanted}
+    for number, handler in usual.items():
+        if handler != signal.SIG_IGN:
+            signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number, handler in usual.items():
+            signal.signal(number, handler)
+
+
+def _leave(code: int, message: str) -> NoReturn:
+    """End at once: compiled code may still be running in another thread, which would be waited for."""
+    typer.echo(f"surfacechem: {message}", err=True)
+    sys.stderr.flush()
+    os._exit(code)
 
 
 class Commands(TyperGroup):
@@ -44,15 +83,25 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
         try:
-            return super().invoke(ctx)
+            with _signals_raised():
+                return super().invoke(ctx)
+        except OutputError as error:
+            typer.echo(f"surfacechem: {error}", err=True)
+            raise typer.Exit(UNWRITTEN) from None
         except SurfacechemError as error:
             typer.echo(f"surfacechem: {error}", err=True)
             raise typer.Exit(BAD_INPUT) from None
-        except KeyboardInterrupt:
-            typer.echo("surfacechem: interrupted; nothing was written.", err=True)
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(INTERRUPTED)  # compiled code may still be running in another thread, which would be waited for
+        except SignalledError as error:
+            (number,) = error.args
+            name = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+            _leave(SIGNALLED + number, f"{name}; nothing was written.")
+        except BrokenPipeError:
+            raise  # the reader has enough
+        except OSError as error:
+            # Every file is written by what says so itself: this is the standard output, which Python would try again.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            typer.echo(f"surfacechem: standard output: cannot be written: {error.strerror or error}.", err=True)
+            raise typer.Exit(UNWRITTEN) from None
 
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]

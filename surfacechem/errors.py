@@ -5,6 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Self
+
+MANY = 100
+"""Names that a message lists."""
+
+LONGEST = 2000
+"""Characters of a message: a hundred names and a sentence."""
 
 
 @dataclass(frozen=True)
@@ -25,17 +32,25 @@ class SurfacechemError(Exception):
     """Base of every error this package raises on purpose."""
 
 
-class InputError(SurfacechemError):
-    """The input is wrong; nothing was computed. The message is one line, whatever of the input it quotes."""
+class PlacedError(SurfacechemError):
+    """One line that can be read, whatever it quotes, with the place that it is about."""
 
     def __init__(self, message: str, place: Place | None = None) -> None:
-        self.message = printable(message)
+        self.message = message = shortened(printable(message))
         self.place = place
         super().__init__(printable(f"{place}: {message}" if place and str(place) else message))
 
-    def at(self, place: Place) -> InputError:
+    def at(self, place: Place) -> Self:
         """The same error with its place, unless it already knows one."""
         return self if self.place else type(self)(self.message, place)
+
+
+class InputError(PlacedError):
+    """The input is wrong; nothing was computed."""
+
+
+class OutputError(PlacedError):
+    """What was computed could not be written."""
 
 
 def printable(text: str) -> str:
@@ -47,10 +62,17 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
+def shortened(text: str) -> str:
+    """A text that is too long to be read without its middle."""
+    half = LONGEST // 2
+    return text if len(text) <= LONGEST else f"{text[:half]} [...] {text[-half:]}"
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones."""
     names = sorted(known)
-    return f"{nearest(name, names)} Known: {', '.join(names) or 'none'}."
+    shown = ", ".join(names[:MANY]) + (f" and {len(names) - MANY} more" if len(names) > MANY else "")
+    return f"{nearest(name, names)} Known: {shown or 'none'}."
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError
 
 CONVENTIONS = "CF-1.11"
 
@@ -78,31 +79,72 @@ def dataset_path(path: str | Path) -> Path:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A temporary file beside the target that takes its place when all went well; InputError if it cannot be made.
+    """A temporary file beside the target that takes its place, and its permissions, when all went well.
 
-    A link is followed; what is no regular file, or protected, is left alone.
+    A link is followed; what is no regular file, or protected, is left alone: InputError. OutputError where what is
+    written does not fit on the disk.
     """
     target = target.resolve()
+    place = Place(str(target))
     if target.is_dir():
-        raise InputError("is a directory; give a file name to write to.", Place(str(target)))
+        raise InputError("is a directory; give a file name to write to.", place)
     if target.exists() and not target.is_file():
-        raise InputError("is no regular file; give a file name to write to.", Place(str(target)))
+        raise InputError("is no regular file; give a file name to write to.", place)
     if target.exists() and not target.stat().st_mode & stat.S_IWUSR:
-        raise InputError("cannot be written: it is read-only.", Place(str(target)))
+        raise InputError("cannot be written: it is read-only.", place)
     if not target.parent.is_dir():
-        raise InputError(f"cannot be written: there is no folder {target.parent}.", Place(str(target)))
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}.", Place(str(target))) from error
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
+        raise InputError(f"cannot be written: there is no folder {target.parent}.", place)
+    replaced = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+    temporary = target.with_name(f".surfacechem-{secrets.token_hex(8)}{target.suffix}")
+    try:  # from here on, so that no signal finds a file that nobody removes
+        _create(temporary, 0o666 if replaced is None else replaced, place)
+        try:
+            yield temporary
+        except (OSError, RuntimeError) as error:  # RuntimeError is netCDF's
+            raise OutputError(f"cannot be written: {_reason(temporary, error)}.", place) from error
+        if replaced is not None:
+            temporary.chmod(replaced)
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _create(path: Path, mode: int, place: Place) -> None:
+    """An empty file of these permissions without those that the user's umask takes away."""
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror or error}.", place) from error
+
+
+def _reason(path: Path, error: Exception) -> str:
+    """Why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    try:
+        with path.open("wb", buffering=0) as file:
+            for _ in range(64):
+                file.write(bytes(1 << 16))
+    except OSError as found:
+        return found.strerror or str(found)
+    return str(error)
+
+
+def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    """A netCDF file, whole or not at all; OutputError says where the data is kept where there is no room for it."""
+    try:
+        with replacing(target) as temporary:
+            write_netcdf(temporary, columns, attributes)
+    except OutputError as error:
+        kept = Path(tempfile.gettempdir()) / f"{target.stem}-{secrets.token_hex(4)}.nc"
+        try:
+            with replacing(kept) as temporary:
+                write_netcdf(temporary, columns, attributes)
+        except SurfacechemError:
+            raise OutputError(f"{error.message} There is no room in {kept.parent} either.", error.place) from None
+        raise OutputError(
+            f"{error.message} The results are kept in {kept}; move them from there.", error.place
+        ) from None
 
 
 def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:

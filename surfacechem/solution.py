@@ -18,7 +18,7 @@ from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.extremes import capped_rates
 from surfacechem.integrate import Run, Trajectory
-from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, replacing, versions, write_netcdf
+from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, save, versions
 from surfacechem.profiles import profile_columns
 from surfacechem.solvers import solver
 from surfacechem.solvers.contract import Status
@@ -317,8 +317,7 @@ class Solution:
     def write(self, path: str | Path) -> Path:
         """Save as netCDF; the file appears whole or not at all."""
         target = dataset_path(path)
-        with replacing(target) as temporary:
-            write_netcdf(temporary, self.columns, self.attributes)
+        save(target, self.columns, self.attributes)
         return target
 
 

@@ -32,7 +32,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from surfacechem.netcdf import Column, replacing, write_netcdf
+from surfacechem.netcdf import Column, replacing, save
 from surfacechem.report import columns
 
 if TYPE_CHECKING:
@@ -197,10 +197,11 @@ def write(path: str | Path, data: Sequence[Column], attributes: Attributes, figu
 
     files = targets(path)
     for suffix, target in files.items():
+        if suffix == ".nc":
+            save(target, data, attributes)
+            continue
         with replacing(target) as temporary:
-            if suffix == ".nc":
-                write_netcdf(temporary, data, attributes)
-            elif suffix == ".html":
+            if suffix == ".html":
                 temporary.write_text(page.html(), encoding="utf-8")
             else:
                 plots.save(figure, temporary, suffix.removeprefix("."))

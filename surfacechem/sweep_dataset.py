@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.event_table import event_columns
-from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, replacing, versions, write_netcdf
+from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, save, versions
 from surfacechem.quantities import Quantity
 from surfacechem.solution import DATASET_NAMES
 from surfacechem.sweeps import Axis, Plan, Sweep
@@ -247,8 +247,7 @@ class SweepSolution:
     def write(self, path: str | Path) -> Path:
         """Save as netCDF; the file appears whole or not at all."""
         target = dataset_path(path)
-        with replacing(target) as temporary:
-            write_netcdf(temporary, self.columns, self.attributes)
+        save(target, self.columns, self.attributes)
         return target
 
 

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -94,8 +95,11 @@ def test_exit_codes_come_without_traceback(tmp_path, arguments, code):
     assert done.stderr.strip()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to one process")
-def test_interrupt_ends_a_long_run_at_once_and_writes_nothing(tmp_path):
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
+@pytest.mark.parametrize(
+    ("number", "words"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")], ids=["int", "term"]
+)
+def test_a_signal_ends_a_long_run_at_once_and_nothing_is_written(tmp_path, number, words):
     (tmp_path / "long.yaml").write_text(LONG)
     surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
     command = [sys.executable, "-c", SOLVING]
@@ -104,11 +108,52 @@ def test_interrupt_ends_a_long_run_at_once_and_writes_nothing(tmp_path):
         assert process.stdout.readline() == "solving\n", process.communicate()
         time.sleep(1.0)  # well inside the compiled loop
         assert process.poll() is None, process.communicate()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, error = process.communicate(timeout=30)
     finally:
         process.kill()
-    assert (process.returncode, out) == (130, "")
-    assert "surfacechem: interrupted; nothing was written.\n" in error
+    assert (process.returncode, out) == (128 + number, "")
+    assert f"surfacechem: {words}; nothing was written.\n" in error
     assert "Traceback" not in error
     assert {path.name for path in tmp_path.iterdir()} == {"long.yaml", "exothermic.nc"}
+
+
+WRITING = """\
+import time
+from surfacechem import netcdf
+from surfacechem.cli import app
+
+def slow(path, columns, attributes):
+    path.write_bytes(b"half")
+    print("writing", flush=True)
+    time.sleep(60)
+
+netcdf.write_netcdf = slow
+app(["run", "exothermic", "-q"], prog_name="surfacechem")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_while_writing_leaves_no_file_behind(tmp_path, number):
+    command = [sys.executable, "-c", WRITING]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "writing\n", process.communicate()
+        process.send_signal(number)
+        process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("arguments", [("laws",), ("run", "exothermic"), ("schema",)])
+def test_a_full_standard_output_is_one_message(tmp_path, arguments):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 5
+    assert done.stderr.splitlines()[-1] == "surfacechem: standard output: cannot be written: No space left on device."
+    assert "Traceback" not in done.stderr

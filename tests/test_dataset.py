@@ -1,6 +1,8 @@
 """The dataset: conventions, units, attributes, and files that appear whole or not at all."""
 
+import errno
 import os
+import stat
 from functools import cache
 
 import numpy as np
@@ -9,8 +11,8 @@ import xarray
 
 import surfacechem
 from surfacechem.case import names
-from surfacechem.errors import InputError
-from surfacechem.netcdf import cf_unit
+from surfacechem.errors import InputError, OutputError
+from surfacechem.netcdf import cf_unit, write_netcdf
 
 pytestmark = pytest.mark.around
 
@@ -102,14 +104,49 @@ def test_a_file_is_replaced_whole(solution, tmp_path):
     assert xarray.open_dataset(path)["T"].size == 201
 
 
-def test_a_failing_write_leaves_nothing_behind(solution, tmp_path, monkeypatch):
-    def fail(*_):
-        raise OSError("disk full")
+def full_disk(folder):
+    """Writing of netCDF that finds no room in a folder."""
 
-    monkeypatch.setattr("surfacechem.solution.write_netcdf", fail)
-    with pytest.raises(OSError, match="disk full"):
+    def write(path, columns, attributes):
+        if path.parent == folder:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_netcdf(path, columns, attributes)
+
+    return write
+
+
+def test_what_has_no_room_is_kept_elsewhere(solution, tmp_path, monkeypatch):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "other").mkdir()
+    monkeypatch.setattr("surfacechem.netcdf.write_netcdf", full_disk(tmp_path / "full"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "other"))
+    with pytest.raises(OutputError, match=r"out\.nc: cannot be written: No space left on device\. The results"):
+        solution.write(tmp_path / "full" / "out.nc")
+    assert list((tmp_path / "full").iterdir()) == []
+    (kept,) = (tmp_path / "other").iterdir()
+    assert xarray.open_dataset(kept)["T"].size == 201
+
+
+def test_where_there_is_no_room_at_all_nothing_stays_behind(solution, tmp_path, monkeypatch):
+    monkeypatch.setattr("surfacechem.netcdf.write_netcdf", full_disk(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.raises(OutputError, match="There is no room in"):
         solution.write(tmp_path / "out.nc")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
+def test_permissions_follow_the_umask_and_the_file_that_is_replaced(solution, tmp_path, umask):
+    usual = os.umask(umask)
+    try:
+        solution.write(tmp_path / "new.nc")
+        (tmp_path / "old.nc").touch()
+        (tmp_path / "old.nc").chmod(0o664)
+        solution.write(tmp_path / "old.nc")
+    finally:
+        os.umask(usual)
+    assert stat.S_IMODE((tmp_path / "new.nc").stat().st_mode) == 0o666 & ~umask
+    assert stat.S_IMODE((tmp_path / "old.nc").stat().st_mode) == 0o664
 
 
 @pytest.mark.parametrize("target", ["", "missing/out.nc"])

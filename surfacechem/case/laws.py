@@ -22,13 +22,19 @@ L = TypeVar("L", bound=Law)
 Units = Mapping[str, str]
 """Unit of each variable that the case has."""
 
+MOST = 500
+"""Laws of a list. Each may be the same law again, whose names are numbered up to a thousand."""
+
 DIFFERENCES = ("amplitude",)
 """Fields that are a change of their variable, so that degrees Celsius have no meaning for them."""
 
 
 def law_list(contract: type[L], tree: Tree | None, units: Units) -> tuple[L, ...]:
     """The laws of a list."""
-    return tuple(law(contract, item, units) for item in items(tree, partial(_example, contract)))
+    found = items(tree, partial(_example, contract))
+    if len(found) > MOST:
+        raise found[MOST].error(f"more than {MOST} laws in a list.")
+    return tuple(law(contract, item, units) for item in found)
 
 
 def law(contract: type[L], item: Tree, units: Units, x: str = "") -> L:
