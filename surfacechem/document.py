@@ -34,6 +34,9 @@ class Limits:
 CASE = Limits()
 """Of a case; longer tables belong into files of their own."""
 
+ORIGIN = "override"
+"""What stands for the file in messages about a value that the user has set from outside the document."""
+
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -94,6 +97,23 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+def beside(folder: Path, name: str, place: Place) -> Path | None:
+    """The file of a name in a folder, None where there is none.
+
+    A document may come from elsewhere, so that what it names is read only where it lies beside or below it; a file in
+    another place is for the user to name.
+    """
+    path = folder / name
+    if not is_file(path):
+        return None
+    if place.file != ORIGIN and not path.resolve().is_relative_to(folder.resolve()):
+        message = (
+            f"{name} lies outside the folder of the case. Put it there, or name it yourself: --set {place.path}=..."
+        )
+        raise InputError(message, place)
+    return path
 
 
 def parse(text: str, file: str = "") -> Tree:

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from surfacechem.document import Tree, from_plain, labels, parse, with_paths
+from surfacechem.document import ORIGIN, Tree, from_plain, labels, parse, with_paths
 from surfacechem.errors import InputError, Place, suggestion
-
-ORIGIN = "override"
-"""What stands for the file in messages about a value that was set from outside."""
 
 WRITTEN_OUT = ("level", "value", "rises-to")
 """Keys of a value that may also stand by itself."""

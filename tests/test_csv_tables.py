@@ -79,9 +79,9 @@ def test_editors_know_both_ways(table):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("t [s], Q_1 [W/m^2]\n0, 0\n1, x\n", r"heat.csv:3: 'x W/m\^2' is not a number with a unit; Q_1 needs"),
+        ("t [s], Q_1 [W/m^2]\n0, 0\n1, x\n", r"heat.csv:3: Q_1 is no number there"),
         ("t [s], Q_1 [K]\n0, 0\n1, 1\n", r"heat.csv:2: 0 K is a temperature; Q_1 needs"),
-        ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: 't' is no name with a unit"),
+        ("t, Q_1 [W/m^2]\n0, 0\n1, 1\n", r"heat.csv:1: the heading of column 1 is no name with a unit"),
         ("t [s], Q_1 [W/m^2]\n0, 0\n1, 1, 1\n", r"heat.csv:3: 3 values for 2 columns"),
         ("t [s], Q_1 [W/m^2]\n\n2, 0\n1, 1\n", r"heat.csv:4: times must never decrease"),
         (
@@ -104,7 +104,7 @@ def test_bad_files_are_refused_by_line(tmp_path, content, message):
 
 def test_a_table_in_the_case_has_its_lines(tmp_path):
     inline = CASE.replace("{file: heat.csv}", '{csv: "t [s], Q_1 [W/m^2]\\n0, 0\\n1, x"}')
-    with pytest.raises(InputError, match=r"written.yaml:7: loading.Q_1.table.csv: line 3 of the table: 'x W/m\^2'"):
+    with pytest.raises(InputError, match=r"written.yaml:7: .*csv: line 3 of the table: Q_1 is no number"):
         surfacechem.load(_write(tmp_path, inline))
 
 
@@ -113,3 +113,28 @@ def test_a_missing_file(tmp_path):
         surfacechem.load(_write(tmp_path, CASE))
     with pytest.raises(InputError, match="two roles: give `file` or `csv`"):
         surfacechem.load(_write(tmp_path, CASE.replace("heat.csv", 'heat.csv, csv: "t [s]"')))
+
+
+@pytest.mark.parametrize("name", ["{}/secret.csv", "../secret.csv", "link.csv"])
+def test_what_lies_elsewhere_is_named_by_the_user_or_not_read(tmp_path, name):
+    """A case may come from anywhere; it cannot make somebody's files appear in messages or datasets."""
+    folder = tmp_path / "case"
+    folder.mkdir()
+    (tmp_path / "secret.csv").write_text("t [s], Q_1 [W/m^2]\n0, 0\n1, 1\n")
+    (folder / "link.csv").symlink_to(tmp_path / "secret.csv")
+    file = name.format(tmp_path)
+    (folder / "written.yaml").write_text(CASE.replace("{file: heat.csv}", f"{{file: {file}}}"))
+    with pytest.raises(InputError, match=r"written.yaml:7: .* lies outside the folder of the case.*--set loading.Q_1"):
+        surfacechem.load(folder / "written.yaml")
+    assert surfacechem.load(folder / "written.yaml", {"loading.Q_1.table.file": str(tmp_path / "secret.csv")})
+
+
+def test_no_message_repeats_what_stands_in_a_file(tmp_path):
+    (tmp_path / "heat.csv").write_text("daemon:x:0:0\nt [s], Q_1 [W/m^2]\n0, password\n")
+    (tmp_path / "written.yaml").write_text(CASE)
+    for _ in range(2):
+        with pytest.raises(InputError) as caught:
+            surfacechem.load(tmp_path / "written.yaml")
+        assert "daemon" not in str(caught.value)
+        assert "password" not in str(caught.value)
+        (tmp_path / "heat.csv").write_text("t [s], Q_1 [W/m^2]\n0, password\n1, 1\n")

@@ -39,8 +39,8 @@ def _with_content(fields: dict[str, Tree], base: str) -> dict[str, Tree]:
         raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
     file = fields.pop("file")
     name = text(file, "the file of a table")
-    path = Path(base) / name
-    if not document.is_file(path):
+    path = document.beside(Path(base), name, file.place)
+    if path is None:
         raise file.error(f"no file {name} beside the case.")
     return {"csv": Tree(document.read(path), Place(str(path))), **fields}
 
@@ -109,7 +109,8 @@ def _column(cell: str, heading: Row) -> tuple[str, str]:
     """Name and unit of a column."""
     found = HEADING.fullmatch(cell)
     if found is None:
-        raise heading.error(f"'{cell[:40]}' is no name with a unit; the first line is like {EXAMPLE}.")
+        number = heading.cells.index(cell) + 1
+        raise heading.error(f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}.")
     return found["name"], found["unit"].strip()
 
 
@@ -138,6 +139,10 @@ def _number(row: Row, index: int, columns: Sequence[tuple[str, str]], unit: str,
     name, given = columns[index]
     cell = row.cells[index]
     whose = f"{variable}, from the column {name}," if variable and variable != name else name
+    try:
+        float(cell)
+    except ValueError:
+        raise row.error(f"{whose} is no number there.") from None
     try:
         return parse(cell if given == "1" else f"{cell} {given}", unit, name=whose)
     except InputError as error:

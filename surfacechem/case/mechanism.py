@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -28,9 +28,10 @@ def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: 
     """
     if tree is None:
         return None
-    file, phase, bonds, neighbours = _choice(tree)
+    named, phase, bonds, neighbours = _choice(tree)
+    file = _with_suffix(text(named, "the mechanism"))
     if content is None:
-        path = _find(file, Path(base), tree)
+        path = _find(file, Path(base), named)
         return _load(path, phase, bonds, tree, evaluate, neighbours)
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
@@ -62,17 +63,16 @@ def _neighbour(tree: Tree) -> Neighbour:
     )
 
 
-def _choice(tree: Tree) -> tuple[str, str | None, Sequence[str] | None, dict[str, Tree]]:
+def _choice(tree: Tree) -> tuple[Tree, str | None, Sequence[str] | None, dict[str, Tree]]:
     """File, phase, names of the bonds and states of the neighbours."""
     if not isinstance(tree.value, dict):
-        return _with_suffix(text(tree, "the mechanism")), None, None, {}
+        return tree, None, None, {}
     fields = mapping(tree, ["file", "phase", "bonds", "neighbours"])
     if "file" not in fields:
         raise tree.error("the mechanism needs `file`: the name of a Cantera surface mechanism.")
     phase = text(fields["phase"], "the phase") if "phase" in fields else None
     bonds = [text(item, "a species") for item in items(fields["bonds"])] if "bonds" in fields else None
-    file = _with_suffix(text(fields["file"], "the mechanism"))
-    return file, phase, bonds, mapping(fields.get("neighbours"))
+    return fields["file"], phase, bonds, mapping(fields.get("neighbours"))
 
 
 def _with_suffix(name: str) -> str:
@@ -80,18 +80,18 @@ def _with_suffix(name: str) -> str:
 
 
 def _find(name: str, base: Path, tree: Tree) -> Path:
-    for folder in (base, data.mechanisms()):
-        if document.is_file(folder / name):
-            return folder / name
-    for folder in _of_cantera():
-        if document.is_file(folder / name):
-            return folder / name
-    known = [path.stem for folder in (data.mechanisms(),) for path in folder.glob("*.yaml")]
+    """Beside the case, in the package, or where Cantera itself looks."""
+    for folders in ((base, data.mechanisms()), _of_cantera()):
+        for folder in folders:
+            path = document.beside(folder, name, tree.place)
+            if path is not None:
+                return path
+    known = [path.stem for path in data.mechanisms().glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
 
 
-def _of_cantera() -> list[Path]:
+def _of_cantera() -> Iterator[Path]:
     """The folders in which Cantera itself looks for mechanisms."""
     import cantera
 
-    return [Path(folder) for folder in cantera.get_data_directories() if folder != "."]
+    yield from (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
