@@ -142,6 +142,16 @@ class RateLaw(Law):
         return None
 
     @property
+    def balanced(self) -> bool:
+        """Whether the reverse follows from the affinity, with which the rate vanishes."""
+        return "mu" in reads(self.statement)
+
+    @property
+    def length(self) -> Expression | None:
+        """How far a bond that the law forms lets a load down [m]; None where the law runs one way or does not say."""
+        return None
+
+    @property
     def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
         """Enthalpy and Gibbs energy [J] that one reaction takes from what is beside the interface; None where nothing.
 

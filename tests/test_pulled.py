@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.laws import laws
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.ratecurves import Curves
+from surfacechem.terms import RateLaw
 
 KT = BOLTZMANN * 298.15
 LENGTH = 3.8e-9  # 0.4 nm + 3.4 nm
@@ -119,3 +122,92 @@ def test_the_sheet_of_a_mechanism_says_the_same():
     assert K[1] - K[0] == pytest.approx(1e-11 * LENGTH / KT, rel=1e-9)
     free = curves.log_equilibrium("R2", np.array(298.15), np.array([0.0, 1e-11]))
     assert free[1] == free[0]
+
+
+# -- laws of one kind of bond -----------------------------------------------------------------------------------------
+
+SITES = 1e16
+EPSILON = 4e-21
+HELD = """
+title: bonds under a prescribed load
+bodies: {{a: {{temperature: 300 K}}, b: {{temperature: 300 K}}}}
+interface:
+  temperature: 300 K
+  sites: 1e16 1/m^2
+  potential: [{{lattice-gas: {{epsilon: 4e-21 J}}}}{springs}]
+  bonding: [{laws}]
+{load}
+initial: {{phi: 0.6}}
+run: {{until: {until}}}
+"""
+RATIO = math.exp(EPSILON / (BOLTZMANN * 300.0))
+ELL = -0.7e-9
+BELL = f"{{bell: {{k_off: 1 1/s, x_off: 0.4 nm, k_on: {RATIO!r} 1/s, x_on: -0.3 nm}}}}"
+REVERSIBLE = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm, x_on: -0.3 nm}}"
+BESIDE = f"{REVERSIBLE}, {{linear-affinity: {{c_r: 1e20 1/J/s}}}}"
+
+
+PROGRAMME = "programme: [{{pull: {{f: 1 pN/s, for: {0}.5 s}}}}]"
+
+
+def held(folder, laws, load="loading: {f: 5 pN}", until="60 s", springs=""):
+    path = folder / "held.yaml"
+    path.write_text(HELD.format(laws=laws, load=load, until=until, springs=springs))
+    return surfacechem.load(path)
+
+
+def test_every_law_that_says_a_length_is_tried_below():
+    """A new law that a force drives to another equilibrium joins the list."""
+    assert {law.name() for law in laws(RateLaw).values() if "length" in vars(law)} == {"bell", "reversible-bell"}
+
+
+@pytest.mark.parametrize("law", [BELL, REVERSIBLE, BESIDE])
+@pytest.mark.parametrize("load", ["loading: {{f: {0} pN}}", "loading: {{t_n: {0} kPa}}", PROGRAMME])
+def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
+    """d ln(phi / (1 - phi)) / df = l / k_B T, with the force or the share of a traction that each bond bears."""
+    found = []
+    for level in (0, 4, 10):
+        solution = held(tmp_path, law, load.format(level), "90 s").run()
+        last = solution.dataset.isel(time=-1)
+        force = float(last["f"])
+        found.append((force, math.log(last["phi"] / (1 - last["phi"]))))
+        assert solution.audit.violations == ()
+        assert solution.audit.energy_error < 1e-9
+    for force, log_ratio in found:
+        assert log_ratio == pytest.approx((EPSILON + force * ELL) / (BOLTZMANN * 300.0), abs=1e-7)
+    assert found[2][0] > found[1][0] > 0
+
+
+def test_bells_rates_depart_from_no_equilibrium_under_a_force(tmp_path):
+    data = held(tmp_path, BELL, "loading: {f: {ramp: {rate: 1 pN/s}}}", "10 s").run().dataset
+    np.testing.assert_allclose(data["departure_bell"], 0.0, atol=1e-12)
+    rate, force = data["R_bell"], data["f"]
+    work = np.trapezoid(rate * force * ELL, data["time"])
+    assert float(data["W_f"][-1]) == pytest.approx(float(work), rel=1e-3)
+
+
+def test_both_ways_of_bell_run_alike(tmp_path):
+    """The reverse that follows from the potential and the force is that of the distance of formation."""
+    both = [held(tmp_path, law, "loading: {f: 8 pN}", "1 s").run().dataset["phi"] for law in (BELL, REVERSIBLE)]
+    np.testing.assert_allclose(both[0], both[1], rtol=1e-9)
+
+
+def test_without_a_length_a_prescribed_force_is_refused(tmp_path):
+    law = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm}}"
+    for load in ("loading: {f: 0 pN}", "loading: {t_n: 1 kPa}"):
+        with pytest.raises(
+            InputError, match=r"held.yaml:8: .* same equilibrium under any prescribed force.* Give `x_on`"
+        ):
+            held(tmp_path, law, load).run()
+
+
+def test_a_length_beside_springs_is_refused(tmp_path):
+    with pytest.raises(InputError, match="the potential says what the force does to the equilibrium; leave it out"):
+        held(tmp_path, REVERSIBLE, "loading: {g_n: 1 nm}", springs=", {bond-springs: {k_b: 1e-3 N/m}}").run()
+
+
+def test_a_reversible_bell_reaction_under_a_prescribed_force_is_refused(tmp_path):
+    reversible = "- {equation: a <=> b, type: Bell, rate-constant: {A: 2 1/s, b: 0, Ea: 0}, x-beta: 0.4 nm}\n"
+    case = pairs(tmp_path, reversible=reversible)
+    with pytest.raises(InputError, match=r"same equilibrium under any prescribed force.* two reactions with `=>`"):
+        case.run()

@@ -14,7 +14,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.draft import Bond
 from surfacechem.assembly.force import RESOLUTION, SHARED
 from surfacechem.assembly.pairs import departure, opposed, own_departure
-from surfacechem.assembly.pulled import book_work, dead_load
+from surfacechem.assembly.pulled import book_work, by_affinity, dead_load
 from surfacechem.assembly.softening import softening
 from surfacechem.expressions import Expression, depends, derivative, exponents, where
 from surfacechem.quantities import Quantity
@@ -34,14 +34,15 @@ def reactions(build: Build) -> None:
         build.law_ranges(law)
     pairs = opposed(laws)
     together = {label: pair.label for pair in pairs for label in pair.labels}
-    affinities = {label: _affinity(build, law, mu) for label, law in laws.items()}
     load = dead_load(build, laws, pairs)
     loaded = {name: value + load.get(name, 0) for name, value in mu.items()}
+    pulled = {label: law for label, law in laws.items() if label in together or by_affinity(law)}
+    affinities = {label: _affinity(build, law, loaded if label in pulled else mu) for label, law in laws.items()}
     rates = {label: _rate(build, law, label, affinities[label]) for label, law in laws.items()}
     free = _free(build, laws, rates)
     named: dict[str, Expression] = {}
     for label, law in laws.items():
-        nu, affinity = law.stoichiometry(), _affinity(build, law, loaded if label in together else mu)
+        nu, affinity = law.stoichiometry(), affinities[label]
         quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
         rate = named[label] = build.name(quantity, rates[label] * free if "phi" in nu else rates[label])
         # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
@@ -52,7 +53,7 @@ def reactions(build: Build) -> None:
         own_departure(build, label, law, affinity)
         softening(build, law)
     supplied(build, laws, named)
-    book_work(build, {label: laws[label] for label in together}, named, load)
+    book_work(build, pulled, named, load)
     for pair in pairs:
         departure(build, pair, loaded)
     for name, bond in build.bonding.items():

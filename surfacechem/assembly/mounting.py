@@ -96,7 +96,7 @@ def held_across(build: Build, along: Held) -> Held | None:
             raise InputError("a mass is the same in every direction. Give `m` under `tangential`.", law.place)
         _refuse_restitution(law, "t2")
         return Held(law, "t2", law.path, along)
-    given = any(_driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
+    given = any(driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
     if given or any(hasattr(friction, "transverse") for friction in build.interface.frictions):
         return Held(along.law, "t2", along.by, along)
     return None
@@ -104,10 +104,11 @@ def held_across(build: Build, along: Held) -> Held | None:
 
 def pulled(build: Build, axis: str) -> bool:
     """Whether a history or the programme gives a far-field traction."""
-    return _driven(build, f"F_{axis}")
+    return driven(build, f"F_{axis}")
 
 
-def _driven(build: Build, name: str) -> bool:
+def driven(build: Build, name: str) -> bool:
+    """Whether a history or the programme gives a variable."""
     return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
 
 

@@ -8,6 +8,10 @@ the species k lets the load down,
 .. math:: \sum_k \nu_k \ell_k = x_f - x_r, \qquad \Lambda = -f \sum_k N_k \theta_k \ell_k,
 
 and the load's potential belongs to the affinity of the pair, whose reactions take :math:`f\sum_k\nu_k\ell_k` from it.
+So it does to that of every law which goes by the affinity: in equilibrium :math:`d\ln\frac{\phi}{1-\phi}/df=\ell/k_BT`
+of bonds that mix ideally. A law that feels the force while its reverse follows from the affinity has to say its length
+itself. A prescribed traction that bonds share is such a force too, a share each.
+
 Where pairs around a cycle contradict each other, or reactions whose reverse knows no force, the lengths are the closest
 (least squares), and what is left is a departure from equilibrium. A reaction that nothing undoes takes no work: what
 the load does once a bond has let go is not the interface's.
@@ -25,9 +29,12 @@ import symengine
 from numpy.typing import NDArray
 
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.force import SHARED
+from surfacechem.assembly.mounting import driven
 from surfacechem.assembly.pairs import Opposed
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
-from surfacechem.terms import RateLaw
+from surfacechem.terms import RateLaw, reads
 
 Array = NDArray[np.float64]
 Change = Mapping[str, int | float]
@@ -37,13 +44,50 @@ NO_PART = 1e-12
 
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
-    """Potential of a prescribed force per molecule [J], by bonding variable; empty where no pair of rates feels one."""
-    found = lengths(laws, pairs) if "f" in build.scene.loading else {}
+    """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
+    given = _prescribed(build)
+    for law in laws.values():
+        (_refuse_unknown_length if given else _refuse_idle_length)(law)
+    found = lengths(laws, pairs) if given else {}
     if not found:
         return {}
     f = build.variables.get("f", "the work of the force")
     load = -f * sum(build.bonding[name].density * build.bonding[name].symbol * found[name] for name in found)
     return {name: derivative(load, build.bonding[name].symbol) / build.bonding[name].density for name in found}
+
+
+def _prescribed(build: Build) -> bool:
+    """Whether the force on a bond is prescribed, by itself or as its share in a prescribed traction."""
+    shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
+    return driven(build, "f") or (shares and driven(build, "t_n"))
+
+
+def by_affinity(law: RateLaw) -> bool:
+    """Whether a law goes by an affinity that the work of a force is part of."""
+    return law.length is not None or "mu" in reads(law.statement)
+
+
+def _refuse_unknown_length(law: RateLaw) -> None:
+    if law.balanced and law.length is None and "f" in reads(law.statement):
+        remedy = (
+            "Give `x_on`, 0 m where formation does not feel the force"
+            if hasattr(law, "x_on")
+            else "Write it as two reactions with `=>`, each with its own distance to the transition state"
+        )
+        raise InputError(
+            f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
+            f"how far a bond lets the load down as it forms is not known. {remedy}.",
+            law.place,
+        )
+
+
+def _refuse_idle_length(law: RateLaw) -> None:
+    if law.length is not None and law.log_ratio is None:
+        raise InputError(
+            f"x_on of {law.name()} belongs to a prescribed force. Here the potential says what the force does to the "
+            "equilibrium; leave it out.",
+            law.place,
+        )
 
 
 def book_work(
@@ -60,14 +104,15 @@ def book_work(
         power = symengine.Add(*taken)
         build.supply("W_f", "work of the prescribed force on bonds", power, None)
         build.into_interface.append(power)
-        build.node_of["interface"].inflow.append(power)
+        if "interface" in build.node_of:
+            build.node_of["interface"].inflow.append(power)
 
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """How far a bond of each species lets a load down [m], up to what no pair tells; empty where no pair feels it."""
-    known = list(_known(pairs))
+    known = [*_known(pairs), *((law.stoichiometry(), law.length) for law in laws.values() if law.length is not None)]
     names = list(dict.fromkeys(name for change, _ in known for name in change))
-    both_ways = [law.stoichiometry() for law in laws.values() if not law.one_way and law.log_ratio is None]
+    both_ways = [law.stoichiometry() for law in laws.values() if law.balanced and not by_affinity(law)]
     inverse = _inverse(*(_matrix(names, changes) for changes in ([change for change, _ in known], both_ways)))
     return {
         name: sum(float(c) * x for c, (_, x) in zip(row, known, strict=True) if abs(c) > NO_PART)

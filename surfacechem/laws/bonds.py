@@ -35,6 +35,11 @@ class Bell(StatedBothWays):
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
     x_on: float = parameter("m", "distance to the transition state of formation", default=0.0)
 
+    @property
+    def length(self) -> Expression | None:
+        """What the two distances to the transition state differ by, where bonds form too."""
+        return None if self.log_ratio is None else self.x_on - self.x_off
+
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
         on, off = (BellFactor(x_beta=x).log_factor(f, T_c) for x in (self.x_on, self.x_off))
@@ -52,9 +57,16 @@ class ReversibleBell(RateLaw):
 
     .. math:: R = -n_c k_{off} e^{f x_{off} / k_B T_c}\,\phi \left( 1 - e^{-\mu / k_B T_c} \right)
 
-    With a lattice gas and bond springs, bonds form at the rate
-    :math:`k_{off} e^{(\varepsilon + f x_{off} - w_b) / k_B T_c}`. Source: Bell (1978), doi 10.1126/science.347575, with
-    the reverse of Sauer, Duong & Mandadapu (2021), section 4. Always admissible; the potential should contain mixing.
+    With a lattice gas and bond springs, whose energy knows the force, bonds form at the rate
+    :math:`k_{off} e^{(\varepsilon + f x_{off} - w_b) / k_B T_c}`. A prescribed force works on the way from one state to
+    the other, :math:`\ell = x_{on} - x_{off}`, by which a bond lets it down as it forms: its work belongs to the
+    affinity, :math:`\mu - f \ell` stands for :math:`\mu`, and bonds form at the rate
+    :math:`k_{off} e^{(\varepsilon + f x_{on}) / k_B T_c}`. The equilibrium then obeys
+
+    .. math:: \frac{d}{df} \ln\frac{\phi}{1 - \phi} = \frac{\ell}{k_B T_c}
+
+    Source: Bell (1978), doi 10.1126/science.347575, with the reverse of Sauer, Duong & Mandadapu (2021), section 4.
+    Always admissible; the potential should contain mixing.
 
     >>> ReversibleBell(k_off=0.1, x_off=4e-10).rate(phi=0.5, n_c=1.0, f=0.0, T_c=300.0, mu=1e-20)
     -0.045528...
@@ -62,6 +74,14 @@ class ReversibleBell(RateLaw):
 
     k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
     x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
+    x_on: float | None = parameter(
+        "m", "distance to the transition state of formation, under a prescribed force only", default=None
+    )
+
+    @property
+    def length(self) -> Expression | None:
+        """What the two distances to the transition state differ by, where both are given."""
+        return None if self.x_on is None else self.x_on - self.x_off
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""

@@ -116,6 +116,11 @@ class SurfaceReaction(MechanismReaction):
         return ()
 
     @property
+    def balanced(self) -> bool:
+        """Whether the reverse follows from the thermo."""
+        return self.reversible
+
+    @property
     def rate(self) -> Formula:  # type: ignore[override]
         """Net rate [1/(m^2 s)]."""
         return self._formula(lambda values: self._forward(values) - self._reverse(values))
