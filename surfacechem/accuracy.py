@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,3 +61,31 @@ def relative_errors(values: Array, exact: Array, floor: float) -> Array:
 def relative_error(values: Array, exact: Array, floor: float) -> float:
     """The largest of the relative errors."""
     return float(np.max(relative_errors(values, exact, floor), initial=0.0))
+
+
+UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
+"""Why the error of a run with cells is not known."""
+
+
+@dataclass(frozen=True)
+class CellErrors:
+    """Relative errors that the cells leave, by variable; nothing where no body has any."""
+
+    variables: Mapping[str, float] = field(default_factory=dict)
+    converged: bool = True
+    """Whether half of the cells and a quarter of them confirm the order, so that the errors are known."""
+    in_noise: bool = False
+    """Whether the tolerance of the run hides what more cells would change."""
+    source: str = "and one with half of the cells"
+    """What the errors are from, after the words for those of the tolerance."""
+
+    @property
+    def largest(self) -> float:
+        """The largest error; not a number where it is not known."""
+        return max(self.variables.values(), default=0.0) if self.converged else math.nan
+
+    def added_to(self, other: CellErrors) -> CellErrors:
+        """Errors of both; known where both are."""
+        names = {**self.variables, **other.variables}
+        total = {name: self.variables.get(name, 0.0) + other.variables.get(name, 0.0) for name in names}
+        return replace(other, variables=total, converged=self.converged and other.converged)

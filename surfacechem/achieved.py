@@ -8,13 +8,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
+from surfacechem.accuracy import FLOOR, UNKNOWN, CellErrors, relative_error, second_tolerance
 from surfacechem.audit import audit
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.event_table import SIDE, event_times
@@ -39,17 +40,12 @@ def check_way(way: str) -> None:
         raise InputError(f"no source '{way}' of an error.{suggestion(way, WAYS)}", Place(path="--error"))
 
 
-def no_cells() -> Mapping[str, float]:
-    """Errors of cells across bodies where no body has any."""
-    return {}
-
-
 def accuracy(
     trajectory: Trajectory,
     scene: Scene,
     exact: tuple[str, Mapping[str, float]] | None,
     way: str,
-    cells: Callable[[], Mapping[str, float]] = no_cells,
+    cells: Callable[[], CellErrors] = CellErrors,
     estimate: Accuracy | None = None,
 ) -> Accuracy:
     """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters.
@@ -79,7 +75,7 @@ def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapp
     return Accuracy(max(errors.values()), f"exact solution {name}", errors, exact)
 
 
-def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = None) -> Accuracy:
+def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
     """Errors of states and of the times of events, estimated from a second run; at the tightest tolerance that run is
     the looser one. Those of the cells across bodies are added.
     """
@@ -90,10 +86,9 @@ def against_tighter(trajectory: Trajectory, cells: Mapping[str, float] | None = 
         why = f"a second run at rtol {other:.0e} {EARLIER}: {second.reason}"
         return from_balances(trajectory, f"balances only, since {why}")
     errors, note = apart(trajectory, second)
-    source = second_run(other) + (", and one with half of the cells" if cells else "")
-    for name, error in (cells or {}).items():
-        errors[name] = errors.get(name, 0.0) + error
-    return Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+    source = second_run(other)
+    found = Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+    return with_cells(found, cells) if cells else found
 
 
 def second_run(rtol: float) -> str:
@@ -106,7 +101,7 @@ def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]
     found, expected = event_times(first), event_times(second)
     note = difference(found, expected)
     times = first.result.times[: len(second.result.times)]
-    shared = np.flatnonzero(np.full(len(times), True) if note else _beside_jumps(times, first, second))
+    shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
     ours, theirs = states(first), states(second)
     errors = {name: relative_error(ours[name][shared], theirs[name][shared], FLOOR) for name in ours}
     if found and not note:
@@ -114,22 +109,24 @@ def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]
     return errors, note
 
 
-def _beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
+def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
     """At which times two runs with the same events have made the same jumps; those of the events are compared apart."""
     ways = np.array([[one.t, other.t] for one, other in zip(first.jumps, second.jumps, strict=False)]).reshape(-1, 2)
     early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
     return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
 
 
-def with_cells(estimate: Accuracy, cells: Mapping[str, float]) -> Accuracy:
-    """An estimate with the errors of the cells across bodies added."""
-    if not cells:
+def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
+    """An estimate with the errors of the cells across bodies added; not known where those are not."""
+    if not cells.variables:
         return estimate
+    if not cells.converged:
+        return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={})
     errors = dict(estimate.variables)
-    for name, error in cells.items():
+    for name, error in cells.variables.items():
         errors[name] = errors.get(name, 0.0) + error
     worst = max(estimate.error, *errors.values())
-    return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, and one with half of the cells")
+    return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, {cells.source}")
 
 
 def from_balances(trajectory: Trajectory, source: str) -> Accuracy:

@@ -22,6 +22,30 @@ def points(cells: int, grading: float = 1.0) -> tuple[float, ...]:
     return (*(math.expm1(s * i / cells) / math.expm1(s) for i in range(cells)), 1.0)
 
 
+def layered(cells: int, layer: float, both: bool = False) -> tuple[float, ...]:
+    """Points of so many cells whose width is in proportion to their distance from the contact plus a ``layer``; with
+    ``both`` to that from the far side as well. Layers of every depth from that one on are then equally well resolved.
+
+    The mapping is smooth and the same for every number of cells.
+
+    >>> [round(point, 12) for point in layered(2, layer=1 / 8)]
+    [0.0, 0.25, 1.0]
+    >>> [round(point, 12) for point in layered(2, layer=1 / 8, both=True)]
+    [0.0, 0.5, 1.0]
+    """
+    s = folds(layer, both)
+    if not both:
+        return (*(layer * math.expm1(s * i / cells) for i in range(cells)), 1.0)
+    ratio = layer / (1 + layer)
+    near = [layer * math.expm1(s * i / cells) / (1 + ratio * math.exp(s * i / cells)) for i in range(cells // 2 + 1)]
+    return (*near, *(1 - x for x in reversed(near[: (cells + 1) // 2])))
+
+
+def folds(layer: float, both: bool = False) -> float:
+    """By how many factors of e the width of the cells grows, and falls again towards a far side that has layers."""
+    return math.log1p(1 / layer) * (2 if both else 1)
+
+
 def shares(at: tuple[float, ...]) -> tuple[float, ...]:
     """Part of the volume that belongs to each point: half of the cells on either side.
 

@@ -144,6 +144,21 @@ class Trajectory:
         return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
 
 
+def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Every parameter and initial value by path, with some of them changed."""
+    values = {parameter.path: parameter.at(0.0) for parameter in system.parameters}
+    values |= {state.path: state.at_start[1] for state in system.states}
+    specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in system.states}
+    specs |= {parameter.path: parameter.spec for parameter in system.parameters}
+    known = system.changeable if changes else {}
+    for path, value in (changes or {}).items():
+        if path not in known:
+            raise InputError(f"no parameter '{path}' to change.{suggestion(path, known)}")
+        specs[path].check(path, float(value))
+        values[path] = float(value)
+    return values
+
+
 class Model:
     """A system with its machine code, made when it is built."""
 
@@ -189,17 +204,7 @@ class Model:
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Every parameter and initial value by path, with some of them changed."""
-        values = {parameter.path: parameter.at(0.0) for parameter in self.system.parameters}
-        values |= {state.path: state.at_start[1] for state in self.system.states}
-        specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in self.system.states}
-        specs |= {parameter.path: parameter.spec for parameter in self.system.parameters}
-        known = self.system.changeable if changes else {}
-        for path, value in (changes or {}).items():
-            if path not in known:
-                raise InputError(f"no parameter '{path}' to change.{suggestion(path, known)}")
-            specs[path].check(path, float(value))
-            values[path] = float(value)
-        return values
+        return values_of(self.system, changes)
 
     def _segments(self, end: float, values: Mapping[str, float]) -> Array:
         return pieces.segments(self.system, end, values)

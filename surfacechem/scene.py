@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from surfacechem import grids
 from surfacechem.errors import InputError, Place
 from surfacechem.substances import Fluid, Property
 from surfacechem.terms import (
@@ -22,7 +23,7 @@ from surfacechem.terms import (
 )
 
 MOST_CELLS = 4096
-"""Cells across a body at most, whether a case gives them or an accuracy asks for them."""
+"""Cells across a body at most that a case may give."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,9 @@ class Conduction(Law):
     .. math:: \frac{C(T)}{L}\,\dot T = \frac{\partial}{\partial x}\Big(k\,\frac{\partial T}{\partial x}\Big)
 
     The body's heat capacity C, per area, is spread over its thickness L. Its temperature is that at the contact; cells
-    divide the thickness, in finite volumes of second order. Without cells the body is one lump. Far side: insulated,
-    held at a temperature, or cooled through ``h_far``. Source: Carslaw & Jaeger (1959), Conduction of Heat in Solids,
-    chapter III; the first law in one dimension.
+    divide the thickness, in finite volumes of second order, graded as given or towards a ``layer``. Without cells the
+    body is one lump. Far side: insulated, held at a temperature, or cooled through ``h_far``. Source: Carslaw & Jaeger
+    (1959), Conduction of Heat in Solids, chapter III; the first law in one dimension.
     """
 
     contract = "conduction"
@@ -61,6 +62,18 @@ class Conduction(Law):
     accuracy: float | None = option("relative accuracy of temperatures, by which a run chooses the cells", default=None)
     grading: float = option("width of the cells at the far side over that at the contact", default=1.0)
     far: Load | None = option("temperature at the far side, or beyond it; none where insulated", default=None)
+    layer: float = option(
+        "part of the thickness that heat has reached when a run is first looked at, towards which cells are graded; "
+        "0 where they are graded as given",
+        default=0.0,
+    )
+
+    @property
+    def points(self) -> tuple[float, ...]:
+        """Ends of the cells from the contact to the far side, as parts of the thickness."""
+        if self.layer:
+            return grids.layered(self.cells, self.layer, both=self.far is not None)
+        return grids.points(self.cells, self.grading)
 
     @property
     def held(self) -> bool:

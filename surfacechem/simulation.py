@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,15 @@ import numpy as np
 
 from surfacechem import case as cases
 from surfacechem import choice, spatial
+from surfacechem.accuracy import CellErrors
 from surfacechem.achieved import accuracy, check_way
 from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.event_table import event_times
+from surfacechem.integrate import Model, Run, Trajectory, values_of
 from surfacechem.overrides import parameter_path
+from surfacechem.scene import Scene
 from surfacechem.solution import Accuracy, Solution
 from surfacechem.solvers import AUTO
 from surfacechem.system import System
@@ -26,7 +30,7 @@ from surfacechem.units import parse
 
 if TYPE_CHECKING:
     from surfacechem.sweep_dataset import SweepSolution
-    from surfacechem.sweeps import Plan
+    from surfacechem.sweeps import Plan, Sweep
 
 
 def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
@@ -52,12 +56,13 @@ def sweep(
 class Simulation:
     """A case with its system and machine code, each made when first needed."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, grids: dict[tuple[object, ...], Simulation] | None = None) -> None:
         self.case = case
         self._sweep_models: dict[str, Model] = {}
-        self._finer: dict[int, Simulation] = {}
-        self._tightened: dict[float | None, Simulation] = {}
         self._freed: dict[frozenset[str], Simulation] = {}
+        self._grids = {} if grids is None else grids
+        """Simulations of the same case by the cells of their bodies."""
+        self._grids.setdefault(spatial.grid(case.scene), self)
 
     def __repr__(self) -> str:
         """Title and states in a line."""
@@ -87,14 +92,20 @@ class Simulation:
         if (freed := self._with_freed(values)) is not self:
             return freed.run(values, settings, error)
         values = {path: value for path, value in values.items() if path not in self.system.constants}
-        chosen, trajectory, errors = self._as_accurate(settings)._resolved(settings, values)
+        chosen, trajectory, cells = self._as_accurate(settings)._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
             trajectory, estimate = choice.verified(trajectory)
         case = chosen.case
         exact = (case.reference.name, case.reference.options) if case.reference else None
+
+        def cell_errors() -> CellErrors:
+            nonlocal cells
+            cells = cells or chosen._cell_errors(trajectory)
+            return cells
+
         found = (
-            accuracy(trajectory, case.scene, exact, error, lambda: errors or chosen._cell_errors(trajectory), estimate)
+            accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
             if len(trajectory.result.times)
             else None
         )
@@ -108,31 +119,46 @@ class Simulation:
             changes=values,
             case_run=case.run,
             error_from=error,
-            notes=spatial.missed(case.scene, errors, found),
+            notes=spatial.missed(case.scene, cells or CellErrors(), found),
         )
 
     def _as_accurate(self, run: Run) -> Simulation:
         """The same with cells as accurate as the run is asked to be, where an accuracy chooses them."""
-        scene = spatial.tightened(self.case.scene, run.accuracy)
-        if scene is self.case.scene:
-            return self
-        if run.accuracy not in self._tightened:
-            self._tightened[run.accuracy] = Simulation(replace(self.case, scene=scene))
-        return self._tightened[run.accuracy]
+        return self._with(spatial.tightened(self.case.scene, run.accuracy))
 
-    def _resolved(
-        self, settings: Run, values: Mapping[str, float], before: float = math.inf
-    ) -> tuple[Simulation, Trajectory, Mapping[str, float]]:
+    def _with(self, scene: Scene) -> Simulation:
+        """The same with the cells of another scene, assembled and compiled once for each choice of them."""
+        key = spatial.grid(scene)
+        if key not in self._grids:
+            self._grids[key] = Simulation(replace(self.case, scene=scene), self._grids)
+        return self._grids[key]
+
+    def _graded(self, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> Simulation:
+        """The same with cells that resolve what runs with these values look at first, if an accuracy chooses."""
+        if spatial.wanted(self.case.scene) is None:
+            return self
+        return self._with(spatial.suited(self.case.scene, spatial.layers(self.system, points, times)))
+
+    def _resolved(self, settings: Run, values: Mapping[str, float]) -> tuple[Simulation, Trajectory, CellErrors | None]:
         """With the cells that its accuracy needs: the simulation, its run and, where it asks for an accuracy, the
-        errors of the cells by variable.
+        errors of the cells.
         """
-        trajectory = self._solved(settings, values)
-        errors = self._cell_errors(trajectory) if spatial.wanted(self.case.scene) is not None else {}
-        factor = spatial.finer(self.case.scene, errors)
-        error = max(errors.values(), default=0.0)
-        if factor > 1 and not error > spatial.HELPED * before:
-            return self._with_more_cells(factor)._resolved(settings, values, error)
-        return self, trajectory, errors
+        chosen = self
+        if spatial.wanted(self.case.scene) is not None:
+            point = values_of(self.system, values)
+            chosen = self._graded([point], [spatial.shortest(self.system, settings, point)])
+        trajectory = chosen._solved(settings, values)
+        if chosen is self:
+            return self, trajectory, None
+        errors = CellErrors()
+        for _ in range(spatial.TRIALS):
+            errors = chosen._halved(trajectory, given=False)
+            finer = spatial.refined(chosen.case.scene, errors, chosen._layers(trajectory))
+            if finer is None:
+                break
+            chosen = self._with(finer)
+            trajectory = chosen._solved(settings, values)
+        return chosen, trajectory, None if spatial.fixed(self.case.scene) else errors
 
     def _solved(self, run: Run, values: Mapping[str, float]) -> Trajectory:
         try:
@@ -140,24 +166,43 @@ class Simulation:
         except InputError as error:
             raise self.case.located(error) from None
 
-    def _with_more_cells(self, factor: int) -> Simulation:
-        if factor not in self._finer:
-            finer = Simulation(replace(self.case, scene=spatial.multiplied(self.case.scene, factor)))
-            self._finer[factor] = finer
-        return self._finer[factor]
+    def _layers(self, *runs: Trajectory) -> dict[str, float]:
+        """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""
+        events = [np.concatenate([*event_times(run).values(), []]) for run in runs]
+        pairs = zip(runs, events, strict=True)
+        times = [spatial.shortest(self.system, run.run, run.values, at) for run, at in pairs]
+        return spatial.layers(self.system, [run.values for run in runs], times)
 
-    @cached_property
-    def _coarser(self) -> Simulation:
-        """The same with half of the cells."""
-        return Simulation(replace(self.case, scene=spatial.halved(self.case.scene)))
-
-    def _cell_errors(self, trajectory: Trajectory) -> dict[str, float]:
+    def _cell_errors(self, trajectory: Trajectory) -> CellErrors:
         """Errors of the cells, by variable; nothing where no body has any."""
-        if not spatial.divided(self.case.scene):
-            return {}
-        changes = {path: value for path, value in trajectory.values.items() if path in self._units}
-        coarse = self._coarser._solved(trajectory.run, changes)
-        return spatial.errors(trajectory, coarse)
+        scene = self.case.scene
+        if not spatial.divided(scene):
+            return CellErrors()
+        parts = self._layers(trajectory)
+        if not spatial.fixed(scene):
+            return self._halved(trajectory)
+        if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
+            return found
+        other = self._with(spatial.suited(scene, parts, given=True))
+        held_against = other._solved(trajectory.run, self._changes(trajectory))
+        own = other._halved(held_against)
+        found = CellErrors(spatial.differences(held_against, trajectory), source="and one with cells that suit")
+        return own.added_to(found)
+
+    def _halved(self, trajectory: Trajectory, given: bool = True) -> CellErrors:
+        """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
+        chooses only.
+        """
+        runs = [trajectory]
+        for divisor in (2, 4):
+            coarser = self._with(spatial.part(self.case.scene, divisor, given))
+            runs.append(coarser._solved(trajectory.run, self._changes(trajectory)))
+        near, far = (spatial.differences(*pair) for pair in pairwise(runs))
+        return spatial.judged(near, far, trajectory.run.rtol)
+
+    def _changes(self, trajectory: Trajectory) -> dict[str, float]:
+        """The values of a run that another number of cells has, too."""
+        return {path: value for path, value in trajectory.values.items() if path in self._units}
 
     def sweep(
         self,
@@ -186,15 +231,41 @@ class Simulation:
         if (freed := self._with_freed({**values, **others})) is not self:
             return freed.sweep_plan(plan, values, threads)
         values = {path: value for path, value in values.items() if path not in constants}
-        if spatial.wanted(self.case.scene) is not None:
-            chosen = self._as_accurate(self.case.run)._resolved(self.case.run, values)[0]
-            if chosen is not self:
-                return chosen.sweep_plan(plan, values, threads)
+        chosen, done, errors = self._as_accurate(self.case.run)._swept_resolved(plan, values, threads)
+        return sweeping.solution(
+            chosen.case, done, values, threads, lambda: errors or [chosen._cell_errors(run) for run in done]
+        )
+
+    def _swept_resolved(
+        self, plan: Plan, values: Mapping[str, float], threads: int | None
+    ) -> tuple[Simulation, Sweep, list[CellErrors]]:
+        """With cells that are accurate enough for every run, as :meth:`_resolved` has them for one."""
+        from surfacechem import sweeping
+
+        chosen, search = self, spatial.wanted(self.case.scene) is not None
+        if search:
+            points = [values_of(self.system, {**values, **point}) for point in plan.points]
+            runs = sweeping.settings(self.system, plan, self.case.run, points)
+            pairs = zip(runs, points, strict=True)
+            chosen = self._graded(points, [spatial.shortest(self.system, *pair) for pair in pairs])
+        done, errors = chosen._swept(plan, values, threads), []
+        for _ in range(spatial.TRIALS if search else 0):
+            errors = [chosen._halved(run, given=False) for run in done]
+            finer = spatial.refined(chosen.case.scene, spatial.worst(errors), chosen._layers(*done))
+            if finer is None:
+                break
+            chosen = self._with(finer)
+            done = chosen._swept(plan, values, threads)
+        return chosen, done, [] if spatial.fixed(self.case.scene) else errors
+
+    def _swept(self, plan: Plan, values: Mapping[str, float], threads: int | None) -> Sweep:
+        from surfacechem import sweeping
+
         key = plan.until[0] if plan.until else ""
         try:
             if key not in self._sweep_models:
                 self._sweep_models[key] = Model(sweeping.prepared(self.system, plan)) if key else self.model
-            return sweeping.sweep(self.case, self._sweep_models[key], plan, values, threads)
+            return sweeping.solve(self._sweep_models[key], plan, self.case.run, values, threads)
         except InputError as error:
             raise self.case.located(error) from None
 

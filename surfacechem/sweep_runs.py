@@ -54,7 +54,7 @@ def solve(
     values = [model.values({**(changes or {}), **point}) for point in plan.points]
     if (suited := model.suited(values)) is not model:
         model, values = suited, [suited.adopted(point) for point in values]
-    runs = _scaled(model.system, plan, run, values) if plan.until else [run] * len(values)
+    runs = settings(model.system, plan, run, values)
     if model.system.transitions or model.system.fit or run.solver != Radau.name:
         return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
     problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
@@ -85,9 +85,10 @@ def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, M
     return Separate(model, plan, run, values, problems, batch(results), seconds, trajectories=trajectories)
 
 
-def _scaled(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
-    """The settings of each run, its output times stretched to where the load is reached."""
-    assert plan.until is not None
+def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
+    """The settings of each run, its output times stretched to where a load is reached that the plan names."""
+    if plan.until is None:
+        return [run] * len(values)
     variable, target = plan.until
     if system.breakpoints:
         raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.")

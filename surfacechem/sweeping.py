@@ -2,43 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import references, sweep_runs
-from surfacechem.accuracy import FLOOR, relative_error, second_tolerance
+from surfacechem.accuracy import FLOOR, UNKNOWN, CellErrors, relative_error, second_tolerance
 from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
-from surfacechem.integrate import Model
 from surfacechem.references._start import Start
 from surfacechem.references.matching import beside_events, exact_values, match, renamed
 from surfacechem.spectrum import Statistics
 from surfacechem.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
-from surfacechem.sweep_runs import prepared
-from surfacechem.sweeps import Plan, Sweep
+from surfacechem.sweep_runs import prepared, settings, solve
+from surfacechem.sweeps import Sweep
 
-__all__ = ["prepared", "sweep"]
+__all__ = ["prepared", "settings", "solution", "solve"]
 
 Array = NDArray[np.float64]
 
 
-def sweep(case: Case, model: Model, plan: Plan, changes: Mapping[str, float], threads: int | None) -> SweepSolution:
-    """Run the plan with the settings of the case; ``model`` is that of the prepared system."""
-    done = sweep_runs.solve(model, plan, case.run, changes, threads)
-    accuracy = _accuracy(case, done, changes, threads)
+Cells: TypeAlias = Callable[[], Sequence[CellErrors]]
+"""Errors of the cells across bodies, of each run."""
+
+
+def solution(case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Cells) -> SweepSolution:
+    """Runs that were made with the settings of the case, with how far each is from the truth."""
+    accuracy = _accuracy(case, done, changes, threads, cells)
     return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", accuracy, changes)
 
 
-def _accuracy(case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None) -> SweepAccuracy:
+def _accuracy(
+    case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Cells
+) -> SweepAccuracy:
     if case.reference is None:
-        return _against_tighter(done, changes, threads)
+        return _against_tighter(done, changes, threads, cells())
     try:
         return _against_exact(case, done, case.reference)
     except InputError as error:
-        estimate = _against_tighter(done, changes, threads)
+        estimate = _against_tighter(done, changes, threads, cells())
         unused = f"the exact solution {case.reference.name} is not of this scene: {error.message}"
         return replace(estimate, source=f"{estimate.source}; {unused}")
 
@@ -78,8 +83,12 @@ def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> floa
     return max(relative_error(ours[name], exact[name], FLOOR if name in states else 1.0) for name in exact)
 
 
-def _against_tighter(done: Sweep, changes: Mapping[str, float], threads: int | None) -> SweepAccuracy:
-    """Errors of states and statistics, estimated from a second sweep."""
+def _against_tighter(
+    done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Sequence[CellErrors]
+) -> SweepAccuracy:
+    """Errors of states and statistics, estimated from a second sweep, with those of the cells of each run added; not
+    numbers where they are not known.
+    """
     other = second_tolerance(done.run.rtol)
     atol = None if done.run.atol is None else done.run.atol * other / done.run.rtol
     second = sweep_runs.solve(done.model, done.plan, replace(done.run, rtol=other, atol=atol), changes, threads)
@@ -92,4 +101,9 @@ def _against_tighter(done: Sweep, changes: Mapping[str, float], threads: int | N
         elif both[i].any() and np.array_equal(done.reached[i], second.reached[i]):
             parts = [relative_error(done.named[n][i][both[i]], second.named[n][i][both[i]], FLOOR) for n in names]
             errors[i] = max(parts)
-    return SweepAccuracy(errors, f"estimate: a second sweep at rtol {other:.0e}")
+    errors += [found.largest for found in cells]
+    source = f"estimate: a second sweep at rtol {other:.0e}"
+    ways = dict.fromkeys(found.source for found in cells if found.variables)
+    unknown = sum(not found.converged for found in cells)
+    said = f"; unknown in {unknown} of {len(cells)} runs: {UNKNOWN}" if unknown else ""
+    return SweepAccuracy(errors, ", ".join([source, *ways]) + said)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -95,6 +95,10 @@ class Sweep:
     def __len__(self) -> int:
         """Number of runs."""
         return len(self.problems)
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        """The runs in order."""
+        return (self[i] for i in range(len(self)))
 
     def __getitem__(self, i: int) -> Trajectory:
         """One run."""

@@ -6,16 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slabs
+from scipy.special import erfcx
 
 import surfacechem
 from surfacechem import plots
-from surfacechem.achieved import against_tighter
+from surfacechem.achieved import against_tighter, with_cells
 from surfacechem.case import load_text
 from surfacechem.errors import InputError
 from surfacechem.grids import points
 from surfacechem.references import get
 from surfacechem.references._slabs import HELD
 from surfacechem.simulation import Simulation
+from surfacechem.spatial import judged
 
 TWO = """
 title: two slabs
@@ -210,11 +213,12 @@ def test_a_joint_jump_heats_the_volume_of_the_bodies():
 
 def test_cells_are_chosen_by_an_accuracy():
     chosen = two("{accuracy: 1e-4}").run()
-    plain = two(chosen.attributes["cells_1"]).run()
-    assert np.array_equal(chosen.dataset.profile_1, plain.dataset.profile_1)
     assert chosen.accuracy.error < 1e-4
-    assert chosen.attributes["cells_1"] > 16
     assert not chosen.warnings
+    widths = np.diff(chosen.dataset.x_1)
+    assert np.all(widths[1:] > widths[:-1])
+    reached = np.sqrt(0.2 * 2e-3 / 4e3 * 1.0)  # by the first output
+    assert widths[0] < reached / 8
 
 
 def test_the_error_of_the_cells_is_estimated():
@@ -226,12 +230,27 @@ def test_the_error_of_the_cells_is_estimated():
         assert 0.5 < estimate.variables[name] / exact.variables[name] < 2
 
 
-def test_a_sweep_takes_the_cells_that_its_case_needs():
-    simulation = two("{accuracy: 1e-4}")
-    swept = simulation.sweep({"heat.conductance.h": [400.0, 500.0]})
-    alone = simulation.run()
-    np.testing.assert_allclose(swept.dataset["T_1"][0], alone.dataset["T_1"], rtol=1e-10)
-    assert swept.sweep.model.program.n == alone.trajectory.model.program.n > 2 + 2 * 16
+def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave():
+    text = """
+bodies:
+  a: {temperature: T_1, capacity: constant, C: 1.0e4, conduction: {thickness: 5 mm, conductivity: 20, cells: CELLS}}
+  b: {temperature: 400 K}
+heat: [conductance: {between: [a, b], h: 2.0e3}]
+T_0: 300 K
+initial: {T_1: 300 K}
+run: {until: 0.2 s, outputs: 11}
+"""
+    conductivities = np.array([20.0, 2.0, 0.2, 0.02])
+    stated = {}
+    for cells in ("{accuracy: 1e-4}", "24"):
+        simulation = Simulation(load_text(text.replace("CELLS", cells)))
+        swept = simulation.sweep({"bodies.a.conduction.conductivity": conductivities})
+        exact = [slabs.touched(0.0, swept.dataset.time[1:] * k / 50.0, 10.0 / k)[:, 0] for k in conductivities]
+        true = np.max(abs(swept.dataset.T_1[:, 1:] / (300 + 100 * np.array(exact)) - 1), axis=1).values
+        stated[cells] = swept.accuracy.errors
+        assert np.all((stated[cells] > 0.8 * true) & (stated[cells] < 4 * true + 1e-10)), (stated[cells], true)
+    assert np.all(stated["{accuracy: 1e-4}"] < 1e-4)
+    assert max(stated["24"]) > 1e-3
 
 
 @pytest.mark.parametrize("C_c", ["1e-3", "1e-15"])
@@ -357,3 +376,132 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         source = surfacechem.run("sudden-contact", [*change, "run.until=1 s"]).accuracy.source
         assert reason in source
         assert "half of the cells" in source
+
+
+# -- layers thinner than a cell ---------------------------------------------------------------------------------------
+
+ONE = """
+T_0: 300 K
+bodies:
+  a: {temperature: T_1, capacity: constant, C: 1.0e4, conduction: {thickness: 5 mm, conductivity: 0.2, cells: CELLS}}
+  b: {temperature: 500 K}
+heat: [conductance: {between: [a, b], h: CONDUCTANCE}]
+loading: {Q_1: FLUX}
+initial: {T_1: 300 K}
+run: {RUN}
+"""
+EFFUSIVITY = np.sqrt(0.2 * 1e4 / 5e-3)
+
+
+def one(cells: object, run: str, h: float = 1e-9, flux: object = 0.0) -> Simulation:
+    """A bad conductor that something acts on for a moment."""
+    changes = {"CELLS": str(cells), "CONDUCTANCE": repr(h), "FLUX": str(flux), "RUN": run}
+    text = ONE
+    for word, value in changes.items():
+        text = text.replace(word, value)
+    return Simulation(load_text(text))
+
+
+def test_a_flash_heats_the_skin_of_a_bad_conductor():
+    run = one("{accuracy: 1e-3}", "until: 1.2 us", flux=5e7).run()
+    exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
+    assert exact[-1] == pytest.approx(397.72, abs=0.01)
+    np.testing.assert_allclose(run.dataset["T_1"], exact, rtol=1e-3)
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-3
+
+
+def test_a_hot_plate_touches_a_bad_conductor_for_a_moment():
+    run = one("{accuracy: 1e-3}", "until: 20 us", h=2e4).run()
+    exact = 500 - 200 * erfcx(2e4 * np.sqrt(run.dataset.time.values) / EFFUSIVITY)
+    assert exact[-1] == pytest.approx(328.30, abs=0.01)
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-3
+
+
+@pytest.mark.parametrize("cells", [2, 16, 30, 400])
+def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so(cells):
+    run = one(cells, "until: 1.2 us", flux=5e7).run()
+    exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
+    true = abs(run.dataset["T_1"] / exact - 1).values.max()
+    assert true > 0.2
+    assert 0.9 * true < run.accuracy.error < 2 * true
+    assert "cells that suit" in run.accuracy.source
+    assert any("the error of" in warning for warning in run.warnings)
+
+
+def test_each_pulse_starts_a_layer_of_its_own():
+    pulses = "{table: {times: [0 s, 0.1 s, 0.1 s, 0.2 s, 0.2 s, 1 s], values: [0, 0, 1e6, 1e6, 0, 0]}}"
+    run = one("{accuracy: 1e-4}", "times: [0.1, 0.10001, 0.15, 0.2, 0.20001, 1.0]", flux=pulses).run()
+    t = run.dataset.time.values
+    since = [np.sqrt(np.maximum(t - start, 0) / np.pi) for start in (0.1, 0.2)]
+    exact = 300 + 2 * 1e6 * (since[0] - since[1]) / EFFUSIVITY
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-4
+
+
+def test_an_error_that_does_not_converge_is_unknown():
+    found = judged({"T_1": 1e-4}, {"T_1": 5e-5}, rtol=1e-11)
+    assert not found.converged
+    assert np.isnan(found.largest)
+    run = two(40).run()
+    estimate = with_cells(against_tighter(run.trajectory), found)
+    assert np.isnan(estimate.error)
+    assert estimate.source.startswith("unknown: the error of the cells")
+
+
+def random_slab(random: np.random.Generator) -> tuple[Simulation, float, object]:
+    """A slab of any properties that is heated or touched, between 1e-6 and 100 times of its diffusion time: its
+    simulation, the accuracy asked for, and its temperatures by places and times.
+    """
+    C, L, k = (float(10 ** random.uniform(*span)) for span in ((2, 5), (-4, -1), (-1.5, 2.5)))
+    time, length = C * L / k, float(10 ** random.uniform(-6, 2))
+    asked = float(random.choice([1e-3, 1e-4, np.inf]))
+    outputs, end = int(random.integers(3, 60)), length * time
+    first = float(end * 10 ** random.uniform(-4, -0.5))
+    spacing = f", spacing: logarithmic, first: {first!r}" if random.random() < 0.5 else ""
+    rise, biot = float(random.uniform(10, 300)), float(10 ** random.uniform(-3, 3))
+    flux = float(rise / slabs.heated(0.0, length)[0, 0] * k / L)
+    heats = bool(random.random() < 0.5)
+    text = f"""
+T_0: 300 K
+bodies:
+  a:
+    temperature: T_1
+    capacity: constant
+    C: {C!r}
+    conduction:
+      thickness: {L!r}
+      conductivity: {k!r}
+      cells: {f"{{accuracy: {asked}}}" if np.isfinite(asked) else 2 * random.integers(1, 40)}
+  b: {{temperature: {300 + rise!r}}}
+heat: [conductance: {{between: [a, b], h: {0.0 if heats else biot * k / L!r}}}]
+loading: {{Q_1: {flux if heats else 0.0!r}}}
+initial: {{T_1: 300 K}}
+run: {{until: {end!r}, outputs: {outputs}{spacing}}}
+"""
+
+    def exact(x, t):
+        x, t = x / L, t / time
+        return 300 + (flux * L / k * slabs.heated(x, t) if heats else rise * slabs.touched(x, t, biot))
+
+    return Simulation(load_text(text)), asked, exact
+
+
+def assert_known(seed: int, scenes: int) -> None:
+    random = np.random.default_rng(seed)
+    for i in range(scenes):
+        simulation, asked, exact = random_slab(random)
+        run = simulation.run()
+        values = exact(run.dataset.x_1.values, run.dataset.time.values[1:])
+        true, stated = np.max(abs(run.dataset.profile_1.values[1:] / values - 1)), run.accuracy.error
+        assert true <= asked, (seed, i, true)
+        assert true < 1.4 * stated, (seed, i, true, stated)
+        assert stated < 20 * true + 1e-9, (seed, i, true, stated)
+
+
+def test_random_slabs_are_as_accurate_as_they_say():
+    assert_known(seed=1, scenes=16)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_many_random_slabs_are_as_accurate_as_they_say(seed):
+    assert_known(seed, scenes=60)

@@ -342,6 +342,21 @@ class Jumping(Conductance):
 def test_a_jump_at_touch_is_warned_of():
     (warning,) = warnings_of(Jumping(between=ENDS, h=10.0))
     assert "jumps at touch, from 30 to 10 W/(m^2 K)" in warning
+    assert assemble(direct([Jumping(between=ENDS, h=10.0)], {"g_n": Hold(level=1e-6)})).warnings == ()
+
+
+@pytest.mark.parametrize("gap", ["10 um", "{ramp: {start: 10 um, rate: -1 um/s}}"])
+def test_a_film_that_conducts_without_end_at_touch_does_not_jump_there(gap):
+    text = """
+T_0: 300 K
+bodies: {a: {temperature: T_1, capacity: constant, C: 1000}, b: {temperature: T_2, capacity: constant, C: 1000}}
+interface: {medium: {conductivity: 0.1}}
+heat: [{film: {between: [a, b]}}]
+loading: {g_n: GAP}
+initial: {T_1: 300, T_2: 400}
+run: {until: 1 s}
+"""
+    assert load_text(text.replace("GAP", gap)).system().warnings == ()
 
 
 def test_a_gas_layer_without_roughness_ends_at_touch():

@@ -94,7 +94,7 @@ def conductors(build: Build) -> Iterator[Conductor]:
 def _divided(build: Build, number: int, body: Body, law: Conduction) -> Slab:
     """The body's energy shared among its nodes."""
     surface = build.node_of[body.name]
-    at = grids.points(law.cells, law.grading)
+    at = law.points
     nodes = [surface]
     for i in range(1, law.cells + (0 if law.held else 1)):
         name = f"T_{number}_x{i}"

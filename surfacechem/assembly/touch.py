@@ -5,6 +5,7 @@ Source: Sauer, Duong & Mandadapu (2021), section on heat transfer: the sum of ga
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import symengine
@@ -35,7 +36,9 @@ def touch(build: Build) -> None:
                 f"{ends} has a part that reads p and does not vanish without pressure, nor with the gap."
             )
         total = symengine.Add(*across)
-        if start.at(total, G, 0.0) is not None:
+        at_touch = start.at(total, G, 0.0)
+        # A pole, as of a film of no thickness, is no jump: the law ends there, and says so itself.
+        if not start.apart and at_touch is not None and math.isfinite(at_touch):
             build.warnings += _along(start, total, ends)
 
 
@@ -62,6 +65,9 @@ class _Start:
             if item.name not in ("p", "g_n"):
                 point[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(point)
         self.point = point
+        held = build.loads.get("g_n")
+        self.apart = held is not None and held.name() == "hold" and held.value(0.0) > 0
+        """Whether the gap is held open."""
 
     def at(self, h: Expression, variable: Any, value: float) -> float | None:
         """Value of a conductance where the variable has this value; None where it depends on more."""

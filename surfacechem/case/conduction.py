@@ -17,7 +17,7 @@ FAR_KEYS = ("temperature", "h")
 LUMP, INSULATED = "lump", "insulated"
 
 FIRST_CELLS = 16
-"""Cells with which the search for an accuracy starts."""
+"""Cells of a body before a run has chosen them."""
 
 ACCURACY = Spec("1", "accuracy", above=0, at_most=0.1)
 GRADING = Spec("1", "grading", at_least=1e-6, at_most=1e6)
