@@ -19,6 +19,7 @@ from surfacechem.equilibria import Equilibria, Point
 from surfacechem.errors import InputError, suggestion
 from surfacechem.events import Hybrid
 from surfacechem.jumps import Jump, Jumper
+from surfacechem.passing import Passing
 from surfacechem.preparing import PREPARING
 from surfacechem.solvers import ASKING, AUTO, solver
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
@@ -37,6 +38,9 @@ GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, 
 
 DEFAULT_RTOL = 1e-11
 """Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
+
+SAMPLES, CLOSER = 60.0, 7.3
+"""Looks at the equations in a run, and how many times more in the second one, which must not share its blindness."""
 
 OWN = "radau"
 """The method of this package."""
@@ -60,6 +64,8 @@ class Run:
     max_seconds: float | None = None
     accuracy: float | None = None
     """Relative accuracy that was asked for, if no tolerances were given."""
+    samples: float = SAMPLES
+    """Parts of the run in each of which its steps are held against the equations at least once."""
 
     def __post_init__(self) -> None:
         """Output times start at zero, where the initial values hold, and increase."""
@@ -209,14 +215,25 @@ class Model:
     def _segments(self, end: float, values: Mapping[str, float]) -> Array:
         return pieces.segments(self.system, end, values)
 
-    def problem(self, run: Run, values: Mapping[str, float]) -> Problem:
-        """The initial value problem; InputError where the initial state is not admissible."""
+    @cached_property
+    def passing(self) -> Passing:
+        """What tells when given variables pass what is narrow."""
+        return Passing(self.system)
+
+    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
+        """The initial value problem; InputError where the initial state is not admissible.
+
+        ``passing`` ends pieces where given variables pass what is narrow, too.
+        """
         system = self.system
         initial = {state.name: state.from_given(values) for state in system.states}
         end = run.times[-1]
         segments = self._segments(end, values)
         scales = np.array([state.finest or state.scale for state in system.states])
         parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
+        if passing:
+            fastest = max((values[path] for path in system.cycles), default=0.0)
+            segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         pieces.start_modes(system, parameters, values)
         self._check_start(values, parameters[0], initial)
         start = self._start(np.array(list(initial.values())), parameters)
@@ -234,6 +251,7 @@ class Model:
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
+            spacing=end / run.samples,
         )
 
     def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:
@@ -275,10 +293,10 @@ class Model:
         return {path: values.get(path, own) for path, own in self.values().items()}
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
-        """The same run at another tolerance, its absolute tolerance in proportion."""
+        """The same run at another tolerance, its absolute tolerance in proportion, looked at more closely elsewhere."""
         run = trajectory.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
-        return self.solve_values(replace(run, rtol=rtol, atol=atol), trajectory.values)
+        return self.solve_values(replace(run, rtol=rtol, atol=atol, samples=CLOSER * run.samples), trajectory.values)
 
     def chosen(self, run: Run) -> Run:
         """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""

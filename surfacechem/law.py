@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 from abc import ABC
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, dataclass_transform
 
@@ -128,8 +128,10 @@ class Law(ABC):
         return {}
 
     @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """Values of variables at which the formula has a narrow peak, which a step must not pass over."""
+    def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
+        """Values of variables at which the formula is narrow, so that a step must not pass over them: where it peaks,
+        begins, ends or bends.
+        """
         return {}
 
     @property

@@ -19,7 +19,8 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.integrate import Model, Run
 from surfacechem.onebyone import batch
-from surfacechem.solvers.radau import Radau, solve_many
+from surfacechem.solvers.contract import Problem
+from surfacechem.solvers.radau import Batch, Radau, gathered, solve_many
 from surfacechem.sweeps import Plan, Separate, Sweep
 from surfacechem.system import System
 
@@ -58,23 +59,37 @@ def solve(
     if model.system.transitions or model.system.fit or run.solver != Radau.name:
         return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
     problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
-    first = problems[0]
     Radau().prepare()
     start = time.perf_counter()
-    solved = solve_many(
-        model.program,
+    solved = _batch(problems, threads or os.cpu_count() or 1)
+    return Sweep(model, plan, run, values, problems, solved, time.perf_counter() - start)
+
+
+def _batch(problems: Sequence[Problem], threads: int) -> Batch:
+    """The runs in one call of the compiled loop for each number of pieces that they have."""
+    pieces = np.array([len(problem.segments) for problem in problems])
+    groups = [np.flatnonzero(pieces == count) for count in np.unique(pieces)]
+    return gathered([_alike([problems[int(i)] for i in group], threads) for group in groups], np.concatenate(groups))
+
+
+def _alike(problems: Sequence[Problem], threads: int) -> Batch:
+    first = problems[0]
+    segments, times = (np.array([getattr(problem, name) for problem in problems]) for name in ("segments", "times"))
+    shared = np.all(segments == segments[0]) and np.all(times == times[0])
+    return solve_many(
+        first.program,
         np.array([problem.y0 for problem in problems]),
         np.array([problem.parameters for problem in problems]),
-        np.array([problem.segments for problem in problems]) if plan.until else first.segments,
-        run.rtol,
+        first.segments if shared else segments,
+        first.rtol,
         first.atol,
-        times=np.array([problem.times for problem in problems]) if plan.until else first.times,
+        times=first.times if shared else times,
         margins=first.margins,
-        max_steps=run.max_steps,
-        threads=threads or os.cpu_count() or 1,
+        max_steps=first.max_steps,
+        threads=threads,
         event_rows=USUAL_EVENTS if first.margins else 0,
+        spacing=[problem.spacing for problem in problems],
     )
-    return Sweep(model, plan, run, values, problems, solved, time.perf_counter() - start)
 
 
 def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]]) -> Sweep:

@@ -339,9 +339,10 @@ class System:
         return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
 
     def moving_margins(self) -> tuple[Margin, ...]:
-        """The margins that change in the course of a run."""
-        moving = {self.t, *(x for state in self.states for x in (state.symbol, state.dot))}
-        return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving)
+        """The margins that change in the course of a run; when time alone leads to a peak is known before."""
+        evolved = {x for state in self.states for x in (state.symbol, state.dot)}
+        moving = {True: evolved, False: evolved | {self.t}}
+        return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving[m.peak])
 
     @property
     def in_stretches(self) -> bool:

@@ -53,6 +53,7 @@ FLOORS = {
         "events",
         "pacing",
         "pieces",
+        "passing",
         "starting",
         "ends",
         "integrate",

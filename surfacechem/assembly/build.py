@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import symengine
@@ -217,9 +218,9 @@ class Build(Draft):
         for name, bend in law.kinks.items():
             value = own[name] if name in own else self.variables.get(name, law)
             self.margins.append(Margin(name, value - bend, f"{law.name()} bends at this {name}", False))
-        for name, top in law.peaks.items():
-            value, reason = self.variables.get(name, law) - top, f"{law.name()} is at its peak"
-            self.margins.append(Margin(f"{name} at the peak of {law.name()}", value, reason, terminal=False, peak=True))
+        for name, tops in {**dict.fromkeys(law.positive, ()), **law.peaks}.items():
+            value = own[name] if name in own else self.variables.get(name, law)
+            self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
         for name, ends in law.limits.items():
             value, (low, high) = self.variables.get(name, law), ends
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
@@ -228,6 +229,19 @@ class Build(Draft):
                 self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
             if math.isfinite(high):
                 self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
+
+    def _narrow(self, law: Law, name: str, value: Expression, tops: Sequence[Expression]) -> None:
+        """A step ends where a variable passes a narrow place of a law, and where a gap with a mass turns round, which
+        may have come close to one.
+        """
+        reason, moving = f"{law.name()} is narrow near here", symengine.sympify(self.expanded(value)).free_symbols
+        found = [Margin(f"{name} at place {i} of {law.name()}", value - top, reason) for i, top in enumerate(tops, 1)]
+        velocities = {state.symbol for state in self.states if state.quantity.unit == "m/s"}
+        for gap, rate in self.motion.gap_rates.items():
+            if symengine.Symbol(gap) in moving and symengine.sympify(rate).free_symbols & velocities:
+                found.append(Margin(f"{gap} turns", rate, reason))
+        known = {margin.expression for margin in self.margins}
+        self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
 
     def volume(self, body: str) -> list[tuple[Node, Expression]]:
         """The nodes of a body with their parts of its volume; the one at the contact is the first."""

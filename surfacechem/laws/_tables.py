@@ -37,6 +37,11 @@ class ConductanceTable(HeatTransfer):
         return {self.over: (self._at[0], self._at[-1])}
 
     @property
+    def peaks(self) -> Mapping[str, Sequence[float]]:
+        """The points of the table, between which all may change."""
+        return {self.over: tuple(self._at)}
+
+    @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """The ends of a table that is not extrapolated."""
         return self.ranges if self.extrapolation == "refuse" else {}

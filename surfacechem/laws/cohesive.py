@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 from surfacechem.expressions import EXPONENT_CAP, Expression, decay, where
 from surfacechem.terms import Potential, parameter
@@ -31,6 +32,11 @@ class ExponentialCohesiveZone(Potential):
     t_max: float = parameter("Pa", "strength, largest tensile traction", at_least=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
     E_n: float = parameter("Pa/m", "contact stiffness in compression", at_least=0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at the strength."""
+        return {"g_n": self.g_0}
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
@@ -66,6 +72,11 @@ class XuNeedleman(Potential):
     g_t0: float = parameter("m", "characteristic tangential gap", above=0)
     q: float = parameter("1", "tangential over normal work of separation", default=1.0, at_least=0)
     r: float = parameter("1", "normal gap over g_0 after complete shear at zero normal traction", default=0.0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
+        """The gaps at the strengths, normal and tangential."""
+        return {"g_n": self.g_0, "g_t": (-self.g_t0 / math.sqrt(2), self.g_t0 / math.sqrt(2))}
 
     def energy(self, g_n: Expression, g_t: Expression) -> Expression:
         """Free energy [J/m^2]."""

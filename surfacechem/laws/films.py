@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from surfacechem.expressions import Expression, positive, sqrt
 from surfacechem.terms import Friction, HeatTransfer, Potential, parameter
@@ -66,6 +67,11 @@ class RarefiedFilm(HeatTransfer):
     alpha_1: float = parameter("1", "thermal accommodation at the first end", default=1.0, above=0, at_most=1)
     alpha_2: float = parameter("1", "thermal accommodation at the second end", default=1.0, above=0, at_most=1)
     Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
+
+    @property
+    def peaks(self) -> Mapping[str, float]:
+        """Touch, where the film is thinnest."""
+        return {"d_m": 0.0}
 
     def conductance(
         self,

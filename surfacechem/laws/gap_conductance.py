@@ -35,6 +35,11 @@ class GapConductance(HeatTransfer):
     epsilon_1: float = parameter("1", "emissivity of the first end", above=0, at_most=1)
     epsilon_2: float = parameter("1", "emissivity of the second end", above=0, at_most=1)
 
+    @property
+    def peaks(self) -> Mapping[str, float]:
+        """Touch, which the contact spots let go of within little."""
+        return {"g_n": 0.0}
+
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """Contact spots, gas and radiation."""
         return {"spots": self.spots, "gas": self.gas, "radiation": self.radiation}
@@ -85,6 +90,11 @@ class GasGap(HeatTransfer):
     )
     M: float = parameter("m", "temperature jump distance of both walls", default=0.0, at_least=0)
     Y: float = parameter("m", "mean gap at touch, left by the roughness", default=0.0, at_least=0)
+
+    @property
+    def peaks(self) -> Mapping[str, float]:
+        """Touch, where the gas is thinnest."""
+        return {"g_n": 0.0}
 
     @property
     def positive(self) -> tuple[str, ...]:  # type: ignore[override]

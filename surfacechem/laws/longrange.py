@@ -9,6 +9,7 @@ Derjaguin's approximation drops the second term.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from surfacechem.expressions import Expression, is_symbolic, log, where
 from surfacechem.laws._sites import InteractingSites
@@ -38,6 +39,11 @@ class LennardJonesFlatFlat(InteractingSites):
     -0.002261946673
     """
 
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at the strength."""
+        return {"g_n": self.g_0 * 5 ** (-1 / 6)}
+
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8), (-6, 2))
@@ -62,6 +68,11 @@ class LennardJonesSpherePlane(InteractingSites):
 
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at which the attraction is strongest."""
+        return {"g_n": self.g_0 * 15 ** (-1 / 6)}
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
@@ -89,6 +100,11 @@ class LennardJonesDerjaguin(InteractingSites):
 
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
+
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at which the attraction is strongest."""
+        return {"g_n": self.g_0 * 15 ** (-1 / 6)}
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""

@@ -73,7 +73,7 @@ class EmbeddedScene:
             _refuse_folds(system)
             self.model = Model(system)
             self.values = _widest(system, self.model.values())
-            self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values)
+            self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values, passing=False)
         except InputError as error:
             raise case.located(error) from None
         self.evaluation = Evaluation(self.problem.program, self.problem.y0, self.problem.parameters[0])
@@ -157,7 +157,7 @@ class EmbeddedScene:
     def begin_piece(self, t: float, rtol: float) -> None:
         """Go on with the pieces of the histories that hold from time t [s] on; bounds give way to the tolerance."""
         run = Run(times=(0.0, FOREVER), rtol=max(rtol, DIFFERENCE))
-        table = self.model.problem(run, self.values).parameters
+        table = self.model.problem(run, self.values, passing=False).parameters
         parameters = table[bisect_right(self.breakpoints, t)]
         if self.moments:
             self.moments.begin_piece(parameters)

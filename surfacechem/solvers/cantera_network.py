@@ -147,17 +147,24 @@ class _SystemReactor(HeldReactor):
         return np.asarray(self.evaluation.ydot[self.evaluation.free] / self.unit)
 
 
+TINIEST = 1e-15
+"""Part of the end of a run that a step may go beyond it."""
+
+
 class _Stretch(Method):
     def __init__(self, view: View, t: float, end: float, y: Array) -> None:
         self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y))
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
-        self.net.initial_time, self.net.max_time_step = t, LONGEST * (end - t)
-        self.t = t
+        self.net.initial_time = t
+        self.longest = min(LONGEST * (end - t), view.problem.spacing)
+        self.t, self.end = t, end
         self.polynomial = np.zeros((1, len(self.reactor.names)))
 
     def advance(self) -> float:
         try:
+            # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
+            self.net.max_time_step = min(self.longest, max(self.end - self.t, TINIEST * self.end))
             self.t = float(self.net.step())
             order = int(self.net.solver_stats["last_order"])
             factorial = 1.0

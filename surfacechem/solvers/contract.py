@@ -109,6 +109,8 @@ class Problem:
     """What each quadrature amounted to at most before, where the problem continues another."""
     seen: Array | None = None
     """How large each margin was at most before, where the problem continues another."""
+    spacing: float = np.inf
+    """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
     goes_on: bool = False
     """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
 

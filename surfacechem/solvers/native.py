@@ -55,11 +55,12 @@ M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH =
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero."""
 (
-    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
-) = np.arange(12)  # fmt: skip
+    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, SPACING, GUESSED,
+) = np.arange(13)  # fmt: skip
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
-t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; GUESSED is by how much the first guess
-of the stages was wrong, in units of the tolerance."""
+t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; SPACING is how far apart the
+points of a long step are at which it is held against the equations; GUESSED is by how much the first guess of the
+stages was wrong, in units of the tolerance."""
 STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
 MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton

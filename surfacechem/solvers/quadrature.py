@@ -33,19 +33,20 @@ NEGLIGIBLE = 1e-3
 
 
 @compiled
-def _find_misses(w: Any, h: float, remaining: float) -> None:
-    """Error of each account's quadrature, and what it turned over or soon will.
+def _find_misses(w: Any, row: int, h: float, remaining: float) -> None:
+    """Error of each account's quadrature from the defects in a row, and what it turned over or soon will.
 
-    The defect of the rate at the start has the order s of the stages, the quadrature 2s - 1: for a smooth rate its
-    error, relative to what the step turns over, is that power of the defect.
+    The defect of the rate has the order s of the stages, the quadrature 2s - 1: for a smooth rate its error, relative
+    to what the step turns over, is that power of the defect.
     """
     s = stage_count(w.count[MEMBER])
     for m in range(w.groups.shape[0]):
         rate = abs(w.rates[7, m])
         for i in range(s):
             rate = max(rate, abs(w.rates[i, m]))
-        miss = abs(w.ledger[Q_CORRECTION, m])
+        miss = abs(w.ledger[row, m])
         if miss > 0.0:
+            rate = max(rate, miss / h)
             miss *= (miss / (h * rate)) ** (1.0 - 1.0 / s)
         w.ledger[Q_MISS, m] = miss
         w.ledger[Q_LARGEST, m] = max(w.ledger[Q_LARGEST, m], abs(w.ledger[Q, m]))
@@ -82,13 +83,23 @@ def _excuse_states(w: Any, h: float) -> None:
 
 
 @compiled
-def ledger_norm(w: Any, h: float, remaining: float) -> float:
-    """Error of the quadratures over the step in units of what is allowed; nothing where it limits no step."""
-    _find_misses(w, h, remaining)
-    if not _group_norm(w) > NEGLIGIBLE:
-        return 0.0
+def defect_norm(w: Any, row: int, h: float, remaining: float) -> float:
+    """Error of the quadratures over the step in units of what is allowed, from the defects in a row."""
+    _find_misses(w, row, h, remaining)
+    return _group_norm(w)
+
+
+@compiled
+def excused_norm(w: Any, h: float) -> float:
+    """The error that was found last, without what the states may miss."""
     _excuse_states(w, h)
     return _group_norm(w)
+
+
+@compiled
+def ledger_norm(w: Any, h: float, remaining: float) -> float:
+    """Error of the quadratures over the step in units of what is allowed; nothing where it limits no step."""
+    return excused_norm(w, h) if defect_norm(w, Q_CORRECTION, h, remaining) > NEGLIGIBLE else 0.0
 
 
 @compiled

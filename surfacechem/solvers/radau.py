@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache, lru_cache
 from typing import Any
 
@@ -33,8 +33,8 @@ _STATUSES = tuple(Status)
 LOOSEST = 3e-5
 """Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
 
-TIMES = 14
-"""Where segments and output times stand among the arguments of the compiled entry point."""
+SPACING, TIMES = 10, 15
+"""Where the spacing, and segments and output times, stand among the arguments of the compiled entry point."""
 
 
 @lru_cache(maxsize=256)
@@ -62,6 +62,7 @@ class _Tables:
         exchanged: Array | None = None,
         seen: Array | None = None,
         goes_on: bool = False,
+        spacing: Array | float = np.inf,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
         self.stop = np.zeros(1, np.int64)
@@ -70,7 +71,8 @@ class _Tables:
         self.outputs = np.empty((runs, times.shape[-1], n + q))
         self.steps = np.empty((runs, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(runs)
         self.events = np.empty((runs, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(runs)
-        self.own_times = (segments, times) if segments.ndim == 2 else None
+        spacings = np.broadcast_to(spacing, (runs,))
+        self.own_times = (spacings, segments, times) if segments.ndim == 2 else None
         self.arguments = (
             program.addresses,
             program.algebraic_mask,
@@ -82,6 +84,7 @@ class _Tables:
             max_steps,
             self.stop,
             min(rtol, LOOSEST),
+            float(np.min(spacings)),
             atol,
             _kinds(margins),
             y0,
@@ -99,9 +102,11 @@ class _Tables:
         if self.own_times is None:
             stepper.run_batch()(first, last, *self.arguments)
             return
-        for i, (segments, times) in enumerate(zip(*(t[first:last] for t in self.own_times), strict=True), first):
-            before, after = self.arguments[:TIMES], self.arguments[TIMES + 2 :]
-            stepper.run_batch()(i, i + 1, *before, segments, times, *after)
+        arguments = list(self.arguments)
+        for i in range(first, last):
+            arguments[SPACING] = float(self.own_times[0][i])
+            arguments[TIMES : TIMES + 2] = (own[i] for own in self.own_times[1:])
+            stepper.run_batch()(i, i + 1, *arguments)
 
 
 @lru_cache(maxsize=4)
@@ -136,6 +141,7 @@ def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
         problem.exchanged,
         problem.seen,
         problem.goes_on,
+        problem.spacing,
     )
 
 
@@ -245,12 +251,13 @@ def solve_many(
     max_steps: int = 100_000,
     threads: int = 1,
     event_rows: int = 0,
+    spacing: ArrayLike = np.inf,
 ) -> Batch:
     """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number
     of threads.
 
-    Segments and output times are shared by all runs, or have one row a run, both of them. Events are recorded where
-    ``event_rows``, the usual number of them, is not zero.
+    Segments and output times are shared by all runs, or have one row a run, both of them; so may the spacing have.
+    Events are recorded where ``event_rows``, the usual number of them, is not zero.
     """
     states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
     weights = np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))
@@ -265,7 +272,18 @@ def solve_many(
         Problem(program, states[i], when, pieces, table[i], rtol, weights, kinds, max_steps)
     while True:
         tables = _Tables(
-            program, states, table, breaks, outputs, rtol, np.array(weights), kinds, max_steps, 0, event_rows
+            program,
+            states,
+            table,
+            breaks,
+            outputs,
+            rtol,
+            np.array(weights),
+            kinds,
+            max_steps,
+            0,
+            event_rows,
+            spacing=np.asarray(spacing, dtype=float),
         )
         _run_all(tables, len(states), threads)
         most = int(tables.counts[:, EVENTS].max(initial=0))
@@ -300,6 +318,17 @@ def _batch(program: Program, tables: _Tables) -> Batch:
     )
 
 
+def gathered(batches: Sequence[Batch], order: NDArray[np.int64]) -> Batch:
+    """One batch of many; ``order`` is which run each of theirs is, one batch after the other."""
+    if len(batches) == 1:
+        return batches[0]
+    back = np.argsort(order)
+    columns = {item.name: [getattr(batch, item.name) for batch in batches] for item in fields(Batch)}
+    events = [found for batch in columns.pop("events") for found in batch]
+    joined = {name: np.concatenate(parts)[back] for name, parts in columns.items()}
+    return Batch(**joined, events=[events[i] for i in back])
+
+
 @dataclass(frozen=True)
 class Consistent:
     """States that satisfy G(t, y, ydot) = 0; ``valid`` is False where none was found."""
@@ -317,7 +346,7 @@ def search_arguments(program: Program, ends: Array, table: Array, counts: NDArra
     none, nothing = np.zeros(0), _no_rows(len(ends))
     return (
         0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, _no_accounts(), none, none, 0, 0,
-        counts[0], 1.0, np.ones(program.n), _kinds(()),
+        counts[0], 1.0, np.inf, np.ones(program.n), _kinds(()),
         ends, table, none, none, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 

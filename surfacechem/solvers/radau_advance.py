@@ -18,6 +18,7 @@ from surfacechem.solvers.native import (
     MEMBER,
     OFFSET,
     PIVOT,
+    REFUSED,
     REJECTED,
     RTOL,
     SCALE,
@@ -84,6 +85,7 @@ def restart(w: Any) -> int:
     w.clock[TAU] = w.clock[H_LAST] = w.clock[H_FACTORED] = 0.0
     w.clock[CONTRACTION] = 1.0
     w.count[CALM] = 0
+    w.count[REFUSED] = min(w.count[REFUSED], w.count[STEPS] // 2)
     w.count[FRESH] = INVALID
     w.count[MEMBER] = preferred_member(w.clock[RTOL])
     for j in range(n):

@@ -96,7 +96,7 @@ def filter_residual(w: Any) -> bool:
 
 
 @compiled
-def _error_norm(w: Any, floor: float) -> float:
+def error_norm(w: Any, floor: float) -> float:
     """Norm of the part of the error above so many times the noise."""
     norm = 0.0
     last = stage_count(w.count[MEMBER]) - 1
@@ -121,11 +121,11 @@ def estimate_error(w: Any, h: float) -> float:
     set_inputs(w, w.vector[Y], w.vector[DELTA])
     if not filter_residual(w):
         return np.inf
-    norm = _error_norm(w, 0.0)
+    norm = error_norm(w, 0.0)
     if norm < NOISY:
         return norm
     find_noise(w)
-    return float(max(_error_norm(w, MAGNIFIED), NOISY))
+    return float(max(error_norm(w, MAGNIFIED), NOISY))
 
 
 @compiled
@@ -135,7 +135,7 @@ def estimate_again(w: Any) -> float:
         w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
     if not filter_residual(w):
         return np.inf
-    return float(max(_error_norm(w, MAGNIFIED), NOISY))
+    return float(max(error_norm(w, MAGNIFIED), NOISY))
 
 
 @compiled

@@ -21,6 +21,7 @@ class _Stretch(Method):
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
             "atol": system.atol,
             "jac": system.jacobian,
+            "max_step": view.problem.spacing,
         }
         try:
             self.solver = kind(system.rates, t, system.start(y), end, **options)

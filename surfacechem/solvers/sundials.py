@@ -6,7 +6,7 @@ import numpy as np
 from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
-from surfacechem.solvers.contract import Array
+from surfacechem.solvers.contract import Array, Problem
 from surfacechem.solvers.reduced import Reduced
 from surfacechem.solvers.stepping import Method, StepError, SteppingSolver, View
 
@@ -49,6 +49,11 @@ class _Stretch(Method):
         return np.array(answer.y)
 
 
+def _longest(problem: Problem) -> float:
+    """Longest step, as either library is told it; 0 where there is none."""
+    return problem.spacing if np.isfinite(problem.spacing) else 0.0
+
+
 class CVODESolver(SteppingSolver):
     """BDF of variable order; algebraic variables are eliminated inside the right-hand side."""
 
@@ -63,7 +68,14 @@ class CVODESolver(SteppingSolver):
         def jacobian(t: float, x: Array, _rates: Array, out: Array) -> None:
             out[:] = system.jacobian(t, x)
 
-        library = CVODE(rates, rtol=view.problem.rtol, atol=system.atol, jacfn=jacobian, max_num_steps=100_000)
+        library = CVODE(
+            rates,
+            rtol=view.problem.rtol,
+            atol=system.atol,
+            jacfn=jacobian,
+            max_num_steps=100_000,
+            max_step=_longest(view.problem),
+        )
         return _Stretch(library, t, end, system.start(y))
 
 
@@ -90,6 +102,7 @@ class IDASolver(SteppingSolver):
             atol=view.problem.atol,
             jacfn=jacobian,
             max_num_steps=100_000,
+            max_step=_longest(view.problem),
             algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
         )
         return _Stretch(library, t, end, y, ydot)

@@ -18,6 +18,7 @@ from surfacechem.solvers.native import (
     REFUSED,
     REJECTED,
     RTOL,
+    SPACING,
     STEPS,
     TAU,
     TRIAL,
@@ -43,6 +44,7 @@ from surfacechem.solvers.radau_advance import (
     store_polynomial,
 )
 from surfacechem.solvers.radau_outputs import write_outputs
+from surfacechem.solvers.radau_samples import unseen
 from surfacechem.solvers.radau_step import first_size, growing_size, loosening
 from surfacechem.solvers.sides import mark_at_end, start_margins
 
@@ -54,7 +56,11 @@ END, OUTPUTS, EVENTS, RECORDS = range(4)
 FIRST_COUNTER, COUNTERS = 4, 6
 
 PATIENCE = 40
-"""Steps that the ledger may refuse beside every second: what it misses may be noise, which must not end a run."""
+"""Steps that the ledger may refuse beside every second, since the last restart: what it misses may be noise, which must
+not end a run.
+"""
+FEWEST = 4
+"""Points of a segment at which its steps are held against the equations, however short it is."""
 SAME = 1e-12
 """Difference of times, relative to time, that makes no second event of a kink."""
 SHORTEST = 1e-10
@@ -180,18 +186,23 @@ def _run_segment(
 ) -> int:
     """Integrate to the end of a segment; GOOD, or the status that ends the run."""
     h, size_last, norm_last = 0.0, 0.0, 1.0
+    aim, spacing = np.inf, w.clock[SPACING]
+    if spacing < np.inf:
+        spacing = min(spacing, (end - w.clock[BASE]) / FEWEST)
     while end - w.clock[BASE] - w.clock[TAU] > 0.0:
         if h == 0.0:
             outcome = _start(w, kinds, times, outputs, steps, counts)
             if outcome != GOOD:
                 return outcome
             h, size_last, norm_last = first_size(w, end - w.clock[BASE]), 0.0, 1.0
-        remaining = (end - w.clock[BASE]) - w.clock[TAU]
+            aim = np.inf
+        left = (end - w.clock[BASE]) - w.clock[TAU]
+        remaining = min(left, aim - w.clock[TAU])
         outcome, h, norm, proposed = advance(w, _next_try(h, remaining), max_steps, stop, size_last, norm_last)
         if outcome != GOOD:
             return outcome
         finish_step(w, h)
-        limit = _ledger_limit(w, h, remaining)
+        limit = _ledger_limit(w, h, left)
         if limit < h:
             h = limit
             continue
@@ -205,8 +216,19 @@ def _run_segment(
             h *= 0.25
             w.clock[H_FACTORED] = 0.0
             continue
+        seen = unseen(w, size, spacing, left, w.clock[TAU] == 0.0, size == left or any_true(w.fired))
+        if seen < 1.0:
+            # A step ends there, so that its last stage feels what the others have missed.
+            h = seen * size
+            aim = w.clock[TAU] + h
+            clear(w.fired)
+            w.count[REJECTED] += 1
+            w.clock[H_FACTORED] = 0.0
+            continue
         reached = w.clock[BASE] + (w.clock[TAU] + size)
-        whole = size == remaining or reached >= end
+        whole = size == left or reached >= end
+        if size == remaining:
+            aim = np.inf
         _move(w, size, end if whole else reached, times, outputs, steps, counts)
         if whole:
             w.clock[TAU] = end - w.clock[BASE]
@@ -294,6 +316,7 @@ def run_batch(
     max_steps: int,
     stop: Any,
     rtol: float,
+    spacing: float,
     atol: Any,
     kinds: Any,
     y0: Any,
@@ -316,6 +339,7 @@ def run_batch(
     w = reference(lay_out(code, algebraic, chains, groups, place, parameters.shape[2], kinds.shape[0]))
     w.clock[RTOL] = rtol
     w.clock[LOOSE] = loosening(rtol)
+    w.clock[SPACING] = spacing
     copy(atol, w.vector[ATOL])
     for i in range(first, last):
         if segments.shape[0] == 0:
