@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
-from surfacechem.guard import interruptible
+from surfacechem.waiting import wait_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -147,7 +147,7 @@ def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
     if not (quiet or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
 
-    return interruptible(run)
+    return wait_for(run)
 
 
 def studied(run: Callable[[], S], quiet: bool) -> S:

@@ -7,19 +7,28 @@ import re
 import secrets
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError
+from surfacechem.waiting import wait_for
+
+R = TypeVar("R")
 
 CONVENTIONS = "CF-1.11"
+
+PATIENCE = 20.0
+"""Time [s] that reading a small file may take: in one that is damaged HDF5 may look for something without end."""
+
+SLOWEST = 1e7
+"""Bytes per second that a disk gives at the least."""
 
 SUFFIXES = (".nc", ".nc4", ".cdf")
 """What names of netCDF files end with."""
@@ -160,6 +169,16 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
             variable.setncatts(column.attributes)
             variable[...] = column.values
         file.setncatts(attributes)
+
+
+def reading(path: Path, read: Callable[[], R]) -> R:
+    """What is read from a netCDF file; InputError where it is none, or damaged."""
+    try:
+        size = path.stat().st_size
+        return wait_for(read, PATIENCE + size / SLOWEST)
+    except Exception as error:  # of a damaged file the library may meet anything
+        reason = " ".join(str(getattr(error, "strerror", None) or error or type(error).__name__).split())
+        raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error
 
 
 def _dimensions(columns: Sequence[Column]) -> dict[str, int]:

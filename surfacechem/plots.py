@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from surfacechem import marks
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.netcdf import reading
 from surfacechem.panels import Panel, chosen, curves, merged, profiles, unit, usual, varies
 
 Array = NDArray[np.float64]
@@ -52,6 +53,23 @@ DECADES = 1e3
 PROFILE_TIMES = 6
 """Times at which profiles are drawn, evenly spread over the outputs."""
 
+OVER = {
+    **{name: (name,) for name in ("time", "tolerance")},
+    **{f"{name}_name": (name,) for name in ("event", "case", "solver", "variable")},
+    "event_time": ("event",),
+}
+"""What some variables go over."""
+
+TEXTS = (
+    *("event_name", "status", "reason", "case_name", "solver_name", "variable_name", "title", "case_text"),
+    *("reference", "regime", "solver", "outcome", "symbol"),
+)
+"""Variables that hold words."""
+
+NUMBER = (float, int, np.number)
+NUMBERS = ("error", "rtol", "energy_error", "entropy_error", "site_error")
+"""Attributes of which figures need the value."""
+
 LEAST = 1e-18
 """Residuals below this are drawn as this."""
 
@@ -80,7 +98,7 @@ def figure(
 
     ``variables`` are shown instead of the usual choice; over the variable ``against`` instead of time.
     """
-    dataset = opened(data)
+    dataset = opened(data, "time")
     if variables and set(variables) & set(profiles(dataset)):
         return _across(dataset, variables)
     panels = chosen(dataset, variables) if variables else usual(dataset)
@@ -149,16 +167,42 @@ def save(plot: Figure, target: Any, kind: str) -> None:
         plot.savefig(target, format=kind, dpi=160, metadata=metadata)
 
 
-def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
-    """A dataset, read from its netCDF file if need be."""
+def opened(data: xarray.Dataset | str | Path, *needed: str) -> xarray.Dataset:
+    """A dataset, read from its netCDF file if need be; InputError where it is none that surfacechem could have written.
+
+    ``needed`` are variables without which there is nothing to draw.
+    """
     if isinstance(data, xarray.Dataset):
-        return data
-    try:
-        with xarray.open_dataset(data, engine="netcdf4") as file:
+        dataset, place = data, None
+    else:
+        dataset, place = _read(Path(data)), Place(str(data))
+    for name in needed:
+        if name not in dataset.variables:
+            raise InputError(f"has no variable '{name}', as datasets of surfacechem have.", place)
+    return dataset
+
+
+def _read(path: Path) -> xarray.Dataset:
+    """A dataset from its file; InputError where a variable or attribute is of no kind that is written."""
+    place = Place(str(path))
+
+    def load() -> xarray.Dataset:
+        with xarray.open_dataset(path, engine="netcdf4") as file:
             return file.load()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(data))) from error
+
+    dataset = reading(path, load)
+    for name, values in dataset.variables.items():
+        wanted = OVER.get(str(name), values.dims)
+        if values.dims != wanted:
+            raise InputError(f"{name} does not go over {' and '.join(wanted)}.", place)
+        if (values.dtype.kind != "f" and name not in TEXTS) or (name == "time" and not np.isfinite(values).all()):
+            raise InputError(f"{name} does not hold numbers in double precision.", place)
+    for name, value in dataset.attrs.items():
+        if not isinstance(value, NUMBER if name in NUMBERS else (str, *NUMBER)):
+            raise InputError(
+                f"the attribute '{name}' is no {'number' if name in NUMBERS else 'text or number'}.", place
+            )
+    return dataset
 
 
 def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
@@ -241,7 +285,7 @@ def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
         exact = str(attributes.get("error_source", "")).startswith("exact") or any(map(_is_exact, dataset))
         source = "exact solution" if exact else "estimate"
         facts.append(f"error {attributes['error']:.1e} ({source})")
-    if "solver" in attributes:
+    if "solver" in attributes and "rtol" in attributes:
         facts.append(f"{attributes['solver']}, rtol {attributes['rtol']:g}")
     if dataset.sizes.get("event", 0) > dataset.sizes.get("time", 0):
         facts.append(f"{dataset.sizes['event']} events between {dataset.sizes.get('time', 0)} outputs")

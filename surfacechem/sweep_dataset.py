@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.errors import InputError
 from surfacechem.event_table import event_columns
 from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, save, versions
 from surfacechem.quantities import Quantity
@@ -256,8 +257,20 @@ def _recorded(plan: Plan) -> dict[str, object]:
     return {"axes": axes, "until": list(plan.until) if plan.until else None}
 
 
-def recorded_plan(text: str) -> Plan:
-    """The plan that an attribute ``sweep`` records."""
-    content = json.loads(text)
-    until = content["until"]
-    return Plan([Axis(**axis) for axis in content["axes"]], (until[0], until[1]) if until else None)
+def recorded_plan(text: object) -> Plan:
+    """The plan that an attribute ``sweep`` records; InputError where it records none."""
+    try:
+        content = json.loads(str(text))
+        axes = [
+            Axis(str(axis["path"]), _numbers(axis["values"]), axis["logarithmic"] is True) for axis in content["axes"]
+        ]
+        until = content["until"]
+        return Plan(axes, (str(until[0]), *_numbers(until[1:2])) if until else None)
+    except (LookupError, TypeError, ValueError, RecursionError):
+        raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
+
+
+def _numbers(values: Any) -> tuple[float, ...]:
+    if not all(isinstance(value, float | int) for value in values):
+        raise TypeError(values)
+    return tuple(map(float, values))

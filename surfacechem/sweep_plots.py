@@ -19,6 +19,7 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.panels import KINDS, varies
 from surfacechem.plots import COLOURS, STYLE, Plot, headings, legend, opened, symbol, unit_text
 from surfacechem.sweep_dataset import WORDS, recorded_plan
+from surfacechem.sweeps import MOST_AXES
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,9 @@ MOST_CURVES = 7
 
 def figure(data: xarray.Dataset | str | Path, variables: Sequence[str] | None = None) -> Figure:
     """A figure of a sweep, from its dataset or its netCDF file: the load at rupture, else final values."""
-    dataset = opened(data)
+    dataset = opened(data, "status", "time_reached")
+    if not all(name in dataset.coords for name in _axes(dataset)) or not 1 <= len(_axes(dataset)) <= MOST_AXES:
+        raise InputError("the dataset does not hold the parameters of a sweep.")
     panels = _panels(dataset, variables)
     with matplotlib.rc_context(STYLE):
         plot = Plot(figsize=(6.4, 0.9 + (2.8 if len(panels) == 1 else 1.7) * len(panels)), layout="constrained")
@@ -76,7 +79,7 @@ def _axes(dataset: xarray.Dataset) -> list[str]:
 def _load(dataset: xarray.Dataset) -> str:
     """The variable whose values at rupture the dataset holds; empty if there is none."""
     found = [str(name).removesuffix("_mode") for name in dataset.data_vars if str(name).endswith("_mode")]
-    return found[0] if found else ""
+    return next((name for name in found if all(f"{name}_{which}" in dataset for which in WORDS)), "")
 
 
 def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
@@ -85,7 +88,7 @@ def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
         return [(values, "")]
     second = dataset[_axes(dataset)[1]]
     chosen = np.unique(np.linspace(0, values.shape[1] - 1, MOST_CURVES).round().astype(int))
-    unit = unit_text(str(second.attrs["units"]))
+    unit = unit_text(str(second.attrs.get("units", "1")))
     name = str(second.name).replace("_", " ")
     return [(values[:, j], f"{name} = {second.values[j]:g} {unit}") for j in chosen]
 

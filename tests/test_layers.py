@@ -19,6 +19,7 @@ FLOORS = {
         "document",
         "overrides",
         "errors",
+        "waiting",
         "data",
         "fits",
         "grids",

@@ -31,7 +31,7 @@ def figure(data: xarray.Dataset | str | Path) -> Figure:
     """The figure of a study, from its dataset or its netCDF file: digits kept as a heat map, a panel for each solver
     and a row for each regime; to the right is more extreme.
     """
-    dataset = opened(data)
+    dataset = opened(data, "regime", "decade", "solver", "digits", "outcome")
     height, width, count = (dataset.sizes[name] for name in ("regime", "decade", "solver"))
     with matplotlib.rc_context(STYLE):
         plot = Plot(figsize=(2.2 + 0.23 * width * count, 1.3 + 0.26 * height), layout="constrained")

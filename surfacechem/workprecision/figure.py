@@ -23,6 +23,13 @@ AXES = {
 }
 """What is drawn on x."""
 
+NEEDED = (
+    *LABELS.values(),
+    *("tolerance", "status", *AXES, "uncertainty_max", "uncertainty_event"),
+    *("run_seconds", "run_seconds_median", "stepping_seconds"),
+)
+"""Variables that are read."""
+
 MARKERS = "osD^vPX"
 
 SMALLEST = 1e-17
@@ -38,7 +45,7 @@ def figure(data: xarray.Dataset | str | Path) -> Figure:
     an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
     reference; crosses at the right edge are failed solves, at the time that they took to fail.
     """
-    dataset = opened(data).set_index(LABELS)
+    dataset = opened(data, *NEEDED).set_index(LABELS)
     columns = [name for name in AXES if bool((dataset[name] > 0).any())]
     columns = columns or ["energy_error"]
     rows = dataset.sizes["case"]
