@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.extremes import cautioned
 from surfacechem.integrate import Model
 from surfacechem.lumping import lumpings
 from surfacechem.pacing import paces
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.scene import Scene
+from surfacechem.solvers.contract import Problem
 from surfacechem.system import System
 from surfacechem.terms import Law, Varying
 
@@ -197,6 +199,12 @@ def warnings(system: System) -> list[str]:
         p for p in system.parameters if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
     return [*system.warnings, *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle)]
+
+
+def cautions(model: Model, problem: Problem) -> list[str]:
+    """What the start gives reason to be cautious of."""
+    start = [np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]]
+    return cautioned(model.system, np.concatenate(start)[None])
 
 
 def lumping_warnings(model: Model, values: Mapping[str, float], end: float) -> list[str]:

@@ -158,7 +158,7 @@ def check(
     accuracy: Wanted = None,
 ) -> None:
     """Say a case back in words, without running it."""
-    from surfacechem.check import groups, lumping_warnings, warnings
+    from surfacechem.check import cautions, groups, lumping_warnings, warnings
     from surfacechem.choice import reasons
     from surfacechem.report import check_summary
     from surfacechem.simulation import load
@@ -169,11 +169,12 @@ def check(
     system, scene, model = simulation.system, simulation.case.scene, simulation.model
     values = model.values()
     try:
-        model.problem(settings, values)
+        problem = model.problem(settings, values)
     except InputError as error:
         raise simulation.case.located(error) from None
     numbers = groups(model, scene, values, settings.times[-1])
-    found = [*warnings(system), *lumping_warnings(model, values, settings.times[-1])]
+    lumped = lumping_warnings(model, values, settings.times[-1])
+    found = [*warnings(system), *cautions(model, problem), *lumped]
     why = reasons(model, settings) if settings.solver == AUTO else ()
     settings = model.chosen(settings)
     typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))

@@ -261,11 +261,13 @@ class Equilibria:
         at = self._moved(point, there, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
         return None if at is None else Lost(at, way, direction)
 
-    def held_at(self, index: int, lost: Lost) -> Lost:
-        """The same fold where sticking holds what slides."""
+    def held_at(self, index: int, lost: Lost) -> Lost | None:
+        """The same fold where sticking holds what slides; None where that holds all."""
         found = self._folds[index]
         assert found is not None
         point, n = self.with_slip(lost.point, 0.0), len(self.items)
+        if not self._active(point.inputs()).any():
+            return None
         values = np.atleast_1d(found[1](point.inputs()))
         way, weights = self._lost_way(point, values[2 * n :].reshape(n, n))
         return Lost(point, way, float(np.sign(values[:n] @ weights)))

@@ -1,4 +1,4 @@
-"""Rates so fast that no run resolves them: those that were capped are never used silently."""
+"""What a run has met that a reader has to know: rates so fast that none resolves them, and laws out of their sense."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from numpy.typing import NDArray
 
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.integrate import Trajectory
+from surfacechem.system import System
+
+ROUNDING = 1e-12
+"""Part of its largest size below zero that a quantity may be by rounding."""
 
 
 def capped_rates(trajectory: Trajectory) -> list[str]:
@@ -30,6 +34,22 @@ def capped_rates(trajectory: Trajectory) -> list[str]:
                 f"{EXPONENT_CAP:g} the rate goes on along its tangent: it is instantaneous, but not the one stated"
             )
     return found
+
+
+def cautions(trajectory: Trajectory) -> list[str]:
+    """What an output or a step of a run gives reason to be cautious of."""
+    system = trajectory.model.system
+    return cautioned(system, _inputs(trajectory)) if system.cautions else []
+
+
+def cautioned(system: System, rows: NDArray[np.float64]) -> list[str]:
+    """The cautions that apply at one of several states, which are the arguments of compiled functions."""
+    if not (system.cautions and len(rows)):
+        return []
+    expressions = [system.expand(item.expression) for item in system.cautions]
+    values = symengine.Lambdify(system.inputs, expressions, backend="lambda")(rows).reshape(len(rows), -1)
+    least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
+    return [item.text for item, x in zip(system.cautions, least < -ROUNDING * size, strict=True) if x]
 
 
 def _inputs(trajectory: Trajectory) -> NDArray[np.float64]:

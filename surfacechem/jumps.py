@@ -284,6 +284,8 @@ class Jumper:
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if slip:
             stuck = None if lost is None else found.held_at(index, lost)
+            if lost is not None and stuck is None:
+                return self._found(start, lost, heat)
             trial = self._found(found.with_slip(start, 0.0), stuck, heat)
             if trial is not None:
                 onward = found.with_slip(trial, slip)

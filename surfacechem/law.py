@@ -94,7 +94,7 @@ class Law(ABC):
     positive: ClassVar[tuple[str, ...]] = ()
     """Variables that must stay above zero for the law to hold."""
     nonnegative: ClassVar[tuple[str, ...]] = ()
-    """Variables that must not fall below zero."""
+    """Variables that must not fall below zero, or below what :attr:`least` states."""
 
     place: Place | None = field(default=None, repr=False)
     """Where the law stands in its case file; None for laws built in Python."""
@@ -125,6 +125,11 @@ class Law(ABC):
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
         """Ranges of variables outside which the law has no value; a run that reaches an end of them stops."""
+        return {}
+
+    @property
+    def least(self) -> Mapping[str, Expression]:
+        """Least values of those ``nonnegative`` variables that may fall below zero."""
         return {}
 
     @property
@@ -202,6 +207,12 @@ class Varying:
 def reads(formula: Callable[..., Expression]) -> tuple[str, ...]:
     """The quantities a law's formula reads: the names of its arguments."""
     return tuple(inspect.signature(formula).parameters)
+
+
+def optional(formula: Callable[..., Expression]) -> frozenset[str]:
+    """Those of them that a scene need not have: the arguments with a default."""
+    arguments = inspect.signature(formula).parameters.values()
+    return frozenset(item.name for item in arguments if item.default is not inspect.Parameter.empty)
 
 
 class Factor(Law):

@@ -74,6 +74,7 @@ VARIABLES = _table(
     ("softening", "1", "one while bonds break along an envelope"),
     ("bonded", "1", "one while the interface is bonded, zero after it has debonded", "b"),
     ("p", "Pa", "contact pressure", "p"),
+    ("p_contact", "Pa", "pressure that the contact bears, without attraction", r"p_{rep}"),
     ("t_n", "Pa", "normal traction on body 1, tension positive", "t_n", "e:cons_tc"),
     ("f", "N", "force per bond, tension positive", "f"),
     ("J_c", "1", "area stretch of the reference surface", "J_c"),

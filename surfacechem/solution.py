@@ -16,7 +16,7 @@ import numpy as np
 from surfacechem.audit import Audit, audit
 from surfacechem.detailedbalance import Verdict, verdicts
 from surfacechem.event_table import event_columns, event_findings, event_violations, event_waits
-from surfacechem.extremes import capped_rates
+from surfacechem.extremes import capped_rates, cautions
 from surfacechem.integrate import Run, Trajectory
 from surfacechem.netcdf import CONVENTIONS, Column, dataset_path, save, versions
 from surfacechem.profiles import profile_columns
@@ -127,6 +127,7 @@ class Solution:
             *event_waits(self.trajectory),
             *self._extrapolations(),
             *capped_rates(self.trajectory),
+            *cautions(self.trajectory),
             *self._lost_fluxes(),
             *self._inaccurate(),
             *system.warnings,

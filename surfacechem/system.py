@@ -207,6 +207,14 @@ class Capped:
 
 
 @dataclass(frozen=True)
+class Caution:
+    """What a reader has to know where an expression falls below zero, at the start or along a run."""
+
+    expression: Expression
+    text: str
+
+
+@dataclass(frozen=True)
 class System:
     """States, equations and everything that is read off them.
 
@@ -241,6 +249,7 @@ class System:
     work."""
     pairs: tuple[Pair, ...] = ()
     paces: tuple[Pace, ...] = ()
+    cautions: tuple[Caution, ...] = ()
     profiles: tuple[Profile, ...] = ()
     """Temperatures across bodies; their states stand behind all others, profile after profile."""
     conductors: tuple[Conductor, ...] = ()

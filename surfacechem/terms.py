@@ -26,7 +26,7 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Literal
 
 from surfacechem.expressions import Expression
-from surfacechem.law import Factor, Law, Spec, Varying, option, parameter, reads, resolved_unit
+from surfacechem.law import Factor, Law, Spec, Varying, option, optional, parameter, reads, resolved_unit
 
 __all__ = [
     "BodyEnergy",
@@ -40,8 +40,11 @@ __all__ = [
     "RateFactor",
     "RateLaw",
     "Spec",
+    "TangentialPotential",
+    "UnderPressure",
     "Varying",
     "option",
+    "optional",
     "parameter",
     "reads",
     "resolved_unit",
@@ -55,6 +58,35 @@ class Potential(Law):
     formula = "energy"
 
     energy: ClassVar[Callable[..., Expression]]
+    repulsion: ClassVar[Callable[..., Expression]]
+    """Part of the energy whose pressure the contact bears, for a law that attracts bodies which touch; absent where
+    a law either presses or pulls, so that its pressure is that of the contact."""
+
+
+class TangentialPotential(Potential):
+    """A potential of the tangential gap, which stands beside friction or carries it.
+
+    In parallel its gap is the whole displacement, along which friction acts too, and the tractions add up. In series it
+    is an elastic gap: as soon as its traction exceeds what friction bears the interface slides instead. Without shear
+    the gap counts as zero, as where adhesion is made anew wherever the surfaces slide to.
+    """
+
+    shear: Literal["parallel", "series", "none"] = option(
+        "how it acts with friction: 'parallel', beside it on the whole displacement, 'series', on an elastic gap that "
+        "slides, or 'none', as if the tangential gap were zero",
+        default="parallel",
+    )
+    unbonded: ClassVar[Callable[..., Expression]]
+    """Fraction of the interface on which friction acts in parallel; all of it where a law does not say."""
+
+
+class UnderPressure(Law):
+    """A law of the contact pressure p: of the net one, or of that which the contact bears without attraction."""
+
+    pressure: Literal["net", "contact"] = option(
+        "the pressure that p stands for: 'net' of all attraction, p = -t_n, or 'contact', the repulsive part p_contact",
+        default="net",
+    )
 
 
 class BodyEnergy(Law):

@@ -13,7 +13,7 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, product
 from surfacechem.quantities import VARIABLES
 from surfacechem.system import Parameter, Role
-from surfacechem.terms import Factor, Law, Load, Spec, Varying, reads, resolved_unit
+from surfacechem.terms import Factor, Law, Load, Spec, UnderPressure, Varying, optional, reads, resolved_unit
 
 L = TypeVar("L", bound=Law)
 
@@ -28,6 +28,7 @@ REMEDIES = {
     "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "direction_2": "Prescribe `v` and `v_2` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
+    "p_contact": "Give the interface a potential that reads the normal gap, or prescribe `p`.",
     "t_n": "Prescribe `t_n` under `loading`, or give the interface a potential that reads the normal gap.",
     "f": "Prescribe `f` under `loading`, or a load on the bonds: `t_n`, or a potential that reads the normal gap.",
     "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
@@ -114,6 +115,8 @@ class Variables:
 
     def get(self, name: str, reader: str | Law) -> Expression:
         """The expression of a name for a law, or something else in words, that reads it."""
+        if name == "p" and isinstance(reader, UnderPressure) and reader.pressure == "contact":
+            name = "p_contact"
         if name not in self._symbols:
             if name not in self._makers:
                 raise self._missing(name, reader)
@@ -135,9 +138,13 @@ class Variables:
     def call(
         self, law: Law, formula: Callable[..., Expression], extra: Mapping[str, Expression] | None = None
     ) -> Expression:
-        """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables."""
+        """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables.
+
+        An argument with a default is left out where the scene has no variable of that name.
+        """
         own = extra or {}
-        return formula(**{name: own[name] if name in own else self.get(name, law) for name in reads(formula)})
+        names = [name for name in reads(formula) if name in own or self.has(name) or name not in optional(formula)]
+        return formula(**{name: own[name] if name in own else self.get(name, law) for name in names})
 
     def bind(self, law: L, path: str, suffix: str = "", unit: str = "") -> L:
         """The law with every numeric parameter replaced by its symbol, times its factors where it varies.

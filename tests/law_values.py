@@ -45,6 +45,7 @@ LISTS = {name: (0.0, 0.8 * size, 1.6 * size) for name, size in AT.items()}
 LISTS |= dict.fromkeys(("values", "conductances"), (1.0, 2.5, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
 OPTIONS = LISTS | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
+OPTIONS |= {"shear": "parallel", "pressure": "net"}
 
 
 def every() -> dict[str, type[Law]]:

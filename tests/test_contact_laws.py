@@ -131,15 +131,35 @@ def test_bond_springs_in_chemical_equilibrium():
 
 def test_cohesive_strength_and_work():
     zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
-    traction = derivative(symbolic(zone), g)
-    assert at(traction, g_n=1e-8) == pytest.approx(1e6, rel=1e-15)
-    assert at(derivative(traction, g), g_n=1e-8) == pytest.approx(0.0, abs=1e-15 * 1e6 / 1e-8)
+    for energy in (symbolic(zone), symengine.sympify(zone.energy(g_n=g))):
+        traction = derivative(energy, g)
+        assert at(traction, g_n=1e-8, g_t=0.0) == pytest.approx(1e6, rel=1e-15)
+        assert at(derivative(traction, g), g_n=1e-8, g_t=0.0) == pytest.approx(0.0, abs=1e-15 * 1e6 / 1e-8)
+        assert at(traction, g_n=-1e-8, g_t=0.0) == -1e7
+        small = compiled(traction, g_n=1e-300, g_t=0.0)
+        assert small == pytest.approx(math.e * 1e6 / 1e-8 * 1e-300, rel=1e-14), "no cancellation"
     assert zone.energy(g_n=1.0) - zone.energy(g_n=0.0) == pytest.approx(math.e * 1e6 * 1e-8, rel=1e-15)
-    assert at(traction, g_n=-1e-8) == -1e7
-    assert compiled(traction, g_n=1e-300) == pytest.approx(math.e * 1e6 / 1e-8 * 1e-300, rel=1e-14), "no cancellation"
     for law in (zone, XuNeedleman(Phi_n=1.0, g_0=1e-8, g_t0=1e-8)):
         slope = derivative(symbolic(law), g)
         assert compiled(slope, g_n=1e-18, g_t=0.0) == pytest.approx(at(slope, g_n=1e-18, g_t=0.0), rel=1e-14)
+
+
+def test_a_cohesive_zone_is_as_strong_in_shear_as_in_tension():
+    """The traction is along the gap, whatever its direction, and pressure adds to it without softening."""
+    t_max, g_0, E_n = 1e6, 1e-8, 1e15
+    energy = symbolic(ExponentialCohesiveZone(t_max=t_max, g_0=g_0, E_n=E_n))
+    normal, shear = derivative(energy, g), derivative(energy, g_t)
+    for size in (1e-3, 1.0, 4.0):
+        t = t_max * size * math.exp(1 - size)
+        for angle in (0.0, 0.4, -0.4, math.pi / 2):
+            c, s = math.cos(angle), math.sin(angle)
+            gap = {"g_n": size * g_0 * c, "g_t": size * g_0 * s}
+            found = at(normal, **gap), at(shear, **gap)
+            assert found == pytest.approx((t * c, t * s), rel=1e-14, abs=1e-14 * t)
+        pressed = at(normal, g_n=-1e-9, g_t=size * g_0), at(shear, g_n=-1e-9, g_t=size * g_0)
+        assert pressed == pytest.approx((-E_n * 1e-9, t), rel=1e-14)
+    closed = compiled(derivative(shear, g_t), g_n=0.0, g_t=0.0), compiled(derivative(normal, g), g_n=0.0, g_t=1e-30)
+    assert closed == pytest.approx((math.e * t_max / g_0, E_n), rel=1e-14), "stiffness of a closed zone"
 
 
 def test_xu_needleman_without_shear_is_the_exponential_zone():

@@ -252,6 +252,20 @@ class TestJumps:
             assert solved["g_n"][10] == pytest.approx(-1e-8 / 11, rel=1e-2)
 
 
+@pytest.mark.parametrize("p", [6559.108123501283, 6015.564932235646, 8743.24723568622, 4958.0812951006765])
+def test_sliding_that_only_dampers_resist_begins_from_rest(p):
+    """Its velocity is nothing but rounding of tractions at first; then u relaxes to the drive."""
+    k, c, rate, mu = 1e13, 1e9, 1e-6, 0.3
+    drive, onset = Ramp(rate=rate), (mu * p - c * rate) / (k * rate)
+    solved = solve(slider(Coulomb(mu=mu), Mounting(k=k, c_b=c), drive, p=p), np.linspace(0.0, 4.0, 41))
+    assert solved.status == "finished", solved.reason
+    assert names(solved) == ["slip forward"]
+    assert solved.jumps[0].t == pytest.approx(onset, rel=1e-9)
+    after = np.linspace(0.0, 4.0, 41)[1:] - onset
+    slid = rate * (after - c / k * -np.expm1(-k / c * after))
+    np.testing.assert_allclose(solved["u_t"][1:], slid, rtol=1e-8)
+
+
 def test_work_on_a_contact_at_rest():
     """A smooth drive that never slides takes back what it gives."""
     drive = Harmonic(amplitude=1e-4, frequency=1.3)

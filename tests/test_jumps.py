@@ -69,7 +69,8 @@ def test_a_snap_beside_a_sticking_or_sliding_contact(w_t):
     loading = {"w_n": Ramp(rate=1e-6), "w_t": Ramp(start=w_t, rate=1e-7)}
     friction = MohrCoulomb(mu=0.5, t_n_max=2e6)
     mounts = {"normal": Mounting(k=K), "tangential": Mounting(k=1e10)}
-    trajectory = solve([ZONE], until=15.0, loading=loading, frictions=[friction], **mounts)
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e13, shear="none")
+    trajectory = solve([zone], until=15.0, loading=loading, frictions=[friction], **mounts)
     assert trajectory.status == "finished", trajectory.reason
     assert len(jumps(trajectory, "snap")) == 1
     assert audit(trajectory).energy_error < 1e-9

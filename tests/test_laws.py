@@ -20,6 +20,7 @@ POINTS = dict.fromkeys(("times", "pressures", "gaps"), (0.0, 1.0, 3.0))
 VALUES = dict.fromkeys(("values", "conductances"), (1.0, 2.0, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
 OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
+OPTIONS |= {"shear": "parallel", "pressure": "net"}
 READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
 SAMPLES = 20
 APPROVED = json.loads(law_values.TABLE.read_text())

@@ -107,6 +107,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         capped=tuple(build.capped),
         pairs=tuple(build.pairs),
         paces=tuple(build.paces),
+        cautions=tuple(build.cautions),
         profiles=tuple(build.profiles),
         conductors=tuple(conductors(build)),
         regime=regime(build),

@@ -16,7 +16,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Margin, Named, Range
-from surfacechem.terms import Friction, Law, Load, Spec
+from surfacechem.terms import Friction, Law, Load, Spec, optional
 from surfacechem.transitions import HELD, Mode
 from surfacechem.variables import unit_of
 
@@ -213,14 +213,21 @@ class Build(Draft):
             self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
-            reason = f"{name} fell below zero, where the law {law.name()} ends"
-            self.margins.append(Margin(f"{name} >= 0", value + NOTHING + self._rounding(value), reason))
+            least = law.least.get(name, 0)
+            slack = NOTHING + self._rounding(value) + DIGITS * absolute(least)
+            reason = f"{name} fell below {least if least != 0 else 'zero'}, where the law {law.name()} ends"
+            self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         for name, bend in law.kinks.items():
+            if name in law.least and name not in met:
+                continue  # the law ends there
             value = own[name] if name in own else self.variables.get(name, law)
             self.margins.append(Margin(name, value - bend, f"{law.name()} bends at this {name}", False))
         for name, tops in {**dict.fromkeys(law.positive, ()), **law.peaks}.items():
+            if name not in own and not self.variables.has(name) and name in optional(law.statement):
+                continue
             value = own[name] if name in own else self.variables.get(name, law)
-            self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
+            if not symengine.sympify(value).is_Number:
+                self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
         for name, ends in law.limits.items():
             value, (low, high) = self.variables.get(name, law), ends
             slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))

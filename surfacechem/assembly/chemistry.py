@@ -11,14 +11,16 @@ from surfacechem import balances
 from surfacechem.assembly.beside import affinity_taken, supplied
 from surfacechem.assembly.bounds import free_to_react
 from surfacechem.assembly.build import Build
+from surfacechem.assembly.closing import TOUCHING
 from surfacechem.assembly.draft import Bond
 from surfacechem.assembly.force import RESOLUTION, SHARED
+from surfacechem.assembly.mounting import law_reads
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.pulled import book_work, by_affinity, dead_load
 from surfacechem.assembly.softening import softening
 from surfacechem.expressions import Expression, depends, derivative, exponents, where
 from surfacechem.quantities import Quantity
-from surfacechem.system import Account, Capped
+from surfacechem.system import Account, Capped, Caution
 from surfacechem.terms import RateLaw
 
 MARGIN = 4
@@ -50,6 +52,7 @@ def reactions(build: Build) -> None:
         build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
         for x, n in nu.items():
             change[x] += n * rate
+        _across_an_open_gap(build, law, rate)
         own_departure(build, label, law, affinity)
         softening(build, law)
     supplied(build, laws, named)
@@ -61,6 +64,22 @@ def reactions(build: Build) -> None:
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
     _prescribed_bonding(build)
+
+
+def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
+    """Tell where bonds form across an open gap at a rate that does not feel it."""
+    bonds = {"phi", *build.interface.bonds}
+    formed = sum(n for x, n in law.stoichiometry().items() if x in bonds)
+    if not formed or not build.variables.has("g_n") or law_reads(law, "bonded"):
+        return
+    g_n = build.variables.get("g_n", law)
+    if build.expanded(rate).free_symbols & build.expanded(g_n).free_symbols - {build.t}:
+        return
+    text = (
+        f"{law.title} forms bonds across an open gap, which it does not read. Where they form in contact only let its "
+        "rate fall with the gap, by `gap-attachment` or a factor of g_n"
+    )
+    build.cautions.append(Caution(where(g_n > TOUCHING, -formed * rate, 0), text))
 
 
 def _affinity(build: Build, law: RateLaw, mu: Mapping[str, Expression]) -> Expression:

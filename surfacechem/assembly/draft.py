@@ -13,7 +13,7 @@ from surfacechem.conductors import Profile
 from surfacechem.expressions import Expression
 from surfacechem.refit import Fit
 from surfacechem.scene import Interface, Scene
-from surfacechem.system import Account, Capped, Margin, Named, Pace, Pair, Range, State
+from surfacechem.system import Account, Capped, Caution, Margin, Named, Pace, Pair, Range, State
 from surfacechem.terms import Friction, Load
 from surfacechem.transitions import Equilibrium, Mode, Transition
 from surfacechem.variables import Parameters, Variables
@@ -57,6 +57,10 @@ class Motion:
     """Tangential traction that sticking can bear along each direction, by axis."""
     jolted: dict[Any, Expression] = field(default_factory=dict)
     """New values of modes and states where loads jump, before what is in equilibrium with them follows."""
+    rubs: Expression = field(default_factory=lambda: symengine.Integer(1))
+    """Fraction of the interface on which friction acts, beside adhesion in parallel."""
+    rubbed: Expression = field(default_factory=lambda: symengine.Integer(0))
+    """Energy, per area of that fraction, of the elastic gap that friction slides on [J/m^2]."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
     works: dict[Friction, str] = field(default_factory=dict)
@@ -120,6 +124,7 @@ class Draft:
     motion: Motion = field(default_factory=Motion)
     pairs: list[Pair] = field(default_factory=list)
     paces: list[Pace] = field(default_factory=list)
+    cautions: list[Caution] = field(default_factory=list)
     conductances: dict[tuple[str, str], list[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     warnings: list[str] = field(default_factory=list)

@@ -67,7 +67,7 @@ def _rates(build: Build) -> dict[Any, Expression]:
 def _gaps(build: Build) -> dict[Any, Expression]:
     """Rates of the gaps that the potential depends on; books the work of the tractions."""
     rates: dict[Any, Expression] = {}
-    for gap in ("g_n", "g_t"):
+    for gap in ("g_n", "g_t", "u_t", "u_t2"):
         symbol = symengine.Symbol(gap)
         if not depends(build.psi, symbol):
             continue

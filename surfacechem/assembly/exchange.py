@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import symengine
 
 from surfacechem.assembly.build import BOTH, NOTHING, Build
+from surfacechem.assembly.kinds import displacement, in_parallel
 from surfacechem.assembly.memory import memory
-from surfacechem.assembly.mounting import ACROSS, Direction
+from surfacechem.assembly.mounting import ACROSS, ALONG, Direction
 from surfacechem.assembly.resistance import resist, resistance, stick_limit
 from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, where
+from surfacechem.expressions import Expression, derivative, where
 from surfacechem.quantities import Quantity
 from surfacechem.system import Margin
 from surfacechem.terms import Friction, HeatTransfer
@@ -21,6 +22,7 @@ from surfacechem.terms import Friction, HeatTransfer
 
 def friction(build: Build) -> None:
     """Sliding tractions and what they dissipate; their power comes from outside."""
+    rubs, total = build.motion.rubs, symengine.Integer(0)
     for law in build.interface.frictions:
         label = build.label(law)
         bound = build.bound(law)
@@ -33,7 +35,8 @@ def friction(build: Build) -> None:
             across = " across v" if d is ACROSS else ""
             quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
             nominal = build.stretch * build.name(quantity, traction)
-            power += nominal * build.variables.get(d.velocity, law)
+            power += rubs * nominal * build.variables.get(d.velocity, law)
+            total += rubs * nominal
             resist(build, d, nominal)
         build.frictions.add(label)
         build.dissipation[label] = power
@@ -43,6 +46,9 @@ def friction(build: Build) -> None:
             _reversal(build, resisted)
         else:
             stick_limit(build, law, bound, met)
+    if not build.motion.slips and in_parallel(build):
+        t_a = derivative(build.psi, displacement(build))
+        build.areal(Quantity(ALONG.total, "Pa", f"{ALONG.text} on body 1", ALONG.total), t_a + total)
 
 
 def pressed(build: Build, law: Friction) -> dict[str, Expression]:
@@ -52,8 +58,8 @@ def pressed(build: Build, law: Friction) -> dict[str, Expression]:
     """
     if "p" not in law.nonnegative or "p" in build.scene.loading:
         return {}
-    p = build.variables.get("p", law)
-    return {"p": where(p < 0, 0 * p, p)}
+    p, least = build.variables.get("p", law), build.bound(law).least.get("p")
+    return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
 
 
 def _reversal(build: Build, directions: Collection[Direction]) -> None:

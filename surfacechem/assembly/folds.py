@@ -107,7 +107,9 @@ def _size(build: Build, e: Equilibrium, own: Expression) -> Expression:
     g = absolute(symengine.Symbol(e.state))
     if far is None:
         return where(g > 0, build.expanded(e.size) / g, 1)
-    t = far.F - build.expanded(e.residual)
+    # Of what holds the gap itself: friction beside it has no stiffness.
+    t = build.expanded(derivative(build.psi, symengine.Symbol(e.state)))
+    t = t if t != 0 else far.F - build.expanded(e.residual)
     secant = t * symengine.Symbol(e.state)
     return where(secant > 0, secant / g**2, where(absolute(own) > 0, absolute(own), 1))
 

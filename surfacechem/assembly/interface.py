@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,13 +10,14 @@ import symengine
 
 from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.draft import Bond
+from surfacechem.assembly.kinds import arrangement, displacement, in_parallel, in_series
 from surfacechem.assembly.logarithms import initial_bonding
-from surfacechem.assembly.mounting import held
+from surfacechem.assembly.mounting import held, law_reads
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import Expression, depends, derivative, where
+from surfacechem.expressions import Expression, depends, derivative, positive, where
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
-from surfacechem.terms import Load, Spec
+from surfacechem.terms import Law, Load, Potential, Spec, UnderPressure
 from surfacechem.transitions import Transition
 
 LOADABLE = (
@@ -44,6 +46,8 @@ LOADABLE = (
 TRACTIONS = (
     ("g_n", "t_n", "normal traction on body 1"),
     ("g_t", "t_e", "elastic tangential traction on body 1"),
+    ("u_t", "t_a", "tangential traction on body 1 of what stands beside friction"),
+    ("u_t2", "t_a2", "transverse traction on body 1 of what stands beside friction"),
 )
 """Gap, traction that is its derivative of the free energy, and its long name."""
 
@@ -148,13 +152,14 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
 
 def free_energy(build: Build) -> None:
     """The sum of the interface's potentials, and the tractions that follow."""
-    for law in build.interface.potentials:
-        bound = build.variables.bind(law, f"interface.potential.{law.name()}")
-        F = build.variables.call(bound, bound.statement)
+    bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
+    gaps = _gaps(build, bounds)
+    energies = _energies(build, bounds, gaps)
+    for law, F in energies.items():
         build.refuse_foreign(F, _known(build), law)
         build.psi += F
         build.law_ranges(law)
-        build.law_margins(bound, {})
+        build.law_margins(bounds[law], gaps[law])
     _sides_of_touch(build)
     if build.interface.temperature is not None:
         node = build.node_of["interface"]
@@ -165,13 +170,85 @@ def free_energy(build: Build) -> None:
             "Give `interface.temperature` a name."
         )
     _tractions(build)
+    if depends(build.psi, symengine.Symbol("g_n")):
+        borne = [build.variables.call(b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()]
+        contact = partial(_contact_pressure, build, [_in_modes(build, F) for F in borne])
+        build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
+        _warn_of_net_pressure(build)
+    elif build.variables.has("p"):
+        build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
+
+
+def _gaps(build: Build, laws: Iterable[Potential]) -> dict[Potential, dict[str, Expression]]:
+    """The tangential gap of each potential where that is not the elastic one: the displacement, or none."""
+    parallel = in_parallel(build)
+    gaps: dict[Potential, Expression] = dict.fromkeys(parallel, displacement(build)) if parallel else {}
+    gaps |= {law: symengine.Integer(0) for law in laws if arrangement(law) == "none"}
+    return {law: {"g_t": gaps[law]} if law in gaps else {} for law in laws}
+
+
+def _energies(
+    build: Build, bounds: Mapping[Potential, Potential], gaps: Mapping[Potential, Mapping[str, Expression]]
+) -> dict[Potential, Expression]:
+    """The energy of each potential, with the tangential gap that it has beside friction or behind it.
+
+    Where a potential in parallel says that friction acts on a part of the interface only, so does the elastic gap that
+    friction slides on.
+    """
+    series = in_series(build)
+    found = {law: build.variables.call(b, b.statement, gaps[law]) for law, b in bounds.items()}
+    for law in in_parallel(build):
+        if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
+            build.motion.rubs *= build.variables.call(bounds[law], unbonded)
+            build.warnings += [
+                f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
+                for friction in build.interface.frictions
+                if friction.breaks_bonds
+            ]
+    if build.motion.rubs != 1:
+        g_t = symengine.Symbol("g_t")
+        for law in series:
+            sheared = found[law] - symengine.sympify(found[law]).subs({g_t: 0})
+            build.motion.rubbed += sheared
+            found[law] += (build.motion.rubs - 1) * sheared
+    return found
+
+
+def _attracts(law: Potential) -> bool:
+    """Whether a potential may pull bodies that touch, so that it says what part of it the contact bears."""
+    return hasattr(law, "repulsion")
+
+
+def _contact_pressure(build: Build, borne: Sequence[Expression]) -> Expression:
+    """Sum of what each potential presses [Pa], per current area."""
+    pressed = (positive(-derivative(F, symengine.Symbol("g_n"))) for F in borne)
+    return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
+
+
+def _warn_of_net_pressure(build: Build) -> None:
+    """Warn of laws that take the attraction of a potential for relief of the contact.
+
+    A law with an adhesive strength of its own has it back.
+    """
+    attracting = [law.name() for law in build.interface.potentials if _attracts(law)]
+    readers = [*build.interface.frictions, *build.interface.reactions, *build.scene.heat]
+    net = [law.name() for law in readers if _reads_net_pressure(law) and not getattr(law, "t_n_max", 0)]
+    if attracting and net:
+        build.warnings.append(
+            f"{' and '.join(attracting)} attracts, and {' and '.join(dict.fromkeys(net))} reads the net pressure: "
+            "attraction lowers it, although it presses the surfaces together. To read what the contact bears give the "
+            "law `pressure: contact`, or a factor `of: p_contact`."
+        )
+
+
+def _reads_net_pressure(law: Law) -> bool:
+    return law_reads(law, "p") and not (isinstance(law, UnderPressure) and law.pressure == "contact")
 
 
 def _sides_of_touch(build: Build) -> None:
     """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
-    conditions = {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
-    psi = symengine.sympify(build.psi).xreplace(conditions)
+    psi = symengine.sympify(build.psi).xreplace(_by_side(g))
     if not depends(psi, side):
         return
     if "g_n" not in build.motion.gap_rates:
@@ -188,6 +265,16 @@ def _sides_of_touch(build: Build) -> None:
         build.transitions.append(Transition(name, margin, reason, other, settles=True, to_pass=bears, measure="g_n"))
 
 
+def _by_side(g: Any) -> dict[Any, Any]:
+    side = symengine.Symbol("side")
+    return {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
+
+
+def _in_modes(build: Build, F: Expression) -> Expression:
+    """An energy with the sides of touch in the mode, where there is one."""
+    return F if build.find_mode("side") is None else symengine.sympify(F).xreplace(_by_side(symengine.Symbol("g_n")))
+
+
 def _rests(build: Build) -> bool:
     """Whether bodies at no gap are in contact, loaded or not: under a dead load nothing else holds them there."""
     mount = held(build, "n")
@@ -196,7 +283,7 @@ def _rests(build: Build) -> bool:
 
 def _known(build: Build) -> set[Any]:
     """What the balance of the interface accounts for: its own temperature, bonds and gaps."""
-    names = {"phi", "g_n", "g_t", *build.bonding}
+    names = {"phi", "g_n", "g_t", "u_t", "u_t2", *build.bonding}
     if build.interface.temperature is not None:
         names.add(build.node_of["interface"].name)
     return {symengine.Symbol(name) for name in names}
@@ -208,6 +295,11 @@ def _tractions(build: Build) -> None:
         symbol = symengine.Symbol(gap)
         if depends(build.psi, symbol):
             build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(build.psi, symbol))
+    if parallel := in_parallel(build):
+        traction = "t_a" if depends(build.psi, symengine.Symbol("u_t")) else "t_e"
+        names = " and ".join(law.name() for law in parallel)
+        arrangement = f"{names} in parallel with friction" if build.interface.frictions else names
+        build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", arrangement)
     if depends(build.psi, symengine.Symbol("g_n")):
         pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
         build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

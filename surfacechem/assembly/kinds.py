@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import symengine
+
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.mounting import ACROSS, ALONG, Direction, Held, held, held_across, read_by_potentials
+from surfacechem.assembly.mounting import ACROSS, ALONG, Direction, Held, driven, held, held_across, law_reads
 from surfacechem.assembly.resistance import formula_along
 from surfacechem.errors import InputError, Place
+from surfacechem.expressions import Expression, sqrt
+from surfacechem.terms import Potential, TangentialPotential
 
 PLACE = Place(path="mechanics.tangential")
 
@@ -41,7 +45,7 @@ class Kind:
 def kinds(build: Build) -> tuple[Kind, ...]:
     """What determines the motion in each direction in which the scene moves by a balance."""
     mount = held(build, "t")
-    elastic = read_by_potentials(build, "g_t") and "g_t" not in build.scene.loading
+    elastic = bool(in_series(build)) and not driven(build, "g_t")
     across = held_across(build, mount) if mount is not None else None
     if across is not None:
         _refuse_half(build, elastic)
@@ -52,6 +56,46 @@ def kinds(build: Build) -> tuple[Kind, ...]:
     if mount is None and not (elastic and "u_t" in build.scene.loading):
         return ()
     return (_kind(build, ALONG, mount, elastic),)
+
+
+def in_parallel(build: Build) -> tuple[Potential, ...]:
+    """The potentials whose tangential gap is the whole displacement, which friction acts along too.
+
+    What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
+    gap and a velocity that are prescribed each by itself are no one displacement.
+    """
+    mount, frictions = held(build, "t"), bool(build.interface.frictions)
+    if mount is not None:
+        beside = not driven(build, "g_t") and (frictions or held_across(build, mount) is not None)
+    else:
+        beside = frictions and not driven(build, "v") and (driven(build, "g_t") or driven(build, "u_t"))
+    return tuple(law for law in _sheared(build) if beside and arrangement(law) == "parallel")
+
+
+def arrangement(law: Potential) -> str:
+    """How a potential acts with friction."""
+    return law.shear if isinstance(law, TangentialPotential) else "series"
+
+
+def in_series(build: Build) -> tuple[Potential, ...]:
+    """The potentials of an elastic gap, which gives way where friction does."""
+    parallel = in_parallel(build)
+    return tuple(law for law in _sheared(build) if law not in parallel)
+
+
+def _sheared(build: Build) -> list[Potential]:
+    return [law for law in build.interface.potentials if law_reads(law, "g_t") and arrangement(law) != "none"]
+
+
+def displacement(build: Build) -> Expression:
+    """The tangential gap of what stands beside friction: the displacement, in two directions its length.
+
+    Laws read its square, so that it needs no guard where it is zero.
+    """
+    if len(build.motion.slips) == 2:
+        return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
+    name = "g_t" if driven(build, "g_t") else "u_t"
+    return build.variables.get(name, "the adhesion beside friction")
 
 
 def _refuse_half(build: Build, elastic: bool) -> None:

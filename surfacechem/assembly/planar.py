@@ -15,7 +15,7 @@ import symengine
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.kinds import Kind
 from surfacechem.assembly.mounting import ACROSS, FarField, far_field
-from surfacechem.assembly.slip import NONE
+from surfacechem.assembly.slip import NONE, beside
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, where
 from surfacechem.system import Margin
 
@@ -46,6 +46,8 @@ class Side:
     resisted: Expression
     needed: Expression
     limit: Expression
+    t_a: Expression
+    """Traction of what stands beside friction; ``far`` is the far field less this."""
 
     @property
     def driving(self) -> Expression:
@@ -55,11 +57,12 @@ class Side:
 def side_of(build: Build, kind: Kind) -> Side:
     """One of the two directions of a scene."""
     assert kind.mount is not None
-    far, u = far_field(build, kind.mount), symengine.Symbol(kind.d.displacement)
-    motion = build.motion
-    resisted, limit = motion.sliding_tractions[kind.d.axis], motion.stick_limits[kind.d.axis]
+    motion, u = build.motion, symengine.Symbol(kind.d.displacement)
+    t_a = derivative(build.psi, u)
+    far = beside(far_field(build, kind.mount), t_a)
+    resisted, limit = (motion.rubs * by[kind.d.axis] for by in (motion.sliding_tractions, motion.stick_limits))
     rate, cosine = motion.gap_rates[kind.d.displacement], unit_vector()[kind.d is ACROSS]
-    return Side(kind, far, u, cosine, rate, resisted, far.force(u, NONE), limit)
+    return Side(kind, far, u, cosine, rate, resisted, far.force(u, NONE), limit, t_a)
 
 
 def unit_vector() -> tuple[Expression, Expression]:

@@ -29,7 +29,7 @@ import symengine
 from surfacechem.assembly.breaking import broken
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.kinds import PLACE, Kind
-from surfacechem.assembly.mounting import LENGTH
+from surfacechem.assembly.mounting import LENGTH, far_field
 from surfacechem.assembly.planar import (
     BEGAN,
     SLIDES,
@@ -155,8 +155,9 @@ def motion(build: Build, kinds: Sequence[Kind]) -> None:
     for side in sides:
         name = side.kind.d.displacement
         build.rows[name] = symengine.Symbol(f"d{name}_dt") - side.rate
-        side.far.book(build, side.u, side.rate)
-        name_traction(build, side.kind.d, SLIDES, side.resisted, side.needed)
+        assert side.kind.mount is not None
+        far_field(build, side.kind.mount).book(build, side.u, side.rate)
+        name_traction(build, side.kind.d, SLIDES, side.t_a + side.resisted, side.t_a + side.needed)
     _transitions(build, sides, _balance(build, sides))
 
 

@@ -74,6 +74,7 @@ def on_springs(build: Build, sides: Sequence[Side]) -> None:
             "a dead load nothing holds what slides. Give the mounting `k`, `m` or `c_b`.",
             PLACE,
         )
+    _refuse_adhesion(sides)
     dl, turn = symengine.symbols(f"d{PATH}_dt dturn_dt")
     sizes = [resistance(build, side) for side in sides]
     pulled = turned([build.total_derivative(side.far.force(NONE, NONE)) for side in sides])
@@ -85,6 +86,15 @@ def on_springs(build: Build, sides: Sequence[Side]) -> None:
     build.rows[PATH] = where(SLIDES > 0, along - skew * turn, dl)
     build.rows["turn"] = where(SLIDES > 0, across - turning * turn, turn)
     _settling(build, sides, sizes)
+
+
+def _refuse_adhesion(sides: Sequence[Side]) -> None:
+    if any(side.t_a != 0 for side in sides):
+        raise InputError(
+            "adhesion in parallel with dry friction in two directions softens, so that springs alone do not say which "
+            "way it slips as it gives way. Give the mounting `m` or `c_b`, or let it move in one direction.",
+            PLACE,
+        )
 
 
 def _unseen(sides: Sequence[Side]) -> Expression:

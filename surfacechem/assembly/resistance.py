@@ -14,6 +14,7 @@ from surfacechem.assembly.build import Build
 from surfacechem.assembly.mounting import ACROSS, ALONG, Direction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, where
+from surfacechem.system import Caution
 from surfacechem.terms import Friction, Varying, reads
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
@@ -81,6 +82,8 @@ def resist(build: Build, d: Direction, traction: Expression) -> None:
 
 def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
     """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
+    if any(slip.sticks for slip in build.motion.slips):
+        _caution(build, law, bound)
     for slip in build.motion.slips:
         if slip.sticks:
             limits, axis = build.motion.stick_limits, slip.d.axis
@@ -95,6 +98,27 @@ def _borne(build: Build, bound: Friction, d: Direction, at_rest: Mapping[str, Ex
         return kinetic
     static = build.variables.call(bound, bound.transverse_limit if two else bound.limit, at_rest)
     return static if static == kinetic else where(static > kinetic, static, kinetic)
+
+
+def _caution(build: Build, law: Friction, bound: Friction) -> None:
+    """Tell where a law bears less at rest than it resists sliding with, which happens to no contact.
+
+    The pressure of 1 Pa stands for any: coefficients are compared.
+    """
+    if not bound.has_limit:
+        return
+    given = {"p": ONE, **REST}
+    kinetic = build.variables.call(bound, bound.statement, given)
+    if {"mu_s", "mu_k"} <= vars(bound).keys():  # that of fast sliding, to which that at rest falls
+        static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
+    else:
+        static = build.variables.call(bound, bound.limit, given)
+    if static != kinetic:
+        text = (
+            f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on is "
+            "what sticking bears"
+        )
+        build.cautions.append(Caution(static - kinetic, text))
 
 
 def formula_along(law: Friction, d: Direction) -> tuple[str, ...]:

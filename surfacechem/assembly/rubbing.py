@@ -49,7 +49,7 @@ def rubbing(build: Build, impulse: Expression) -> Rubbing:
     if not (laws and sliding):
         return Rubbing()
     velocity = "speed" if len(sliding) == 2 else "v"
-    ratio = symengine.Add(*(_ratio(build, law, velocity) for law in laws))
+    ratio = build.motion.rubs * symengine.Add(*(_ratio(build, law, velocity) for law in laws))
     return _slowed(build, sliding[0], symengine.Symbol(velocity), ratio, impulse)
 
 
@@ -70,7 +70,7 @@ def _driven(build: Build, laws: Sequence[Friction], impulse: Expression) -> Rubb
     for law in laws:
         account = build.motion.works[law]
         done = build.mode(f"{account}_of_impacts", 0.0, {0.0: f"work of impacts against {law.title} [J/m^2]"})
-        power = _at_infinity(build, law, _power(build, law))
+        power = build.motion.rubs * _at_infinity(build, law, _power(build, law))
         build.motion.given[account] = done
         works[done] = done + power * exerted
         powers += power

@@ -6,6 +6,7 @@ by something that depends on its rate, or rate-independent, in which case the tr
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import symengine
@@ -23,10 +24,10 @@ from surfacechem.assembly.creep import (
     inertia,
     stands_for_velocity,
 )
-from surfacechem.assembly.kinds import PLACE, Kind
+from surfacechem.assembly.kinds import PLACE, Kind, in_series
 from surfacechem.assembly.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, absolute, derivative, sign, where
+from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.system import Margin, State
 from surfacechem.transitions import Equilibrium, Transition
@@ -112,15 +113,16 @@ def _own_velocity(build: Build, kind: Kind, place: str) -> Expression:
 
 def _yielding(build: Build, mount: Held) -> Expression:
     """Velocity at which the dampers bear what is out of balance with the elastic gap."""
-    far = far_field(build, mount)
-    return build.name(
-        VARIABLES["v_t"], far.yielding(symengine.Symbol("u_t"), derivative(build.psi, symengine.Symbol("g_t")))
-    )
+    far, u = far_field(build, mount), symengine.Symbol("u_t")
+    traction = derivative(build.psi, symengine.Symbol("g_t")) + derivative(build.psi, u)
+    return build.name(VARIABLES["v_t"], far.yielding(u, traction))
 
 
 def _elastic_gap(build: Build, kind: Kind) -> None:
     g = evolve(build, "g_t")
-    build.variables.define("g_t", lambda: g, "evolved", "elastic sticking")
+    names = " and ".join(law.name() for law in in_series(build))
+    arrangement = f"{names} in series with friction" if build.interface.frictions else names
+    build.variables.define("g_t", lambda: g, "evolved", arrangement)
     build.motion.gap_rates["g_t"] = symengine.Symbol("dg_t_dt")
     if kind.mount is None:
         build.motion.gap_rates["u_t"] = (
@@ -147,32 +149,51 @@ def motion(build: Build, kind: Kind) -> None:
         build.variables.get("v_t", "the mechanics")
     d, u = kind.d, symengine.Symbol(kind.d.displacement)
     v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
+    rubs, t_a = build.motion.rubs, derivative(build.psi, u)
     t_f = build.motion.sliding_tractions.get(d.axis, NONE)
-    t_e = derivative(build.psi, symengine.Symbol("g_t")) if kind.elastic else None
-    carried = t_e if t_e is not None else t_f
-    needed = t_e if t_e is not None else far.force(u, NONE)  # type: ignore[union-attr]
+    if kind.elastic:
+        # Per area on which friction acts, however small that is.
+        t_e = derivative(build.psi if rubs == 1 else build.motion.rubbed, symengine.Symbol("g_t"))
+        carried, needed = rubs * t_e, t_e
+    else:
+        t_e, t_f = None, rubs * t_f
+        carried, needed = t_f, beside(far, t_a).force(u, NONE)  # type: ignore[arg-type]
     slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(kind.slides)
     if far is not None:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
         far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
-        _balance(build, kind, far, slides, t_f, carried)
+        _balance(build, kind, far, slides, t_f, carried, t_a)
     else:
-        build.supply("W_t", "work of the far field on the tangential displacement", carried * rate, None)
-    if kind.elastic:
+        build.supply("W_t", "work of the far field on the tangential displacement", (carried + t_a) * rate, None)
+    if t_e is not None:
         _elastic_rows(build, kind, slides, t_f, t_e, v)
-    name_traction(build, d, slides, carried, needed)
+    name_traction(build, d, slides, t_a + carried, t_a + (carried if kind.elastic else needed))
     if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
         _transitions(build, kind, needed, v)
 
 
+def beside(far: FarField, t_a: Expression) -> FarField:
+    """The far field less the traction of what stands beside friction, as friction feels it."""
+    return replace(far, F=far.F - t_a)
+
+
 def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:
-    """The traction of the friction while sliding, else what holds the interface."""
+    """The traction carried while sliding, else what holds the interface."""
     traction = slides * carried + (1 - slides) * needed
     build.areal(Quantity(d.total, "Pa", f"{d.text} on body 1", d.total), traction)
 
 
-def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: Expression, carried: Expression) -> None:
+def _balance(
+    build: Build,
+    kind: Kind,
+    mounted: FarField,
+    slides: Expression,
+    t_f: Expression,
+    carried: Expression,
+    t_a: Expression,
+) -> None:
     """Row of the displacement, and of its velocity where that is a variable of its own."""
+    far = beside(mounted, t_a)
     name = kind.d.displacement
     u, du = symengine.symbols(f"{name} d{name}_dt")
     rate = build.motion.gap_rates[name]
@@ -198,11 +219,12 @@ def _balance(build: Build, kind: Kind, far: FarField, slides: Expression, t_f: E
         _sliding_row(build, kind, slides, driving)
     else:
         driving = far.force(u, NONE) - t_f
-        if far.k == 0:
+        if far.k == 0 and not depends(t_a, u):
             _held_by_friction(build, name, driving)
             return
-        build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * far.k * du
-        size = far.size(u) + absolute(t_f)
+        held = far.k if far.k != 0 else 1
+        build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * held * du
+        size = mounted.size(u) + absolute(t_f) + absolute(t_a)
         build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
 
 
@@ -263,10 +285,15 @@ def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
 def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expression) -> None:
     """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it."""
     v = build.motion.slides_by[kind.d.velocity]
-    build.rows[str(v)] = slides * driving + (1 - slides) * v
+    slope = -derivative(build.expanded(driving), v)
+    balance = driving
+    if slope != 0 and not depends(slope, v):
+        # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
+        whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
+        balance = whole.subs({v: 0}) / slope - v
+    build.rows[str(v)] = slides * balance + (1 - slides) * v
     if build.motion.creeping is not None and len(build.interface.frictions) == 1 and _is_damped(kind):
         return  # both friction and damper resist the more, the faster it slides
-    slope = -derivative(build.expanded(driving), v)
     if slope == 0:
         raise InputError(
             "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
@@ -282,7 +309,7 @@ def _is_damped(kind: Kind) -> bool:
 
 def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
-    limit = build.motion.stick_limits["t"]
+    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.motion.rubs)
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
     bears = where(limit > 0, limit, 0)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)

@@ -11,7 +11,7 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Body
 
-GAPS = ("g_n", "g_t")
+GAPS = ("g_n", "g_t", "u_t", "u_t2")
 
 
 def by_channel(build: Build, k: int, body: Body) -> Expression:

@@ -11,7 +11,7 @@ from functools import partial
 
 from surfacechem.assembly import plane, slip
 from surfacechem.assembly.build import Build
-from surfacechem.assembly.kinds import Kind, kinds
+from surfacechem.assembly.kinds import Kind, displacement, in_parallel, kinds
 from surfacechem.assembly.mounting import ACROSS, ALONG
 from surfacechem.assembly.resistance import directions
 from surfacechem.expressions import Expression, norm, sign, where
@@ -36,6 +36,8 @@ def _in_the_plane(found: Sequence[Kind]) -> bool:
 
 def _prescribed_direction(build: Build) -> None:
     """The direction of sliding where its velocity is prescribed: a sign, or a unit vector."""
+    if in_parallel(build):
+        build.variables.define("v", partial(_along_displacement, build), "derived", "the prescribed displacement")
     if len(directions(build)) == 1:
         if build.variables.has("v"):
             build.variables.define("direction", lambda: sign(build.variables.get("v", "the friction")), "internal", "v")
@@ -52,6 +54,10 @@ def _prescribed_direction(build: Build) -> None:
     build.variables.define("speed", speed, "derived", "v and v_2")
     for d in (ALONG, ACROSS):
         build.variables.define(d.cosine, partial(along, d.velocity), "internal", "v and v_2")
+
+
+def _along_displacement(build: Build) -> Expression:
+    return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
 
 
 def tangential_motion(build: Build) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from surfacechem.expressions import Expression, positive, where
-from surfacechem.terms import Potential, RateLaw, parameter
+from surfacechem.terms import RateLaw, TangentialPotential, parameter
 
 
-class AdhesionIntensity(Potential):
+class AdhesionIntensity(TangentialPotential):
     r"""Elastic adhesion of an intensity between zero and one, the bonding state.
 
     .. math::
@@ -19,7 +19,12 @@ class AdhesionIntensity(Potential):
     Dupré's energy. Contact in compression is elastic and does not lose stiffness; the original is rigid, the limit of
     large :math:`E_n`. Another energy of adhesion than the linear one is had by a bond energy beside it.
 
-    Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, after Frémond (1987). Any gaps.
+    In parallel with friction :math:`g_t` is the whole displacement. Friction acts on the part that is not bonded,
+    :math:`t_t = \phi^2 C_T g_t + (1 - \phi)\,t_f`, so that shear that begins with complete adhesion peaks no lower
+    than without it, at :math:`\sqrt{w\,C_T}` where nothing delays the loss, and ends on the plateau of friction.
+
+    Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, after Frémond (1987); friction on the
+    part :math:`1 - \phi` as in Raous & Monerie (2002), in Contact Mechanics (Kluwer). Any gaps.
 
     >>> AdhesionIntensity(C_N=1e12, C_T=1e12, w=1.0, E_n=1e14).energy(g_n=1e-6, g_t=0.0, phi=0.5)
     -0.375
@@ -34,6 +39,10 @@ class AdhesionIntensity(Potential):
         """Free energy [J/m^2]."""
         normal = where(g_n > 0, self.C_N * phi**2, self.E_n) * g_n**2
         return (normal + self.C_T * phi**2 * g_t**2) / 2 - self.w * phi
+
+    def unbonded(self, phi: Expression) -> Expression:
+        """Fraction of the interface on which friction acts."""
+        return 1 - phi
 
 
 class AdhesionLoss(RateLaw):

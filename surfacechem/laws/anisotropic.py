@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from surfacechem.expressions import Expression
-from surfacechem.terms import Friction, parameter
+from surfacechem.terms import Friction, UnderPressure, parameter
 
 
-class AnisotropicCoulomb(Friction):
+class AnisotropicCoulomb(UnderPressure, Friction):
     r"""Dry friction with a coefficient for each of two directions along the interface.
 
     .. math:: (t_t, t_2) = p\,\frac{(\mu_1 v,\ \mu_2 v_2)}{\sqrt{v^2 + v_2^2}}

@@ -5,28 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from surfacechem.expressions import EXPONENT_CAP, Expression, decay, where
-from surfacechem.terms import Potential, parameter
+from surfacechem.expressions import EXPONENT_CAP, Expression, decay, sqrt, where
+from surfacechem.terms import TangentialPotential, parameter
+
+CLOSED = 1e-16
+"""Mixed gap over g_0 of a closed zone, whose direction is undefined: its square is far below the rounding of one."""
 
 
-class ExponentialCohesiveZone(Potential):
-    r"""Exponential cohesive law in tension, elastic contact in compression.
+class ExponentialCohesiveZone(TangentialPotential):
+    r"""Exponential cohesive law of the gap in tension and shear, elastic contact in compression.
 
     .. math::
-        \Psi = -t_{max} (g_n + g_0) e^{1 - g_n/g_0}, \quad t_n = t_{max} \frac{g_n}{g_0} e^{1 - g_n/g_0}
-        \quad \text{for } g_n > 0
+        \Psi = -t_{max} (g + g_0) e^{1 - g/g_0} + \tfrac12 E_n \langle -g_n \rangle^2, \quad
+        g = \sqrt{\langle g_n \rangle^2 + g_t^2}, \quad
+        (t_n, t_t) = t_{max} \frac{(g_n, g_t)}{g_0} e^{1 - g/g_0} \quad \text{for } g_n > 0
 
-    and :math:`\Psi = -e\,t_{max} g_0 + \tfrac12 E_n g_n^2` for g_n <= 0. The strength :math:`t_{max}` is reached at
-    :math:`g_0`; the work of separation is :math:`e\,t_{max} g_0`. Both may vary with temperature and bonding state; the
-    entropy, heat capacity and chemical potential that go with it follow. With :math:`t_{max} \propto T_0/T` the zone
-    has a positive capacity and cools where it opens; a strength concave in T takes capacity away.
+    Shear takes part where the scene has a tangential gap; without one :math:`g = \langle g_n \rangle`. The strength
+    :math:`t_{max}` is reached at :math:`g = g_0` in any direction; the work of separation is :math:`e\,t_{max} g_0`.
+    Both may vary with temperature and bonding state; the entropy, heat capacity and chemical potential that go with it
+    follow. With :math:`t_{max} \propto T_0/T` the zone has a positive capacity and cools where it opens; a strength
+    concave in T takes capacity away.
 
-    Source: Sauer, Duong & Mandadapu (2021), eqs. ex:psi_czm and ex:bt_czm, with the sign of tension and a signed gap:
-    with the norm of the gap it would soften in compression too. Any g_n; reversible.
+    Source: Sauer, Duong & Mandadapu (2021), eqs. ex:psi_czm and ex:bt_czm, with the sign of tension and a signed
+    normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible.
 
     >>> zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
     >>> round(zone.energy(g_n=0.0), 10), round(zone.energy(g_n=1e-8), 10)
     (-0.0271828183, -0.02)
+    >>> round(zone.energy(g_n=0.6e-8, g_t=0.8e-8), 10), round(zone.energy(g_n=-1e-8, g_t=1e-8), 10)
+    (-0.02, 0.03)
     """
 
     t_max: float = parameter("Pa", "strength, largest tensile traction", at_least=0)
@@ -34,18 +41,21 @@ class ExponentialCohesiveZone(Potential):
     E_n: float = parameter("Pa/m", "contact stiffness in compression", at_least=0)
 
     @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """The gap at the strength."""
-        return {"g_n": self.g_0}
+    def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
+        """The gaps at the strength; and no shear, where the stiffness of a pressed zone has its peak and bends."""
+        return {"g_n": self.g_0, "g_t": (-self.g_0, 0.0, self.g_0)}
 
-    def energy(self, g_n: Expression) -> Expression:
+    def energy(self, g_n: Expression, g_t: Expression | None = None) -> Expression:
         """Free energy [J/m^2]."""
-        u = g_n / self.g_0
-        falling, touching = decay(u), math.e * self.t_max * self.g_0
-        return where(g_n > 0, -touching * (falling + u * falling), self.E_n * g_n**2 / 2 - touching)
+        touching, contact = math.e * self.t_max * self.g_0, self.E_n * g_n**2 / 2
+        if g_t is None or g_t == 0:
+            return where(g_n > 0, -touching * _separated(g_n / self.g_0), contact - touching)
+        square = where(g_n > 0, g_n**2, 0) + g_t**2
+        apart = sqrt(square / self.g_0**2 + CLOSED**2)
+        return where(g_n > 0, 0, contact) - touching * _separated(apart)
 
 
-class XuNeedleman(Potential):
+class XuNeedleman(TangentialPotential):
     r"""Cohesive zone that couples opening and sliding.
 
     .. math::
@@ -85,6 +95,12 @@ class XuNeedleman(Potential):
         constant = (1 - self.r) * ratio - self.q * shear
         linear = ratio - (self.r - self.q) / (self.r - 1) * shear
         return self.Phi_n * _decaying(g_n / self.g_0, constant, linear)
+
+
+def _separated(u: Expression) -> Expression:
+    """(1 + u) exp(-u), written so that its derivatives do not cancel."""
+    falling = decay(u)
+    return falling + u * falling
 
 
 def _decaying(u: Expression, constant: Expression, linear: Expression) -> Expression:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from surfacechem.expressions import Expression, log, positive, where
-from surfacechem.terms import Potential, parameter
+from surfacechem.terms import Potential, TangentialPotential, option, parameter
 
 
 class NormalStiffness(Potential):
@@ -43,13 +45,14 @@ class BondedContact(Potential):
         return self.E_n * (bonded * positive(g_n) ** 2 + positive(-g_n) ** 2) / 2
 
 
-class TangentialStiffness(Potential):
+class TangentialStiffness(TangentialPotential):
     r"""Linear elastic contact along the interface.
 
     .. math:: \Psi = \tfrac12 E_t g_t^2, \quad t_t = E_t g_t
 
-    Where the elastic gap is prescribed it carries its traction beside that of friction; where it moves, in series
-    with it: elastic sticking.
+    In series with friction it is elastic sticking: :math:`g_t` grows up to what friction bears, then the interface
+    slides. In parallel it holds the whole displacement beside friction, as a layer of glue does. Where :math:`g_t` is
+    prescribed it carries its traction beside that of friction.
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:psi_c. Any g_t.
 
     >>> TangentialStiffness(E_t=1e12).energy(g_t=1e-6)
@@ -57,6 +60,11 @@ class TangentialStiffness(Potential):
     """
 
     E_t: float = parameter("Pa/m", "tangential contact stiffness", at_least=0)
+    shear: Literal["parallel", "series", "none"] = option(
+        "how it acts with friction: 'series', on an elastic gap that slides, 'parallel', beside it on the whole "
+        "displacement, or 'none'",
+        default="series",
+    )
 
     def energy(self, g_t: Expression) -> Expression:
         """Free energy [J/m^2]."""

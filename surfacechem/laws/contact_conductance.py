@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 
 from surfacechem.expressions import Expression, power
 from surfacechem.laws._tables import ConductanceTable
-from surfacechem.terms import HeatTransfer, Varying, option, parameter
+from surfacechem.terms import HeatTransfer, UnderPressure, Varying, option, parameter
 
 
 def _value(number: float | Varying) -> float:
     return number.value if isinstance(number, Varying) else number
 
 
-class PressureConductance(HeatTransfer):
+class PressureConductance(UnderPressure, HeatTransfer):
     r"""Conductance of contact spots that grow with the pressure.
 
     .. math:: h = h_0 + h_c \left(\frac{p}{H}\right)^q
@@ -44,7 +44,7 @@ class PressureConductance(HeatTransfer):
         return self.h_0 + self.h_c * power(p / self.H, self.q)
 
 
-class BondedPressureConductance(HeatTransfer):
+class BondedPressureConductance(UnderPressure, HeatTransfer):
     r"""Conductance of contact spots, different where they are bonded.
 
     .. math:: h = h_0 + h_c \left(\frac{p}{H}\right)^q, \quad
@@ -79,7 +79,7 @@ class BondedPressureConductance(HeatTransfer):
         return h_0 + h_c * power(p / self.H, self.q)
 
 
-class CooperMikicYovanovich(HeatTransfer):
+class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     r"""Conductance of conforming rough surfaces whose asperities deform plastically.
 
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H}\right)^{0.95}
@@ -109,7 +109,7 @@ class CooperMikicYovanovich(HeatTransfer):
         return 1.25 * self.k * self.m / self.sigma * power(p / self.H, 0.95)
 
 
-class MikicElastic(HeatTransfer):
+class MikicElastic(UnderPressure, HeatTransfer):
     r"""Conductance of conforming rough surfaces whose asperities deform elastically.
 
     .. math:: h = 1.55\,\frac{k\,m}{\sigma} \left(\frac{\sqrt2\,p}{E' m}\right)^{0.94}
@@ -141,7 +141,7 @@ class MikicElastic(HeatTransfer):
         return 1.55 * self.k * self.m / self.sigma * power(relative, 0.94)
 
 
-class SongYovanovich(HeatTransfer):
+class SongYovanovich(UnderPressure, HeatTransfer):
     r"""Conductance of plastic asperities that are the harder the smaller their indents.
 
     .. math:: h = 1.25\,\frac{k\,m}{\sigma} \left(\frac{p}{H_c}\right)^{0.95}, \quad
@@ -188,7 +188,7 @@ class SongYovanovich(HeatTransfer):
         return 1.25 * self.k * self.m / self.sigma * power(self.relative_pressure(p), 0.95)
 
 
-class PressureTable(ConductanceTable):
+class PressureTable(UnderPressure, ConductanceTable):
     r"""Measured conductance at given pressures, interpolated by monotone cubics.
 
     .. math:: h = h(p), \quad h(p_j) = h_j

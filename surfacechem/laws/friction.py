@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from surfacechem.expressions import Expression, absolute, decay, positive, power
-from surfacechem.terms import Friction, parameter
+from surfacechem.terms import Friction, UnderPressure, parameter
 
 
-class Coulomb(Friction):
+class Coulomb(UnderPressure, Friction):
     r"""Amontons-Coulomb dry friction.
 
     .. math:: t_t = \mu\,p\,\mathrm{sgn}(v), \quad |t_t| \le \mu_s\,p \text{ while sticking}
@@ -34,7 +34,7 @@ class Coulomb(Friction):
         return (self.mu if self.mu_s is None else self.mu_s) * p
 
 
-class MohrCoulomb(Friction):
+class MohrCoulomb(UnderPressure, Friction):
     r"""Dry friction with adhesion: sliding is resisted without pressure, and in tension up to the adhesive strength.
 
     .. math:: t_t = [\mu \langle p + t_n^{max} \rangle + c]\,\mathrm{sgn}(v)
@@ -44,17 +44,25 @@ class MohrCoulomb(Friction):
     same law. Where sliding breaks all bonds and the strength is proportional to :math:`\phi`, nothing is left of it;
     let bonds survive sliding or keep a part that does not depend on them.
 
-    Source: Sauer, Duong & Mandadapu (2021), eq. e:M-C; Derjaguin (1934), doi 10.1007/BF01333114. Any v, and pressures
-    down to the strength, beyond which only c is left. Dissipates :math:`t_t v \ge 0`.
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:M-C; Derjaguin (1934), doi 10.1007/BF01333114. Any v;
+    :math:`p \ge -t_n^{max}`. A gap that opens carries the contact beyond its strength, where only c is left; a
+    pressure that is prescribed there is refused. Dissipates :math:`t_t v \ge 0`.
 
     >>> MohrCoulomb(mu=0.5, t_n_max=2e4).traction(p=-1e4, direction=1.0)
     5000.0
     """
 
+    nonnegative = ("p",)
+
     mu: float = parameter("1", "sliding friction coefficient", at_least=0)
     t_n_max: float = parameter("Pa", "adhesive tensile strength", default=0.0, at_least=0)
     c: float = parameter("Pa", "shear strength without pressure (cohesion)", default=0.0, at_least=0)
     mu_s: float | None = parameter("1", "static friction coefficient; mu if not given", default=None, at_least=0)
+
+    @property
+    def least(self) -> Mapping[str, Expression]:
+        """The tension that the adhesive strength bears."""
+        return {"p": -self.t_n_max}
 
     @property
     def kinks(self) -> Mapping[str, Expression]:
@@ -70,7 +78,7 @@ class MohrCoulomb(Friction):
         return (self.mu if self.mu_s is None else self.mu_s) * positive(p + self.t_n_max) + self.c
 
 
-class Stribeck(Friction):
+class Stribeck(UnderPressure, Friction):
     r"""Friction that falls from its static to its sliding value with velocity, and rises again in a full film.
 
     .. math:: t_t = \left[ \mu_k + (\mu_s - \mu_k) e^{-|v / v_s|^\delta} \right] p\,\mathrm{sgn}(v) + c_v v
@@ -101,7 +109,7 @@ class Stribeck(Friction):
         return self.mu_s * p
 
 
-class BondedCoulomb(Friction):
+class BondedCoulomb(UnderPressure, Friction):
     r"""Dry friction whose static coefficient grows with the bonding state and falls with temperature.
 
     .. math:: |t_t| \le \mu_0\,p \text{ while sticking}, \quad

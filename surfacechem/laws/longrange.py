@@ -48,6 +48,10 @@ class LennardJonesFlatFlat(InteractingSites):
         """Free energy [J/m^2]."""
         return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8), (-6, 2))
 
+    def repulsion(self, g_n: Expression) -> Expression:
+        """Energy of the repulsion [J/m^2]."""
+        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8))
+
 
 class LennardJonesSpherePlane(InteractingSites):
     r"""Lennard-Jones type attraction and repulsion between sites on a sphere and on a plane, exact.
@@ -76,7 +80,14 @@ class LennardJonesSpherePlane(InteractingSites):
 
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        near, far = (_repelling(gap / self.g_0, (2520, 7), (-6, 1)) for gap in (g_n, g_n + 2 * self.R))
+        return self._sum(g_n, (2520, 7), (-6, 1))
+
+    def repulsion(self, g_n: Expression) -> Expression:
+        """Energy of the repulsion [J/m^2]."""
+        return self._sum(g_n, (2520, 7))
+
+    def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
+        near, far = (_repelling(gap / self.g_0, *terms) for gap in (g_n, g_n + 2 * self.R))
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
 
 
@@ -111,6 +122,11 @@ class LennardJonesDerjaguin(InteractingSites):
         shape = _repelling(g_n / self.g_0, (2520, 7), (-6, 1))
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
 
+    def repulsion(self, g_n: Expression) -> Expression:
+        """Energy of the repulsion [J/m^2]."""
+        shape = _repelling(g_n / self.g_0, (2520, 7))
+        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
+
 
 class VanDerWaalsFlatFlat(Potential):
     r"""Van der Waals attraction between two half-spaces.
@@ -136,6 +152,10 @@ class VanDerWaalsFlatFlat(Potential):
         distance = _outside(g_n) + self.D_0
         contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
         return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
+
+    def repulsion(self) -> Expression:
+        """None: it bears no contact."""
+        return 0.0
 
 
 class VanDerWaalsSpherePlane(Potential):
@@ -165,6 +185,10 @@ class VanDerWaalsSpherePlane(Potential):
         apart, contact = self._shape(_outside(g_n) + self.D_0), self._shape(self.D_0)
         return self.A_H / (6 * self.area) * where(g_n > 0, apart, contact + slope * g_n)
 
+    def repulsion(self) -> Expression:
+        """None: it bears no contact."""
+        return 0.0
+
     def _shape(self, h: Expression) -> Expression:
         far = h + 2 * self.R
         return -self.R / h - self.R / far - log(h / far)
@@ -191,6 +215,10 @@ class ElectrostaticFlatFlat(Potential):
         """Free energy [J/m^2]."""
         return -self.s_1 * self.s_2 / (2 * self.epsilon) * g_n
 
+    def repulsion(self) -> Expression:
+        """None: it bears no contact."""
+        return 0.0
+
 
 class ElectrostaticSpherePlane(Potential):
     r"""Coulomb interaction of a sphere, charged on its surface, with a charged plane.
@@ -213,6 +241,10 @@ class ElectrostaticSpherePlane(Potential):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return -2 * math.pi * self.R**2 * self.s_1 * self.s_2 / (self.epsilon * self.area) * g_n
+
+    def repulsion(self) -> Expression:
+        """None: it bears no contact."""
+        return 0.0
 
 
 def _outside(g_n: Expression) -> Expression:

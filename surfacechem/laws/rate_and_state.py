@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.expressions import Expression, absolute, asinh_exp, exp, log, sinh_exp, where
-from surfacechem.terms import Friction, parameter
+from surfacechem.terms import Friction, UnderPressure, parameter
 
 SLOWEST = 1e-300
 """Sliding velocity [m/s] that counts as none in a logarithm."""
 
 
-class RateAndState(Friction):
+class RateAndState(UnderPressure, Friction):
     """What both forms share: the traction, regularised at rest."""
 
     nonnegative = ("p",)
