@@ -177,7 +177,7 @@ def reading(path: Path, read: Callable[[], R]) -> R:
         size = path.stat().st_size
         return wait_for(read, PATIENCE + size / SLOWEST)
     except Exception as error:  # of a damaged file the library may meet anything
-        reason = " ".join(str(getattr(error, "strerror", None) or error or type(error).__name__).split())
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error
 
 

@@ -194,7 +194,7 @@ def _read(path: Path) -> xarray.Dataset:
     for name, values in dataset.variables.items():
         wanted = OVER.get(str(name), values.dims)
         if values.dims != wanted:
-            raise InputError(f"{name} does not go over {' and '.join(wanted)}.", place)
+            raise InputError(f"{name} does not go over {' and '.join(map(str, wanted))}.", place)
         if (values.dtype.kind != "f" and name not in TEXTS) or (name == "time" and not np.isfinite(values).all()):
             raise InputError(f"{name} does not hold numbers in double precision.", place)
     for name, value in dataset.attrs.items():

@@ -265,7 +265,7 @@ def recorded_plan(text: object) -> Plan:
             Axis(str(axis["path"]), _numbers(axis["values"]), axis["logarithmic"] is True) for axis in content["axes"]
         ]
         until = content["until"]
-        return Plan(axes, (str(until[0]), *_numbers(until[1:2])) if until else None)
+        return Plan(axes, (str(until[0]), _numbers(until[1:])[0]) if until else None)
     except (LookupError, TypeError, ValueError, RecursionError):
         raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
