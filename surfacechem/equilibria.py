@@ -124,7 +124,25 @@ class Equilibria:
             ways.append(Way(company[j], column, np.eye(len(self.items))[j]))
         return ways
 
+    @cached_property
+    def _follow(self) -> Function:
+        """States that follow the normal gap where it jumps."""
+        return compile_function(self.system.inputs, [self.system.expand(x) for x in self.system.follows.values()])
+
+    @cached_property
+    def followers(self) -> list[int]:
+        """Columns of these states among the inputs."""
+        return [1 + self.states.index(name) for name in self.system.follows]
+
+    def _jumped(self, point: Point, way: Way, gaps: Sequence[float] | Array) -> Array:
+        """The same in a jump, with what follows the gaps."""
+        rows = self._rows(point, way, gaps)
+        if self.followers:
+            rows[:, self.followers] = self._follow(rows)
+        return rows
+
     def _rows(self, point: Point, way: Way, gaps: Sequence[float] | Array) -> Array:
+        """Inputs with the gaps along a way."""
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
         rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
         rows[:, 1 + way.column] = gaps
@@ -140,10 +158,8 @@ class Equilibria:
         paths = [parameter.path for parameter in self.system.parameters]
         return 1 + 2 * len(self.states) + paths.index(SIDE) if SIDE in paths and "g_n" in self.states else None
 
-    def _moved(self, point: Point, way: Way, gap: float | None) -> Point | None:
-        if gap is None:
-            return None
-        row, n = self._rows(point, way, [gap])[0], len(point.y)
+    def _moved(self, point: Point, row: Array) -> Point:
+        n = len(point.y)
         return replace(point, y=row[1 : 1 + n], parameters=row[1 + 2 * n :])
 
     def march(self, point: Point, way: Way, direction: float = 0.0, heat: Heat | None = None) -> Point | None:
@@ -151,9 +167,10 @@ class Equilibria:
 
         A ``direction`` other than zero is that in which a fold has let go.
         """
+        moved = self._rows if heat is None else self._jumped
 
         def driving(gaps: Sequence[float] | Array) -> Array:
-            rows = self._rows(point, way, gaps)
+            rows = moved(point, way, gaps)
             if heat is not None:
                 heated = heat(rows)
                 rows = np.where(np.isfinite(heated), heated, rows)
@@ -161,13 +178,13 @@ class Equilibria:
             return np.asarray(np.where(way.pulls != 0, tractions, 0.0) @ way.pulls)
 
         def noise(gaps: Sequence[float] | Array) -> Array:
-            sizes = np.atleast_2d(self._balance(self._rows(point, way, gaps)))[:, 1::2]
+            sizes = np.atleast_2d(self._balance(moved(point, way, gaps)))[:, 1::2]
             return np.asarray(DIGITS * np.where(way.pulls != 0, sizes, 0.0) @ np.abs(way.pulls))
 
         gap = march(driving, float(point.y[way.column]), direction, noise)
         if gap is not None and abs(gap) < ATOM and abs(driving([0.0])) <= noise([0.0]):
             gap = 0.0  # laws that end with the gap shall know it
-        return self._moved(point, way, gap)
+        return None if gap is None else self._moved(point, moved(point, way, [gap])[0])
 
     def settle(self, point: Point, heat: Heat | None = None) -> Point | None:
         """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat."""
@@ -258,8 +275,8 @@ class Equilibria:
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(tangent(self._rows(point, there, gaps))).reshape(-1)
 
-        at = self._moved(point, there, zero_ahead(ahead, float(point.y[way.column]), direction, 1.0))
-        return None if at is None else Lost(at, way, direction)
+        at = zero_ahead(ahead, float(point.y[way.column]), direction, 1.0)
+        return None if at is None else Lost(self._moved(point, self._rows(point, there, [at])[0]), way, direction)
 
     def held_at(self, index: int, lost: Lost) -> Lost | None:
         """The same fold where sticking holds what slides; None where that holds all."""

@@ -315,8 +315,14 @@ class Hybrid:
         closed = now < -drift
         near = ~closed & (now <= small) & ~to_pass(self.problem)[self.first :]
         if near.any():
-            closed |= near & (self.jumper.margin_rates(self._consistent(point)) < 0)
+            near &= self.jumper.margin_rates(self._consistent(point)) < 0
+            closed |= np.array([one and not self._leads_back(j, point) for j, one in enumerate(near)])
         return int(closed.argmax()) if closed.any() else None
+
+    def _leads_back(self, index: int, point: Point) -> bool:
+        """Whether a transition leads to modes that have been left at this very moment: rounding undoes nothing."""
+        left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
+        return bool(left) and any(np.array_equal(self.jumper.modes_after(index, point), modes) for modes in left)
 
     def _consistent(self, point: Point) -> Point:
         found = consistent(self.problem.program, point.t, point.y, np.zeros_like(point.y), point.parameters)

@@ -108,6 +108,10 @@ class Jumper:
             for item in system.transitions
         ]
 
+    def modes_after(self, index: int, point: Point) -> Array:
+        """The modes that a transition sets."""
+        return self._maps[index](point.inputs())[len(point.y) :]
+
     @cached_property
     def _moving_margins(self) -> list[Expression]:
         return [self.system.expand(item.margin) for item in self.system.transitions]
@@ -165,6 +169,8 @@ class Jumper:
         moved: dict[str, set[str]] = {}
         for e in sorted(self.system.equilibria, key=lambda e: e.axis):
             moved.setdefault(e.axis, set()).update((e.state, *e.along))
+        if "n" in moved:
+            moved["n"].update(self.system.follows)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
     def _made(self, rows: Array, item: Transition, start: Point, energy: float) -> Array:
@@ -186,17 +192,22 @@ class Jumper:
         for axis, columns in self._stages:
             here[:, columns] = rows[:, columns]
             now = self._energy(here)[:, 0]
-            slides = self._slides(rows) & (axis != "n")
+            gives = self._gives(axis, start, rows)
             with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
                 fall = level - now
-            made[~slides, maker(axis)] += fall[~slides]
-            made[slides, maker(INTERFACE)] += fall[slides]
+            made[~gives, maker(axis)] += fall[~gives]
+            made[gives, maker(INTERFACE)] += fall[gives]
             level = now
         return made
 
-    def _slides(self, rows: Array) -> NDArray[np.bool_]:
-        slip = self.equilibria.slip
-        return np.zeros(len(rows), dtype=bool) if slip is None else rows[:, 1 + 2 * len(self.states) + slip] != 0
+    def _gives(self, axis: str, start: Point, rows: Array) -> NDArray[np.bool_]:
+        """Whether the interface gives way along an axis: it slides, or loses bonds."""
+        slip, lost = self.equilibria.slip, self.equilibria.followers
+        if axis == "n":
+            return np.asarray(np.any(rows[:, lost] != start.inputs()[lost], axis=1))
+        if slip is None:
+            return np.zeros(len(rows), dtype=bool)
+        return np.asarray(rows[:, 1 + 2 * len(self.states) + slip] != 0)
 
     def make(
         self,

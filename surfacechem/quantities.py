@@ -72,6 +72,7 @@ VARIABLES = _table(
     ("F_t2", "Pa", "far-field traction across F_t, along the interface", "F_{t2}"),
     ("sticking", "1", "one while the interface sticks, zero while it slides"),
     ("softening", "1", "one while bonds break along an envelope"),
+    ("overshoot", "1/s", "rate at which bonds would pass their envelope"),
     ("bonded", "1", "one while the interface is bonded, zero after it has debonded", "b"),
     ("p", "Pa", "contact pressure", "p"),
     ("p_contact", "Pa", "pressure that the contact bears, without attraction", r"p_{rep}"),

@@ -242,6 +242,8 @@ class System:
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the heat of a jump, by what makes it: the interface, or the support of an axis."""
+    follows: Mapping[str, Expression] = field(default_factory=dict)
+    """New values of states that follow the normal gap where it jumps, by name."""
     given: Mapping[str, Expression] = field(default_factory=dict)
     """Tractions of the far field times their gaps, and what impacts rub off a drive [J/m^2], by account of the work."""
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)

@@ -19,7 +19,7 @@ from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Po
 
 MEDIUM = ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m", "p_m", "d_m", "f_m")
 OWN = {"T_from", "T_to", "mu", "dmu_dphi", "ln_theta", "bonded", "softening", "direction", "direction_2", "sticking"}
-OWN |= {"v_n"}
+OWN |= {"v_n", "overshoot"}
 OWN |= {"T_c", "T_0", "N_c", "n_c", "n_1", "n_2", *MEDIUM}
 """What a scene gives without being asked for it."""
 

@@ -26,7 +26,7 @@ from surfacechem.assembly.mean_influx import mean_influx
 from surfacechem.assembly.medium import medium
 from surfacechem.assembly.programme import TRACTIONS, programme, stage_ends
 from surfacechem.assembly.relaxing import relaxing
-from surfacechem.assembly.softening import softening_mode
+from surfacechem.assembly.softening import apart_from_envelope, softening_mode
 from surfacechem.assembly.tangential import tangential_gap, tangential_motion
 from surfacechem.assembly.temperatures import temperatures
 from surfacechem.assembly.totals import regime, sinks, totals
@@ -62,6 +62,7 @@ STAGES = (
     relaxing,
     folds,
     load_steps,
+    apart_from_envelope,
     heat_paths,
     mean_influx,
     missed,
@@ -117,6 +118,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         transitions=tuple(build.transitions),
         equilibria=tuple(build.equilibria),
         sinks=taking,
+        follows={str(x): value for x, value in build.motion.follows.items()},
         given=dict(build.motion.given),
         pulls=dict(build.motion.pulls),
         fit=build.fit() if build.fit else None,

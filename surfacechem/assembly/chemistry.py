@@ -17,7 +17,7 @@ from surfacechem.assembly.force import RESOLUTION, SHARED
 from surfacechem.assembly.mounting import law_reads
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.pulled import book_work, by_affinity, dead_load
-from surfacechem.assembly.softening import softening
+from surfacechem.assembly.softening import softening, within_reach
 from surfacechem.expressions import Expression, depends, derivative, exponents, where
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Capped, Caution
@@ -40,13 +40,17 @@ def reactions(build: Build) -> None:
     loaded = {name: value + load.get(name, 0) for name, value in mu.items()}
     pulled = {label: law for label, law in laws.items() if label in together or by_affinity(law)}
     affinities = {label: _affinity(build, law, loaded if label in pulled else mu) for label, law in laws.items()}
-    rates = {label: _rate(build, law, label, affinities[label]) for label, law in laws.items()}
-    free = _free(build, laws, rates)
+    others = {label: law for label, law in laws.items() if not hasattr(law, "envelope")}
+    rates = {label: _rate(build, law, label, affinities[label]) for label, law in others.items()}
+    forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in others.items()))
+    free = _free(build, forming)
+    rates |= {label: softening(build, law, forming, free) for label, law in laws.items() if label not in others}
     named: dict[str, Expression] = {}
     for label, law in laws.items():
         nu, affinity = law.stoichiometry(), affinities[label]
         quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
-        rate = named[label] = build.name(quantity, rates[label] * free if "phi" in nu else rates[label])
+        formed = rates[label] * free if "phi" in nu and label in others else rates[label]
+        rate = named[label] = build.name(quantity, formed)
         # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
         owner = together.get(label, label)
         build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
@@ -54,7 +58,6 @@ def reactions(build: Build) -> None:
             change[x] += n * rate
         _across_an_open_gap(build, law, rate)
         own_departure(build, label, law, affinity)
-        softening(build, law)
     supplied(build, laws, named)
     book_work(build, pulled, named, load)
     for pair in pairs:
@@ -107,12 +110,14 @@ def _bound(build: Build, law: RateLaw) -> RateLaw:
     return build.variables.bind(law, f"interface.bonding.{law.name()}")
 
 
-def _free(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> Expression:
-    """One while the bonding state may change; a law with an envelope ends at its bound by itself."""
-    if "phi" not in build.bonding or any(hasattr(law, "envelope") for law in laws.values()):
+def _free(build: Build, forming: Expression) -> Expression:
+    """One while the bonding state may change, zero at a bound and beyond the reach of bonds.
+
+    Only what bonds form by may carry them beyond; a law with an envelope ends at its bound by itself.
+    """
+    if "phi" not in build.bonding or forming == 0:
         return symengine.Integer(1)
-    nu = {label: law.stoichiometry().get("phi", 0) for label, law in laws.items()}
-    return free_to_react(build, symengine.Add(*(nu[label] * rate for label, rate in rates.items())))
+    return within_reach(build) * free_to_react(build, forming)
 
 
 def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:

@@ -61,6 +61,8 @@ class Motion:
     """Fraction of the interface on which friction acts, beside adhesion in parallel."""
     rubbed: Expression = field(default_factory=lambda: symengine.Integer(0))
     """Energy, per area of that fraction, of the elastic gap that friction slides on [J/m^2]."""
+    follows: dict[Any, Expression] = field(default_factory=dict)
+    """New values of states that follow the normal gap where it jumps."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
     works: dict[Friction, str] = field(default_factory=dict)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
 
 import symengine
 
-from surfacechem.assembly.build import Build
+from surfacechem.assembly.build import NOTHING, Build
 from surfacechem.assembly.mounting import far_field, held
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
@@ -38,13 +38,18 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
 
 
 def softening_mode(build: Build) -> None:
-    """The mode, and the velocity that drives the break, for the laws that read them."""
+    """The mode, for the laws that read it."""
     if not any(hasattr(law, "envelope") for law in build.interface.reactions):
         return
-    mode = build.mode("debonding", 0.0, {-1.0: "has lost its bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"})
+    words = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
+    mode = build.mode("debonding", 0.0, words)
     build.variables.define("softening", lambda: (mode + mode**2) / 2, "mode", "interface.bonding")
-    if not build.variables.has("v_n"):
-        build.variables.define("v_n", partial(_velocity, build), "derived", "rate of the normal gap")
+
+
+def within_reach(build: Build) -> Expression:
+    """One while bonds can form, zero where the gap is open beyond their reach."""
+    mode = build.find_mode("debonding")
+    return symengine.Integer(1) if mode is None else 1 - mode * (mode - 1) / 2
 
 
 def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> None:
@@ -79,26 +84,64 @@ def _refuse_steep(law: RateLaw, peak: float, g_f: float) -> None:
         raise InputError(f"{what} is less than {FINEST:g} g_f, too little to be resolved. Lower E_b.", law.place)
 
 
-def _velocity(build: Build) -> Expression:
-    rate = build.motion.gap_rates["g_n"] if "g_n" in build.motion.gap_rates else build.rate_of("g_n")
-    return build.name(VARIABLES["v_n"], rate)
-
-
-def softening(build: Build, law: RateLaw) -> None:
-    """What starts and what ends the loss of bonds along the envelope of a bound law."""
-    if not hasattr(law, "envelope"):
-        return
-    mode = next(item.symbol for item in build.modes if item.name == "debonding")
-    phi, g_n, v_n = (build.variables.get(name, law) for name in ("phi", "g_n", "v_n"))
-    left = build.variables.call(law, law.envelope)
+def softening(build: Build, law: RateLaw, forming: Expression, free: Expression) -> Expression:
+    """Rate of a bound law with an envelope, where others form bonds, and what starts and ends the loss of bonds."""
+    mode = build.find_mode("debonding")
+    phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
+    left = build.variables.call(law, law.envelope)  # type: ignore[attr-defined]
     peak = law.peak()  # type: ignore[attr-defined]
-    none, one = symengine.Integer(0), symengine.Integer(1)
-    lost = {mode: -one}
     _check(build, law, phi, g_n, peak)
+    quantity = VARIABLES["overshoot"]
+    overshoot = build.name(quantity, forming * free / n_c - _rate(build, left), output=False)
+    none, one = symengine.Integer(0), symengine.Integer(1)
+    lost, held = {mode: -one}, build.find_mode("held")
+    breaks = {mode: one} if held is None else {mode: one, held: none}
+    # Where there are no bonds, and none form, none break.
+    present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
+    begins = where(mode**2 > 0, 1, present)
+    beyond = where(mode**2 > 0, 1, where(phi > 0, left - phi + NOTHING, 1))
+    remains = where(left < phi, where(left > 0, left, 0), phi)
+    if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
+        build.motion.follows[phi] = remains
     build.transitions += [
-        Transition("soften", where(mode**2 > 0, 1, left - phi), "bonds begin to break as the gap opens", {mode: one}),
+        Transition("yield", beyond, "a jump leaves less bonds than there were", {}, {phi: remains}, True, "snap"),
+        # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
+        Transition("soften", begins, "bonds begin to break as the gap opens", breaks, to_pass=True),
         *_tear(build, mode, phi, left),
-        Transition("part", where(mode > 0, left, 1), "the last bonds break", lost, {phi: none}, settles=True),
-        Transition("unload", where(mode > 0, v_n, 1), "bonds stop breaking as the gap closes", {mode: none}),
-        Transition("rejoin", where(mode < 0, g_n - peak, 1), "the gap is closed enough to bond", {mode: none}),
+        Transition("part", where(mode > 0, left, 1), "the last bonds break", lost, {phi: none}, True, "snap"),
+        Transition("unload", where(mode > 0, overshoot, 1), "bonds do not reach what the gap leaves", {mode: none}),
     ]
+    if forming != 0:
+        margin, reason = where(mode < 0, where(forming > 0, -left, 1), 1), "the gap is closed enough to bond"
+        build.transitions.append(Transition("rejoin", margin, reason, {mode: none}, to_pass=True))
+    _start(build, phi, left)
+    return build.variables.call(law, law.statement, {"overshoot": overshoot})
+
+
+def apart_from_envelope(build: Build) -> None:
+    """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
+    mode = build.find_mode("debonding")
+    for j, item in enumerate(build.transitions):
+        if mode is not None and item.settles and mode not in item.modes:
+            modes = {**item.modes, mode: where(mode > 0, 0, mode)}
+            build.transitions[j] = replace(item, modes=modes)
+
+
+def _start(build: Build, phi: Expression, left: Expression) -> None:
+    """The mode in which a run begins, with no more bonds than the gap leaves."""
+    j = next(j for j, mode in enumerate(build.modes) if mode.name == "debonding")
+    build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
+    slack = build.variables.get("slack", "the bonds")
+    given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + slack)
+    remedy = "Give less bonds under `initial`, or a smaller gap."
+    build.margins.append(
+        Margin("bonds within their envelope", given, "there are more bonds than the gap leaves", remedy=remedy)
+    )
+
+
+def _rate(build: Build, left: Expression) -> Expression:
+    """How fast the envelope rises [1/s], a moving gap by its velocity where that has a variable of its own."""
+    rate = build.total_derivative(left)
+    if not build.variables.has("v_n"):
+        return rate
+    return rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})

@@ -10,12 +10,15 @@ class CompliantDebonding(RateLaw):
     r"""Bonds break as the gap opens, so that the traction falls along a line to zero.
 
     .. math:: \phi \le \phi_{env}(g_n) = \frac{t_{max}}{E_b\,g_n}\,\frac{g_f - g_n}{g_f - g_c}, \quad
-              g_c = \frac{t_{max}}{E_b}, \quad \dot\phi = \phi_{env}'\,\dot g_n \text{ while opening on the envelope}
+              g_c = \frac{t_{max}}{E_b}, \quad \dot\phi = \min(R_o / n_c, \dot\phi_{env}) \text{ on the envelope}
 
+    where :math:`R_o` is the net rate of all other bonding laws. So bonds break as fast as the envelope falls and others
+    form them; where the envelope rises faster than others form bonds, or others break bonds faster than it falls, they
+    leave it. Beyond :math:`g_f` no bond forms.
     With the potential :math:`\tfrac12 \phi E_b g_n^2` the traction is the bilinear law of cohesive zones: it peaks at
     :math:`t_{max}` and ends at :math:`g_f`; unloading goes back to zero gap along :math:`\phi E_b`. The break is
-    irreversible. Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear form as in
-    Camanho & Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential.
+    irreversible by itself. Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear
+    form as in Camanho & Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential.
     Admissible where the elastic energy of a bond exceeds its bond energy.
 
     >>> law = CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)
@@ -37,8 +40,6 @@ class CompliantDebonding(RateLaw):
         gap = where(g_n > start / 2, g_n, start / 2)
         return start / gap * (self.g_f - gap) / (self.g_f - start)
 
-    def rate(self, n_c: Expression, g_n: Expression, v_n: Expression, softening: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]."""
-        start = self.peak()
-        gap = where(g_n > start / 2, g_n, start / 2)
-        return -n_c * softening * start * self.g_f / ((self.g_f - start) * gap**2) * v_n
+    def rate(self, n_c: Expression, softening: Expression, overshoot: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]; ``overshoot`` is how fast the bonding state would pass the envelope [1/s]."""
+        return -n_c * softening * overshoot
