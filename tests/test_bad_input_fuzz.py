@@ -58,6 +58,7 @@ def loads_or_is_refused(text):
     error = refusal(text)
     if error is not None:
         assert error.place.file.endswith(".yaml"), error  # the mechanism's, where the mistake is in there
+        assert error.place.line or "the file is empty" in error.message or "not YAML" in error.message, error
         assert str(error).isprintable()
 
 

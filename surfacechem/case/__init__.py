@@ -82,7 +82,7 @@ class Case:
             place = self._nearest(path)
             if place is not None:
                 return InputError(error.message.removeprefix(f"{place.path}: "), place)
-        return InputError(error.message, Place(self.file))
+        return InputError(error.message, self.places[""])
 
     def _nearest(self, path: str) -> Place | None:
         """The place of a path, or of the innermost section around it that the case has."""
