@@ -6,6 +6,7 @@ Every expectation is computed here from the rate laws alone, with SciPy or mpmat
 import mpmath
 import numpy as np
 import pytest
+import scipy.integrate
 import scipy.linalg
 
 import surfacechem
@@ -226,3 +227,91 @@ run: {times: [0, 1e-3, 10, 100]}
     found = np.array([solution.dataset[f"theta_{name}"].values for name in names])
     for j, t in enumerate((0.0, 1e-3, 10.0, 100.0)):
         np.testing.assert_allclose(found[:, j], scipy.linalg.expm(matrix * t)[:, 0], atol=1e-9)
+
+
+# -- orders below one ------------------------------------------------------------------------------------------------
+
+SITES = 1e14 / 6.02214076e23
+"""Density of sites [mol/m^2]."""
+
+
+def order(n, k=1.0):
+    """Rate constant of an order n that is k [1/s] at full coverage."""
+    return f"rate-constant: {{A: {k * SITES ** (1 - n)!r}, b: 0, Ea: 0}}"
+
+
+def coverages(folder, enthalpies, reactions, start, times, rtol=1e-11):
+    initial = ", ".join(f"{name}: {value}" for name, value in start.items())
+    more = f"initial: {{coverages: {{{initial}}}}}"
+    solution = solve(folder, "mechanism: mech.yaml", times, more=more, mechanism=mechanism(enthalpies, reactions))
+    assert solution.status == "finished", solution.reason
+    return np.array([solution.dataset[f"theta_{name}"].values for name in enthalpies])
+
+
+@pytest.mark.parametrize("n", [0.05, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("h", [-100.0, -20.0])
+def test_a_cure_of_an_order_below_one_is_complete_and_goes_on(tmp_path, n, h):
+    """It ends after the integral of da / ((1 + (1 - a)^0.5) a^n) from 0 to 0.99."""
+    reaction = "equation: a => b, type: Kamal-Sourour, rate-constant: {A: 1, b: 0, Ea: 0}, A-2: 1, E-2: 0, m: 0.5, n: "
+    q = 1 / (1 - n)
+
+    def age(left):
+        """Time until so much is left, with a = x^q."""
+        return float(mpmath.quad(lambda x: q / (1 + mpmath.sqrt(1 - x**q)), [left ** (1 - n), 0.99 ** (1 - n)]))
+
+    times = [0.0, age(0.5), age(1e-3), 1.01 * age(0.0), 3 * age(0.0)]
+    a, b = coverages(tmp_path, {"a": 0.0, "b": h}, [reaction + str(n)], {"a": 0.99, "b": 0.01}, times)
+    np.testing.assert_allclose(a, [0.99, 0.5, 1e-3, 0.0, 0.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(a + b, 1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [0.0, 0.1, 0.5, 0.8])
+def test_what_is_used_up_stays_so_and_lives_of_what_comes(tmp_path, n):
+    """a => b of order n while c => a: at first a is used up, then it follows its supply."""
+    start, supply = 0.1, 0.3
+    reactions = [f"equation: a => b, orders: {{a: {n}}}, {order(n)}", f"equation: c => a, {order(1, supply)}"]
+    times = np.linspace(0.0, 6.0, 13)
+    a, b, c = coverages(tmp_path, {"a": 0, "b": -50, "c": 50}, reactions, {"a": start, "c": 1 - start}, times)
+    exact = scipy.integrate.solve_ivp(
+        # A layer of 1e-9 stands for the end of the power, in which the supply is met.
+        lambda t, y: [supply * y[1] - y[0] * max(y[0], 1e-9) ** (n - 1), -supply * y[1]],
+        (0.0, 6.0), [start, 1 - start], t_eval=times, method="Radau", rtol=1e-10, atol=1e-13,
+    )  # fmt: skip
+    np.testing.assert_allclose(a, exact.y[0], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(c, exact.y[1], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(a + b + c, 1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("k", [0.5, 1e-3, 1e-6, 1e-10])
+@pytest.mark.parametrize("back", [0.5, 1.0])
+def test_orders_below_one_both_ways_end_in_their_balance(tmp_path, k, back):
+    """a^0.5 = k b^back."""
+    reactions = [
+        f"equation: a => b, orders: {{a: 0.5}}, {order(0.5)}",
+        f"equation: b => a, orders: {{b: {back}}}, {order(back, k)}",
+    ]
+    a, _ = coverages(tmp_path, {"a": 0.0, "b": 0.0}, reactions, {"a": 1.0}, [0.0, 1.0, 2.1, 40.0])
+    with mpmath.workdps(40):
+        exact = mpmath.findroot(lambda x: x - k**2 * (1 - x) ** (2 * back), k**2 / (1 + k**2))
+    assert a[-1] == pytest.approx(float(exact), rel=1e-7, abs=2e-14)
+
+
+def test_several_species_are_used_up_one_after_the_other(tmp_path):
+    """a => b of order 0.3 and b => c of 0.5, and at once d => e of order 0.2."""
+    reactions = [
+        f"equation: a => b, orders: {{a: 0.3}}, {order(0.3)}",
+        f"equation: b => c, orders: {{b: 0.5}}, {order(0.5, 0.4)}",
+        f"equation: d => e, orders: {{d: 0.2}}, {order(0.2, 0.7)}",
+    ]
+    names = dict.fromkeys("abcde", 0.0)
+    times = np.linspace(0.0, 5.0, 11)
+    found = coverages(tmp_path, names, reactions, {"a": 0.6, "d": 0.4}, times)
+
+    def power_law(start, n, k):
+        return np.maximum(start ** (1 - n) - (1 - n) * k * times, 0.0) ** (1 / (1 - n))
+
+    np.testing.assert_allclose(found[0], power_law(0.6, 0.3, 1.0), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[3], power_law(0.4, 0.2, 0.7), rtol=0, atol=1e-9)
+    assert found[1].max() > 0.1
+    np.testing.assert_allclose(found[[0, 1, 2]].sum(axis=0), 0.6, rtol=0, atol=1e-12)
+    assert found[2, -1] == pytest.approx(0.6, abs=1e-12)

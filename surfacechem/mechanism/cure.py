@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression, exp, log, log_fraction, log_sum
-from surfacechem.mechanism.rates import InterfaceArrhenius
+from surfacechem.expressions import Expression, log, log_fraction, log_sum, power, scaled_exp, where
+from surfacechem.mechanism.rates import GONE, InterfaceArrhenius, floored
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.terms import parameter
 
@@ -41,8 +41,11 @@ class InterfaceKamalSourour(InterfaceArrhenius):
 
     def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
         """The rate coefficient times exp(shift)."""
-        catalysis, order = self._catalysis(values), self._order(values)
-        return super().coefficient(values, shift + order) + self.A_2 * exp(catalysis + shift + order)
+        order, activation = self._order(values), -self.E_2 / (GAS_CONSTANT * values["T_c"])
+        (product,) = self.products
+        # As a power it is nothing where nothing has formed: what waits for its own product does not begin by itself.
+        autocatalysis = scaled_exp(self.A_2, activation + shift + order) * power(values[product], self.m)
+        return super().coefficient(values, shift + order) + autocatalysis
 
     def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
         """Logarithm of the rate coefficient."""
@@ -56,4 +59,5 @@ class InterfaceKamalSourour(InterfaceArrhenius):
     def _order(self, values: Mapping[str, Expression]) -> Expression:
         """What the coefficient lacks as mass action is of first order."""
         (reactant,) = self.orders
-        return (self.n - 1) * log_fraction(values[reactant])
+        theta = values[reactant]
+        return (self.n - 1) * where(self.n < 1, log(floored(theta, GONE)), log_fraction(theta))

@@ -24,6 +24,13 @@ NO_COVERAGES: Mapping[str, Expression] = {}
 COVERAGE_FLOOR = 1e-20
 """Coverages below this count as this where a rate depends on their logarithm, as in Cantera."""
 
+GONE = 1e-14
+"""Coverage below which a reaction of an order below one is complete.
+
+A power has an infinite slope at its end, and the zeroth a step; from here on the rate falls in proportion. A step moves
+time by 4e-16 of it at least, and with it a coverage that is used up within that time: 25 of them are in this layer.
+"""
+
 
 @dataclass(frozen=True)
 class CoverageTerm:
@@ -41,8 +48,17 @@ class CoverageTerm:
             energy = theta * (energy + coefficient)
         value = self.a * LN10 * theta - energy / (GAS_CONSTANT * T)
         if self.m:
-            value += self.m * log(where(theta > COVERAGE_FLOOR, theta, COVERAGE_FLOOR + 0 * theta))
+            value += self.m * log(floored(theta))
         return value
+
+
+def floored(theta: Expression, floor: float = COVERAGE_FLOOR) -> Expression:
+    """The coverage, at least a floor.
+
+    >>> floored(0.5), floored(0.0)
+    (0.5, 1e-20)
+    """
+    return where(theta > floor, theta, floor + 0 * theta)
 
 
 LN10 = 2.302585092994046
@@ -160,7 +176,7 @@ class SurfaceReaction(MechanismReaction):
         return any(item.spring for item in self._changing())
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
-        return self.coefficient(values, 0) * self._amounts(values, self.orders)
+        return self.coefficient(values, 0) * self._amounts(values, self.orders, -1)
 
     def _log_forward(self, values: Mapping[str, Expression]) -> Expression:
         total = self.log_coefficient(values)
@@ -177,7 +193,7 @@ class SurfaceReaction(MechanismReaction):
         for item in self.species:
             standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
         affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
-        return self.coefficient(values, affinity) * standard * self._amounts(values, self.products)
+        return self.coefficient(values, affinity) * standard * self._amounts(values, self.products, 1)
 
     def standard_affinity(
         self, T: Expression, g_n: Expression = None, coverages: Mapping[str, Expression] = NO_COVERAGES
@@ -196,12 +212,15 @@ class SurfaceReaction(MechanismReaction):
             total += plain(self.change[item.variable]) * value
         return total / T
 
-    def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float]) -> Expression:
+    def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float], way: int) -> Expression:
+        """Powers of the amounts in the forward (-1) or backward (1) rate, which ends where what it uses up is gone."""
         product: Expression = 1
         for item in self.species:
-            order = orders.get(item.variable, 0)
-            if order:
-                product *= power(values[item.concentration] * values[item.variable], plain(order))
+            order, theta = orders.get(item.variable, 0), values[item.variable]
+            if order < 1 and way * self.change.get(item.variable, 0) > 0:
+                product *= values[item.concentration] ** plain(order) * theta * floored(theta, GONE) ** plain(order - 1)
+            elif order:
+                product *= power(values[item.concentration] * theta, plain(order))
         return product
 
 
