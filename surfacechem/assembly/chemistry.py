@@ -135,7 +135,12 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
 
 
 def _resolved(build: Build, law: RateLaw, label: str, rate: Expression, found: Sequence[Expression]) -> Expression:
-    """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case."""
+    """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case.
+
+    Only of a reaction that is alone: with others it competes for its species, and what they share out depends on it.
+    """
+    if _competes(build, law):
+        return rate
     loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
     if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
         return rate  # bonds that share a load rupture, which ends the run before
@@ -150,6 +155,12 @@ def _resolved(build: Build, law: RateLaw, label: str, rate: Expression, found: S
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
     steps = build.name(quantity, relaxation * (build.t * RESOLUTION / MARGIN), output=False)
     return rate * where(steps > 1, 1 / steps, 1)
+
+
+def _competes(build: Build, law: RateLaw) -> bool:
+    """Whether another law changes what this one changes."""
+    own = law.stoichiometry().keys()
+    return sum(bool(own & other.stoichiometry().keys()) for other in build.interface.reactions) > 1
 
 
 def _prescribed_bonding(build: Build) -> None:
