@@ -240,9 +240,9 @@ def order(n, k=1.0):
     return f"rate-constant: {{A: {k * SITES ** (1 - n)!r}, b: 0, Ea: 0}}"
 
 
-def coverages(folder, enthalpies, reactions, start, times, rtol=1e-11):
+def coverages(folder, enthalpies, reactions, start, times, more=""):
     initial = ", ".join(f"{name}: {value}" for name, value in start.items())
-    more = f"initial: {{coverages: {{{initial}}}}}"
+    more = f"{more}\ninitial: {{coverages: {{{initial}}}}}"
     solution = solve(folder, "mechanism: mech.yaml", times, more=more, mechanism=mechanism(enthalpies, reactions))
     assert solution.status == "finished", solution.reason
     return np.array([solution.dataset[f"theta_{name}"].values for name in enthalpies])
@@ -315,3 +315,87 @@ def test_several_species_are_used_up_one_after_the_other(tmp_path):
     assert found[1].max() > 0.1
     np.testing.assert_allclose(found[[0, 1, 2]].sum(axis=0), 0.6, rtol=0, atol=1e-12)
     assert found[2, -1] == pytest.approx(0.6, abs=1e-12)
+
+
+# -- fast reactions that compete ---------------------------------------------------------------------------
+
+
+def closed(enthalpies, steps):
+    """Matrix of a closed network of steps (from, to, rate forward, reversible) at 300 K."""
+    names = list(enthalpies)
+    matrix = mpmath.zeros(len(names))
+    for a, b, k, reversible in steps:
+        i, j = names.index(a), names.index(b)
+        drop = mpmath.mpf(enthalpies[b] - enthalpies[a]) * 1000 / (GAS * 300)
+        back = mpmath.mpf(k) * mpmath.exp(drop) if reversible else 0
+        for source, target, rate in ((i, j, mpmath.mpf(k)), (j, i, back)):
+            matrix[source, source] -= rate
+            matrix[target, source] += rate
+    return matrix
+
+
+def network(folder, enthalpies, steps, times, loaded=()):
+    """Coverages of a closed network that starts in its first species, from a run and from its eigenvalues."""
+    text = [
+        f"equation: {a} {'<=>' if reversible else '=>'} {b}, "
+        f"{'type: Bell, x-beta: 0.1 nm, ' if i in loaded else ''}rate-constant: {{A: {k!r}, b: 0, Ea: 0}}"
+        for i, (a, b, k, reversible) in enumerate(steps)
+    ]
+    more = f"loading: {{f: 0 N}}\ninitial: {{coverages: {{{next(iter(enthalpies))}: 1}}}}"
+    solution = solve(folder, "mechanism: mech.yaml", times, more=more, mechanism=mechanism(enthalpies, text))
+    assert solution.status == "finished", solution.reason
+    found = np.array([solution.dataset[f"theta_{name}"].values for name in enthalpies])
+    with mpmath.workdps(150):
+        values, vectors = mpmath.eig(closed(enthalpies, steps))
+        parts = mpmath.lu_solve(vectors, mpmath.matrix([1] + [0] * (len(enthalpies) - 1)))
+        modes = [[mpmath.exp(value * t) * part for value, part in zip(values, parts, strict=True)] for t in times]
+        exact = [[float(mpmath.re(x)) for x in vectors * mpmath.matrix(mode)] for mode in modes]
+    return found, np.array(exact).T
+
+
+@pytest.mark.parametrize("loaded", [(), (0,), (1,), (0, 1)])
+def test_a_loaded_reaction_behind_an_unstable_intermediate(tmp_path, loaded):
+    """What the intermediate turns into depends on both of its ways out, 1e12 1/s and 1e13 1/s."""
+    steps = [("a", "i", 0.01, True), ("i", "b", 1e13, True)]
+    times = [0.0, 1.0, 10.0, 100.0, 1000.0]
+    found, exact = network(tmp_path, {"a": 0.0, "i": 80.405, "b": -20.0}, steps, times, loaded)
+    assert exact[0, -1] == pytest.approx(4.4e-4, rel=0.01)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("k", [1e6, 1e13, 1e20])
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 30.0])
+def test_yields_of_fast_ways_out_are_in_proportion_to_their_rates(tmp_path, k, ratio):
+    reactions = [
+        "equation: a => i, rate-constant: {A: 0.5, b: 0, Ea: 0}",
+        f"equation: i => b, type: Bell, x-beta: 0.1 nm, rate-constant: {{A: {k!r}, b: 0, Ea: 0}}",
+        f"equation: i => c, rate-constant: {{A: {ratio * k!r}, b: 0, Ea: 0}}",
+    ]
+    times, names = [0.0, 1.0, 100.0], dict.fromkeys("aibc", 0.0)
+    found = coverages(tmp_path, names, reactions, {"a": 1}, times, more="loading: {f: 0 N}")
+    np.testing.assert_allclose(found[0], np.exp(-0.5 * np.array(times)), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[1, 1:], 0.5 * found[0, 1:] / (k * (1 + ratio)), rtol=1e-5, atol=1e-12)
+    assert found[3, -1] / found[2, -1] == pytest.approx(ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize("force", [0.0, 1e-12, 20e-12])
+@pytest.mark.parametrize("A", [1e3, 1e13])
+def test_two_fast_laws_hold_the_bonds_where_both_say(tmp_path, force, A):
+    law = f"{{bell: {{k_on: 1e10, k_off: 0.9e10, x_off: 1 nm, x_on: 0.5 nm}}}}, {{arrhenius: {{A: {A}}}}}"
+    interface = f"sites: 1e16, potential: [linear-enthalpy: {{H_r: 1}}], bonding: [{law}]"
+    more = f"loading: {{f: {force}}}\ninitial: {{phi: 0.2}}"
+    solution = solve(tmp_path, interface, [0.0, 1.0, 10.0, 1000.0], more=more)
+    on = mpmath.mpf(A) + 1e10 * mpmath.exp(force * mpmath.mpf("0.5e-9") / (BOLTZMANN * 300))
+    off = mpmath.mpf("0.9e10") * mpmath.exp(force * mpmath.mpf("1e-9") / (BOLTZMANN * 300))
+    np.testing.assert_allclose(bonded(solution)[1:], float(on / (on + off)), rtol=1e-12)
+
+
+def test_random_networks_with_rates_of_twenty_decades(tmp_path):
+    draw = np.random.default_rng(8)
+    for _ in range(6):
+        names = {f"s{i}": round(draw.uniform(-20, 20), 3) for i in range(draw.integers(3, 7))}
+        tree = [(int(draw.integers(i)), i) for i in range(1, len(names))]
+        steps = [(f"s{a}", f"s{b}", float(10 ** draw.uniform(-10, 10)), True) for a, b in tree]
+        loaded = np.flatnonzero(draw.random(len(steps)) < 0.5)
+        found, exact = network(tmp_path, names, steps, [0.0, 1e-3, 1.0, 1e3], loaded)
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import symengine
@@ -18,7 +18,7 @@ from surfacechem.assembly.mounting import law_reads
 from surfacechem.assembly.pairs import departure, opposed, own_departure
 from surfacechem.assembly.pulled import book_work, by_affinity, dead_load
 from surfacechem.assembly.softening import softening, within_reach
-from surfacechem.expressions import Expression, depends, derivative, exponents, where
+from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Capped, Caution
 from surfacechem.terms import RateLaw
@@ -41,7 +41,8 @@ def reactions(build: Build) -> None:
     pulled = {label: law for label, law in laws.items() if label in together or by_affinity(law)}
     affinities = {label: _affinity(build, law, loaded if label in pulled else mu) for label, law in laws.items()}
     others = {label: law for label, law in laws.items() if not hasattr(law, "envelope")}
-    rates = {label: _rate(build, law, label, affinities[label]) for label, law in others.items()}
+    stated = {label: _rate(build, law, affinities[label]) for label, law in others.items()}
+    rates = {label: _resolved(build, others, stated, label) for label in others}
     forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in others.items()))
     free = _free(build, forming)
     rates |= {label: softening(build, law, forming, free) for label, law in laws.items() if label not in others}
@@ -120,7 +121,7 @@ def _free(build: Build, forming: Expression) -> Expression:
     return within_reach(build) * free_to_react(build, forming)
 
 
-def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expression:
+def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     own = {"mu": affinity, "t": build.t}
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
@@ -130,37 +131,35 @@ def _rate(build: Build, law: RateLaw, label: str, affinity: Expression) -> Expre
     build.law_margins(law, own)
     if found := exponents(rate):
         build.capped.append(Capped(law.title, tuple(found)))
-        return _resolved(build, law, label, rate, found)
     return rate
 
 
-def _resolved(build: Build, law: RateLaw, label: str, rate: Expression, found: Sequence[Expression]) -> Expression:
+def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], label: str) -> Expression:
     """A rate under load that relaxes no faster than time resolves, both ways alike: faster is at once in any case.
 
-    Only of a reaction that is alone: with others it competes for its species, and what they share out depends on it.
+    It stays far faster than all else that changes the same species, so that what they share out does not depend on it.
     """
-    if _competes(build, law):
-        return rate
+    law, rate = laws[label], rates[label]
     loads = {symengine.Symbol(name) for name in ("g_n", "f", *(f"f_{name}" for name in build.bonding))}
     if any(role.by == SHARED and build.variables.was_read(role.variable) for role in build.variables.roles):
         return rate  # bonds that share a load rupture, which ends the run before
-    if not any(loads & exponent.free_symbols for exponent in found):
+    if not any(loads & exponent.free_symbols for exponent in exponents(rate)):
         return rate
-    relaxation: Expression = symengine.Integer(0)
-    for name, nu in law.stoichiometry().items():
-        bond = build.bonding[name]
-        relaxation -= nu * derivative(rate, bond.symbol) / bond.density
+    own = law.stoichiometry()
+    relaxation = _relaxation(build, own, law, rate)
     if relaxation == 0:
         return rate
+    others = (absolute(_relaxation(build, own, laws[other], rates[other])) for other in laws if other != label)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
     steps = build.name(quantity, relaxation * (build.t * RESOLUTION / MARGIN), output=False)
-    return rate * where(steps > 1, 1 / steps, 1)
+    allowed = 1 + sum(others) * (build.t / MARGIN)
+    return rate * where(steps > allowed, allowed / steps, 1)
 
 
-def _competes(build: Build, law: RateLaw) -> bool:
-    """Whether another law changes what this one changes."""
-    own = law.stoichiometry().keys()
-    return sum(bool(own & other.stoichiometry().keys()) for other in build.interface.reactions) > 1
+def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expression) -> Expression:
+    """How fast a law brings back the variables of these names that it changes [1/s]."""
+    changes = ((build.bonding[name], nu) for name, nu in law.stoichiometry().items() if name in names)
+    return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
 def _prescribed_bonding(build: Build) -> None:
