@@ -335,18 +335,27 @@ def closed(enthalpies, steps):
 
 
 def network(folder, enthalpies, steps, times, loaded=()):
-    """Coverages of a closed network that starts in its first species, from a run and from its eigenvalues."""
-    text = [
-        f"equation: {a} {'<=>' if reversible else '=>'} {b}, "
-        f"{'type: Bell, x-beta: 0.1 nm, ' if i in loaded else ''}rate-constant: {{A: {k!r}, b: 0, Ea: 0}}"
-        for i, (a, b, k, reversible) in enumerate(steps)
-    ]
+    """Coverages of a closed network that starts in its first species, from a run and from its eigenvalues.
+
+    A loaded step is two of type Bell, as both directions need a length under a force.
+    """
+    text, apart = [], []
+    for i, (a, b, k, reversible) in enumerate(steps):
+        if i in loaded and reversible:
+            back = float(mpmath.mpf(k) * mpmath.exp(mpmath.mpf(enthalpies[b] - enthalpies[a]) * 1000 / (GAS * 300)))
+            apart += [(a, b, k, False), (b, a, back, False)]
+            bell = "type: Bell, x-beta: 0.1 nm, rate-constant: {{A: {!r}, b: 0, Ea: 0}}"
+            text += [f"equation: {a} => {b}, {bell.format(k)}", f"equation: {b} => {a}, {bell.format(back)}"]
+        else:
+            apart.append((a, b, k, reversible))
+            arrow = "<=>" if reversible else "=>"
+            text.append(f"equation: {a} {arrow} {b}, rate-constant: {{A: {k!r}, b: 0, Ea: 0}}")
     more = f"loading: {{f: 0 N}}\ninitial: {{coverages: {{{next(iter(enthalpies))}: 1}}}}"
     solution = solve(folder, "mechanism: mech.yaml", times, more=more, mechanism=mechanism(enthalpies, text))
     assert solution.status == "finished", solution.reason
     found = np.array([solution.dataset[f"theta_{name}"].values for name in enthalpies])
     with mpmath.workdps(150):
-        values, vectors = mpmath.eig(closed(enthalpies, steps))
+        values, vectors = mpmath.eig(closed(enthalpies, apart))
         parts = mpmath.lu_solve(vectors, mpmath.matrix([1] + [0] * (len(enthalpies) - 1)))
         modes = [[mpmath.exp(value * t) * part for value, part in zip(values, parts, strict=True)] for t in times]
         exact = [[float(mpmath.re(x)) for x in vectors * mpmath.matrix(mode)] for mode in modes]
