@@ -14,7 +14,8 @@ class Coulomb(UnderPressure, Friction):
     .. math:: t_t = \mu\,p\,\mathrm{sgn}(v), \quad |t_t| \le \mu_s\,p \text{ while sticking}
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max. Any v; p >= 0. Dissipates
-    :math:`t_t v \ge 0`. Without a static coefficient, or with one below mu, the interface sticks up to mu p.
+    :math:`t_t v \ge 0`. Without a static coefficient the interface sticks up to mu p; so it does with one below mu,
+    which `check` and the run then say.
 
     >>> Coulomb(mu=0.3).traction(p=1e5, direction=1.0), Coulomb(mu=0.3, mu_s=0.5).limit(p=1e5)
     (30000.0, 50000.0)
@@ -115,8 +116,9 @@ class BondedCoulomb(UnderPressure, Friction):
     .. math:: |t_t| \le \mu_0\,p \text{ while sticking}, \quad
         \mu_0 = [\phi \mu_b + (1 - \phi) \mu_{ub}] \frac{T_0}{T_c}, \quad t_t = \mu\,p\,\mathrm{sgn}(v)
 
-    Bonds break as sliding starts. Source: Sauer, Duong & Mandadapu (2021), eqs. e:mu0 and e:dry_fric. Any v; p >= 0.
-    Dissipates :math:`t_t v \ge 0`.
+    Bonds break as sliding starts. Where :math:`\mu_0` falls below :math:`\mu`, as in the heat, :math:`\mu p` is what
+    sticking bears, and the run says so. Source: Sauer, Duong & Mandadapu (2021), eqs. e:mu0 and e:dry_fric. Any v;
+    p >= 0. Dissipates :math:`t_t v \ge 0`.
 
     >>> BondedCoulomb(mu=0.3, mu_b=0.7, mu_ub=0.3).limit(p=1e5, phi=0.5, T_c=300.0, T_0=300.0)
     50000.0
