@@ -24,8 +24,14 @@ a hundred times its tolerance, but near singular ends."""
 LOOSEST = 1e-3
 """No accuracy asks for a tolerance above this."""
 
+LAST = 3e-14
+"""Tolerance of the second run where the first has the tightest one."""
+
 FLOOR = 1e-9
-"""Exact values of a state below this part of its largest count as this when errors are made relative."""
+"""Times of events below this part of the run count as this when their errors are made relative."""
+
+ROUNDING = float(np.finfo(float).eps)
+"""No error is claimed to be less than the last digit."""
 
 
 def first_tolerance(accuracy: float) -> float:
@@ -38,24 +44,25 @@ def first_tolerance(accuracy: float) -> float:
 
 
 def second_tolerance(rtol: float) -> float:
-    """Tolerance of the second run; at the tightest tolerance that run is the looser one.
+    """Tolerance of the second run; only one that is tighter than all others has a looser one.
 
-    >>> second_tolerance(1e-8), second_tolerance(1e-13)
-    (1e-10, 1e-11)
+    >>> second_tolerance(1e-8), second_tolerance(1e-13), second_tolerance(1e-15)
+    (1e-10, 3e-14, 1e-13)
     """
-    return max(rtol * TIGHTER, TIGHTEST) if rtol > TIGHTEST else rtol / TIGHTER
+    if rtol > TIGHTEST:
+        return max(rtol * TIGHTER, TIGHTEST)
+    return LAST if rtol > LAST else TIGHTEST
 
 
 def relative_errors(values: Array, exact: Array, floor: float) -> Array:
-    """Errors relative to the exact value at the same time, or to ``floor`` times its largest if that is more; absolute
-    where the exact value is zero throughout.
+    """Errors relative to the exact value at the same time, or to ``floor`` if that is more; absolute where both are
+    zero.
 
-    >>> relative_errors(np.array([1.5, 2.0]), np.array([1.0, 2.0]), 1e-9).tolist()
-    [0.5, 0.0]
+    >>> relative_errors(np.array([1.5, 2.0, 1e-9]), np.array([1.0, 2.0, 0.0]), 1e-6).tolist()
+    [0.5, 0.0, 0.001]
     """
-    largest = float(np.max(np.abs(exact), initial=0.0))
-    scale = np.maximum(np.abs(exact), floor * largest) if largest else 1.0
-    return np.asarray(np.abs(values - exact) / scale)
+    scale = np.maximum(np.abs(exact), floor)
+    return np.asarray(np.abs(values - exact) / np.where(scale > 0, scale, 1.0))
 
 
 def relative_error(values: Array, exact: Array, floor: float) -> float:

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.accuracy import FLOOR, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
 from surfacechem.audit import audit
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.event_table import SIDE, event_times
@@ -55,40 +55,68 @@ def accuracy(
     """
     if way == "balances":
         return from_balances(trajectory, "balances only: what they miss is not seen")
-    if exact is None or way == "estimate":
-        return with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
-    try:
-        return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
-    except InputError as error:
-        estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
-        unused = f"the exact solution {exact[0]} is not of this scene: {error.message}"
-        return replace(estimate, source=f"{estimate.source}; {unused}")
+    unused = ""
+    if exact is not None and way != "estimate" and len(trajectory.result.times) < 2:
+        unused = f"; with one output nothing is compared with the exact solution {exact[0]}"
+    elif exact is not None and way != "estimate":
+        try:
+            return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
+        except InputError as error:
+            unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
+    estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
+    return replace(estimate, source=f"{estimate.source}{unused}")
 
 
 def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapping[str, float]) -> Accuracy:
-    """Largest errors at the output times; InputError where the exact solution is another scene's."""
+    """Largest errors at the output times, and those of the times of events, which a second run tells.
+
+    InputError where the exact solution is another scene's.
+    """
     from surfacechem.references.matching import exact_values
 
     exact = exact_values(name, options, scene, trajectory)
     columns = computed(trajectory)
     errors = {key: relative_error(columns[key], values, floor(trajectory, key)) for key, values in exact.items()}
-    return Accuracy(max(errors.values()), f"exact solution {name}", errors, exact)
+    if event_times(trajectory):
+        errors |= _event_errors(trajectory)
+    return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
+
+
+def _event_errors(trajectory: Trajectory) -> dict[str, float]:
+    """Error of the times of events from a second run; nothing where that has others."""
+    second = trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))
+    found, expected = event_times(trajectory), event_times(second)
+    if difference(found, expected):
+        return {}
+    return {EVENTS: event_error(found, expected, trajectory.run.times[-1])}
 
 
 def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
-    """Errors of states and of the times of events, estimated from a second run; at the tightest tolerance that run is
-    the looser one. Those of the cells across bodies are added.
+    """Errors of states and of the times of events, estimated from a second run. Those of the cells across bodies are
+    added.
     """
     other = second_tolerance(trajectory.run.rtol)
     second = trajectory.model.resolve(trajectory, other)
-    shared = len(trajectory.result.times)
-    if len(second.result.times) < shared or shared < 2:
-        why = f"a second run at rtol {other:.0e} {EARLIER}: {second.reason}"
-        return from_balances(trajectory, f"balances only, since {why}")
+    if trajectory.status == "failed" and len(trajectory.result.times) < 2:
+        return unknown(f"the run failed: {trajectory.reason}")
+    if second.status == "failed" or len(second.result.times) < len(trajectory.result.times):
+        return unknown(f"a second run at rtol {other:.0e} {EARLIER}: {second.reason}")
     errors, note = apart(trajectory, second)
+    if not errors:
+        return unknown("the run ended before its second output")
     source = second_run(other)
-    found = Accuracy(max(errors.values()), f"{source}, which had {note}" if note else source, errors)
+    found = Accuracy(stated(errors), f"{source}, which had {note}" if note else source, errors)
     return with_cells(found, cells) if cells else found
+
+
+def unknown(why: str) -> Accuracy:
+    """The error of a run of which nothing is known."""
+    return Accuracy(math.nan, f"unknown: {why}")
+
+
+def stated(errors: Mapping[str, float]) -> float:
+    """The error of a whole run: the largest, and never less than the last digit."""
+    return max(*errors.values(), ROUNDING)
 
 
 def second_run(rtol: float) -> str:
@@ -97,21 +125,32 @@ def second_run(rtol: float) -> str:
 
 
 def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:
-    """Largest differences of two runs in each state and in the times of events, and in which events they differ."""
+    """Largest differences of two runs in each state and in the times of events, and in which events they differ.
+
+    Of a run that ended before its second output only the events and the end are known.
+    """
     found, expected = event_times(first), event_times(second)
     note = difference(found, expected)
     times = first.result.times[: len(second.result.times)]
-    shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
-    ours, theirs = states(first), states(second)
-    errors = {name: relative_error(ours[name][shared], theirs[name][shared], FLOOR) for name in ours}
+    errors: dict[str, float] = {}
+    if len(times) > 1:
+        shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
+        ours, theirs = states(first), states(second)
+        errors = {name: relative_error(ours[name][shared], theirs[name][shared], floor(first, name)) for name in ours}
     if found and not note:
         errors[EVENTS] = event_error(found, expected, first.run.times[-1])
     return errors, note
 
 
 def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
-    """At which times two runs with the same events have made the same jumps; those of the events are compared apart."""
-    ways = np.array([[one.t, other.t] for one, other in zip(first.jumps, second.jumps, strict=False)]).reshape(-1, 2)
+    """At which times two runs with the same events have made the same jumps; those of the events are compared apart.
+
+    One of them may have made another at the end, where rounding decides whether it still happens.
+    """
+    both = min(len(first.jumps), len(second.jumps))
+    pairs = [(one.t, other.t) for one, other in zip(first.jumps[:both], second.jumps[:both], strict=True)]
+    pairs += [(jump.t, jump.t) for jump in (*first.jumps[both:], *second.jumps[both:])]
+    ways = np.array(pairs).reshape(-1, 2)
     early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
     return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
 
@@ -125,15 +164,17 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     errors = dict(estimate.variables)
     for name, error in cells.variables.items():
         errors[name] = errors.get(name, 0.0) + error
-    worst = max(estimate.error, *errors.values())
+    worst = max(estimate.error, stated(errors))
     return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, {cells.source}")
 
 
 def from_balances(trajectory: Trajectory, source: str) -> Accuracy:
     """What the residuals of the balances tell of the error."""
+    if len(trajectory.result.times) < 2:
+        return unknown("the run ended before its second output")
     books = audit(trajectory)
     errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
-    return Accuracy(max(errors.values()), source, errors)
+    return Accuracy(stated(errors), source, errors)
 
 
 def states(trajectory: Trajectory) -> dict[str, Array]:
@@ -150,10 +191,29 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
     return states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
 
 
+def floors(trajectory: Trajectory) -> Array:
+    """Sizes of the states below which their errors are relative to these, shape (states,): those at which the absolute
+    tolerance is as much as the relative one, and at most their scales.
+    """
+    run, problem = trajectory.run, trajectory.result.problem
+    scales = np.array([state.scale for state in trajectory.model.system.states])
+    return np.asarray(np.minimum(problem.atol / run.rtol, scales))
+
+
 def floor(trajectory: Trajectory, name: str) -> float:
-    """The part of its largest value below which an exact value of a variable counts as this in relative errors."""
-    system = trajectory.model.system
-    return FLOOR if name in {*(s.name for s in system.states), *(p.name for p in system.profiles)} else 1.0
+    """Size of a variable below which its errors are relative to this; for named quantities the largest value."""
+    system, known = trajectory.model.system, dict(zip(_names(trajectory), floors(trajectory), strict=True))
+    for profile in system.profiles:
+        if name == profile.name:
+            return float(max((known[state] for state in profile.states), default=0.0))
+    if name in known:
+        return float(known[name])
+    values = trajectory.outputs[:, [item.name for item in system.outputs].index(name)]
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _names(trajectory: Trajectory) -> list[str]:
+    return [state.name for state in trajectory.model.system.states]
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:

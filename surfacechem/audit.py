@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.integrate import Trajectory
+from surfacechem.solvers.contract import Points
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,8 @@ UNRESOLVED = 1e-2
 """An exchange of which rounding may be this part, or more, is not resolved."""
 
 SLACK = 10.0
-"""Dissipation below zero by less than this many tolerances of the law's largest is error of the integration."""
+"""So many tolerances of what a law turns over, and of the states on which its production depends, are error of the
+integration."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,11 @@ class Audit:
     """Entropy that the last digits of the states stand for over all steps [J/(m^2 K)]."""
     least: Mapping[str, float]
     """Least entropy production of each dissipative law over all steps and outputs [W/(m^2 K)]."""
-    largest: Mapping[str, float]
-    """Largest entropy production of each dissipative law [W/(m^2 K)]."""
     destroyed: Mapping[str, float]
-    """Part of what each dissipative law turns over that it destroys: nothing where it does so for no time at all."""
+    """Part of what each dissipative law turns over that it destroys, beyond rounding; nothing where that is less than
+    the last digit of the total."""
+    destroyed_together: float
+    """The same of all laws together."""
 
     @property
     def energy_error(self) -> float:
@@ -86,17 +90,20 @@ class Audit:
     @cached_property
     def violations(self) -> tuple[str, ...]:
         """Laws that destroyed entropy beyond the tolerance of the run, or whose production is not a number."""
-        rounding = EPSILON * max((abs(high) for high in self.largest.values()), default=0.0)
-        allowed = {law: SLACK * self.rtol * abs(high) + rounding for law, high in self.largest.items()}
-        brief = SLACK * self.rtol
-        return tuple(
-            law for law, low in self.least.items() if not (low >= -allowed[law] or self.destroyed[law] <= brief)
-        )
+        most = SLACK * self.rtol
+        return tuple(law for law, low in self.least.items() if not (low >= 0 or self.destroyed[law] <= most))
+
+    @property
+    def destroys(self) -> bool:
+        """Whether a law destroyed entropy, or all of them together did."""
+        return bool(self.violations) or not self.destroyed_together <= SLACK * self.rtol
 
     @cached_property
     def findings(self) -> tuple[str, ...]:
         """What is wrong with the balances, in words; nothing, as a rule."""
         found = [f"the law {law.replace('_', ' ')} destroys entropy" for law in self.violations]
+        if self.destroys and not found:
+            found = ["the laws together destroy entropy"]
         # What is exchanged may be less than the rounding of a body's heat content.
         known = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
         open_balances = (("energy", known), ("sites", self.site_error))
@@ -200,7 +207,7 @@ class _Books:
 
     def audit(self) -> Audit:
         exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation"), self.between()]
-        low, high, destroyed = self.production()
+        least, destroyed, together = self.production()
         return Audit(
             energy=self.residual("E_total", ("energy supply",)),
             entropy=self.residual("S_total", ("entropy supply", "entropy production")),
@@ -212,9 +219,9 @@ class _Books:
             entropy_stored=self.entropy_stored,
             energy_rounding=self.rounding(),
             entropy_rounding=self.entropy_rounding,
-            least=low,
-            largest=high,
+            least=least,
             destroyed=destroyed,
+            destroyed_together=together,
         )
 
     def sites(self) -> Array:
@@ -227,42 +234,95 @@ class _Books:
             residuals[:, k] = np.abs(bonds - bonds[:1] - self.ledger[:, j])
         return np.asarray(residuals.max(axis=1))
 
-    def production(self) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
-        """Least and largest entropy production of each law over outputs and steps, and the part that it destroys."""
+    def production(self) -> tuple[dict[str, float], dict[str, float], float]:
+        """Least entropy production of each law over outputs and steps, and the part that it destroys, and all do."""
         values = self.trajectory.within_bounds
         laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
         columns = {law: self._before_end(values[f"sigma_{law}"]) for law in laws if len(values.get(f"sigma_{law}", ()))}
-        return (
-            {law: float(c.min()) for law, c in columns.items()},
-            {law: float(c.max()) for law, c in columns.items()},
-            {law: self.destroyed(law, c) for law, c in columns.items()},
-        )
+        least = {law: float(column.min()) for law, column in columns.items()}
+        destroyed = {law: 0.0 if low >= 0 else self._destroyed([law]) for law, low in least.items()}
+        together = self._destroyed(list(columns)) if any(destroyed.values()) else 0.0
+        return least, destroyed, together
 
-    def destroyed(self, law: str, column: Array) -> float:
-        """Part of the entropy that a law turns over that it destroys, by the ledger or at the ends of the steps.
+    def _destroyed(self, laws: list[str]) -> float:
+        """Part of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
 
-        All of it where no step is known; nothing where it is less than the last digits of the total. The end of a
-        stretch says nothing of the step before it: production may jump there.
+        Nothing where it is less than the last digit of the total, which then is the same with it and without.
         """
-        steps = self.trajectory.result.steps
-        if steps is None or len(steps.t) < 2:
-            return 1.0
+        points = self._points
+        booked = np.diff(points.ledger[:, [self._account(law) for law in laws]].sum(axis=1))
+        rates = np.array([self.trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
+        if self.trajectory.status == "stopped":  # a law that ends there may have no value
+            rates[-1:] = np.nan_to_num(rates[-1:])
+        seen = rates[1:] * self._lengths
+        amount, whole = lost(booked, seen)
+        if amount <= SLACK * self.trajectory.run.rtol * whole:
+            return 0.0
+        rounded = self._rounding_of(laws, np.flatnonzero((booked < 0) | (seen < 0)), len(booked))
+        digits = EPSILON * np.abs(points.ledger).sum(axis=1)
+        amount, whole = lost(booked, seen, rounded * np.diff(points.t) + digits[1:] + digits[:-1])
+        return 0.0 if amount <= EPSILON * self.entropy_stored else _share(float(amount), float(whole))
+
+    @cached_property
+    def _points(self) -> Points:
+        """The steps, where they are known, else the outputs."""
+        result, rates = self.trajectory.result, self.trajectory.rates
+        if result.steps is not None and len(result.steps.t) > 1:
+            return result.steps
+        return Points(result.times, result.outputs, rates, result.ledger_outputs, segment=result.segment)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Lengths of the steps whose ends tell of them: where a stretch ends production may jump."""
+        result, points = self.trajectory.result, self._points
+        return np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, np.diff(points.t))
+
+    def _account(self, law: str) -> int:
+        """Column of the ledger that holds the entropy that a law has produced."""
         accounts = enumerate(self.system.ledger)
-        columns = [j for j, a in accounts if a.kind == "entropy production" and a.law == law]
-        booked = np.diff(steps.ledger[:, columns].sum(axis=1))
-        lengths = np.diff(steps.t, prepend=steps.t[0])
-        if steps.segment is not None:
-            lengths[:-1][np.diff(steps.segment) > 0] = 0.0
-        within = column[len(self.trajectory.result.times) :]
-        seen = within * lengths[: len(within)]
-        amount = max(float(-np.minimum(produced, 0.0).sum()) for produced in (booked, seen))
-        whole = max(float(np.abs(produced).sum()) for produced in (booked, seen))
-        return 0.0 if amount <= self.entropy_rounding else _share(amount, whole)
+        return next(j for j, a in accounts if a.kind == "entropy production" and a.law == law)
+
+    def _rounding_of(self, laws: list[str], chosen: NDArray[np.int64], count: int) -> Array:
+        """What is rounded of the production of laws during chosen ones of so many steps [W/(m^2 K)]: by how much last
+        digits of all that it depends on change it at the ends of a step, and errors within the tolerance of the states.
+        """
+        model, result, points = self.trajectory.model, self.trajectory.result, self._points
+        ends = np.union1d(chosen, chosen + 1)
+        segment = None if points.segment is None else points.segment[ends]
+        rows = model.inputs(result, points.t[ends], points.y[ends], points.ydot[ends], segment)
+        columns = [self.names.index(f"sigma_{law}") for law in laws]
+        n, known = len(self.system.states), max(EPSILON, SLACK * self.trajectory.run.rtol)
+        part = np.full(rows.shape[1], EPSILON)
+        part[1 : 1 + 2 * n] = known
+        least = np.zeros(rows.shape[1])
+        least[1 : 1 + n] = SLACK * result.problem.atol
+        now = model.output_function(model.program.filled(rows.copy()))[:, columns]
+        found = EPSILON * np.abs(now)
+        for j in range(rows.shape[1]):
+            moved = rows.copy()
+            moved[:, j] += part[j] * np.abs(rows[:, j]) + least[j]
+            then = model.output_function(model.program.filled(moved))[:, columns]
+            found += np.nan_to_num(np.abs(then - now))
+        rates = np.zeros(count + 1)
+        rates[ends] = found.sum(axis=1)
+        return np.maximum(rates[1:], rates[:-1])
 
     def _before_end(self, values: Array) -> Array:
         """The values but for that of the last step, where a law that ends there may have none."""
         ended = self.trajectory.status == "stopped" and len(values) > 1 and not np.isfinite(values[-1])
         return values[:-1] if ended else values
+
+
+def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
+    """What is destroyed and what is turned over along the last axis: by the ledger, or at the ends of the steps if that
+    is more.
+
+    >>> lost(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)
+    (0.375, 1.25)
+    """
+    amounts = [np.maximum(-produced - rounded, 0.0).sum(axis=-1) for produced in (booked, seen)]
+    wholes = [np.abs(produced).sum(axis=-1) for produced in (booked, seen)]
+    return np.maximum(*amounts), np.maximum(*wholes)
 
 
 def _share(part: float, whole: float) -> float:

@@ -8,14 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from surfacechem.accuracy import FLOOR, MARGIN, TIGHTEST, second_tolerance
-from surfacechem.achieved import apart, second_run
+from surfacechem.accuracy import MARGIN, TIGHTEST, second_tolerance
+from surfacechem.achieved import apart, floors, second_run, stated, unknown
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.solution import Accuracy
 from surfacechem.solvers import ASKING
-
-LAST = 3e-14
-"""Tolerance of the second run where the first has the tightest one."""
 
 
 def asked(run: Run) -> float:
@@ -37,7 +34,7 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     wanted = asked(first.run)
     while True:
         last = first.run.rtol <= TIGHTEST
-        second = first.model.resolve(first, LAST if last else second_tolerance(first.run.rtol))
+        second = first.model.resolve(first, second_tolerance(first.run.rtol))
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
             return first, found
@@ -50,14 +47,16 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     """Largest differences of two runs: of states and of times of events, the end among them where physics set it."""
     rtol = second.run.rtol
     if second.status == "failed":
-        return Accuracy(math.nan, f"not known: a second run at rtol {rtol:.0e} failed: {second.reason}")
+        return unknown(f"a second run at rtol {rtol:.0e} failed: {second.reason}")
     source = second_run(rtol)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
     errors, others = apart(first, second)
     if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
         return Accuracy(math.inf, f"{source}, which had {others}")
-    return Accuracy(max(errors.values()), source, errors)
+    if not errors:
+        return unknown("the run ended before its second output")
+    return Accuracy(stated(errors), source, errors)
 
 
 def rounding_of_time(trajectory: Trajectory) -> float:
@@ -66,8 +65,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
     It is large where a state runs towards a singular end.
     """
     result = trajectory.result
-    y = np.abs(result.outputs)
-    size = np.maximum(y, FLOOR * np.max(y, axis=0, initial=0.0))
+    size = np.maximum(np.abs(result.outputs), floors(trajectory))
     change = np.finfo(float).eps * np.abs(trajectory.rates) * result.times[:, None]
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 
@@ -90,9 +88,12 @@ def reasons(model: Model, run: Run) -> list[tuple[str, str, str]]:
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"
-    second = LAST if run.rtol <= TIGHTEST else second_tolerance(run.rtol)
     return [
         ("solver", chosen.solver, method),
         ("rtol", f"{run.rtol:.0e}", part),
-        ("verified", f"{second:.0e}", "a second run must agree to the accuracy, else it is verified in turn"),
+        (
+            "verified",
+            f"{second_tolerance(run.rtol):.0e}",
+            "a second run must agree to the accuracy, else it is verified in turn",
+        ),
     ]

@@ -77,9 +77,11 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     """Times [s] of the events by name, in order; where physics stopped the run, also that of its end.
 
     Impacts slower than a thousandth of the fastest so far are left out, with what happens at their time but rest: of
-    endless rebounds, how many there are is a matter of the tolerance.
+    endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
+    rounding decides whether it still happens.
     """
-    rows = _telling(trajectory, _rows(trajectory))
+    last = trajectory.run.times[-1] * (1 - SIDE)
+    rows = [row for row in _telling(trajectory, _rows(trajectory)) if row.t < last]
     found = {
         name: np.array([row.t for row in rows if row.name == name]) for name in dict.fromkeys(r.name for r in rows)
     }

@@ -220,10 +220,11 @@ class Model:
         """What tells when given variables pass what is narrow."""
         return Passing(self.system)
 
-    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True) -> Problem:
+    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True, nudged: bool = False) -> Problem:
         """The initial value problem; InputError where the initial state is not admissible.
 
-        ``passing`` ends pieces where given variables pass what is narrow, too.
+        ``passing`` ends pieces where given variables pass what is narrow, too; ``nudged`` loads differ in their last
+        digit.
         """
         system = self.system
         initial = {state.name: state.from_given(values) for state in system.states}
@@ -236,6 +237,8 @@ class Model:
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         pieces.start_modes(system, parameters, values)
         self._check_start(values, parameters[0], initial)
+        if nudged:
+            pieces.nudge(system, parameters)
         start = self._start(np.array(list(initial.values())), parameters)
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
             self._check_start(values, parameters[0], dict(zip(initial, start.tolist(), strict=True)))
@@ -293,10 +296,14 @@ class Model:
         return {path: values.get(path, own) for path, own in self.values().items()}
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
-        """The same run at another tolerance, its absolute tolerance in proportion, looked at more closely elsewhere."""
+        """The same run at another tolerance, its absolute tolerance in proportion, looked at more closely elsewhere.
+
+        Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
+        """
         run = trajectory.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
-        return self.solve_values(replace(run, rtol=rtol, atol=atol, samples=CLOSER * run.samples), trajectory.values)
+        closer = replace(run, rtol=rtol, atol=atol, samples=CLOSER * run.samples)
+        return self.solve_values(closer, trajectory.values, nudged=True)
 
     def chosen(self, run: Run) -> Run:
         """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""
@@ -304,8 +311,10 @@ class Model:
             return run
         return replace(run, solver=ASKING[0] if self.program.filler is not None else OWN)
 
-    def solve_values(self, run: Run, values: Mapping[str, float]) -> Trajectory:
-        """Run with every value given, whatever bounds they need."""
+    def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
+        """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
+        wished.
+        """
         run = self.chosen(run)
         method = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
@@ -315,13 +324,13 @@ class Model:
             )
         fit = self.system.fit
         values = fit.started(values) if fit else values
-        problem = self.problem(run, values)
+        problem = self.problem(run, values, nudged=nudged)
         method.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
         result, jumps, ended = self._integrate(method, problem)
         while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
             values = wider
-            result, jumps, ended = self._integrate(method, self.problem(run, values))
+            result, jumps, ended = self._integrate(method, self.problem(run, values, nudged=nudged))
         prepared = PREPARING.seconds - prepared
         self.compile_seconds += prepared
         seconds = time.perf_counter() - start - prepared

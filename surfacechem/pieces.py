@@ -45,6 +45,12 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
     return rows
 
 
+def nudge(system: System, parameters: Array) -> None:
+    """Change the numbers of histories by their last digit, one up, the next down; times that pieces count from stay."""
+    loads = [j for j, p in enumerate(system.parameters) if p.path.startswith("loading.") and p.field != "origin"]
+    parameters[:, loads] *= 1 + np.finfo(float).eps * (-1.0) ** np.arange(len(loads))
+
+
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
     """Modes that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from surfacechem.integrate import Run, Trajectory
     from surfacechem.scene import Scene
     from surfacechem.solution import Solution
-    from surfacechem.sweep_dataset import SweepSolution
+    from surfacechem.sweep_dataset import SweepAccuracy, SweepSolution
     from surfacechem.sweeps import Sweep
     from surfacechem.system import System
 
@@ -96,13 +96,22 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
         labelled("swept", " by ".join(axes)),
         labelled("solved", f"{states(solution.system)}; {solution.system.regime}; {_method(sweep.run)}"),
         labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
-        *([labelled("error", f"{accuracy.errors.max():.2g} ({accuracy.source})")] if accuracy else []),
+        *([labelled("error", _sweep_accuracy(accuracy))] if accuracy else []),
         labelled("time", f"{speed}; {sweep.batch.steps.sum()} steps"),
         *([labelled("events", events)] if (events := _sweep_events(solution)) else []),
         labelled("balances", _sweep_balances(sweep)),
         *([labelled("written", str(written))] if written else []),
     ]
     return "\n".join(lines)
+
+
+def _sweep_accuracy(accuracy: SweepAccuracy) -> str:
+    """The largest error that is known, and of how many runs none is."""
+    known = accuracy.errors[np.isfinite(accuracy.errors)]
+    missing = len(accuracy.errors) - len(known)
+    if not len(known):
+        return f"unknown ({accuracy.source})"
+    return f"{known.max():.2g} ({accuracy.source})" + (f"; unknown in {missing} runs" if missing else "")
 
 
 def _sweep_events(solution: SweepSolution) -> str:
@@ -167,12 +176,14 @@ def _balances(books: Audit) -> str:
     residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
     if not books.least:
         return f"{residuals}; nothing dissipates"
+    if books.destroys and not books.violations:
+        return f"{residuals}; ENTROPY DESTROYED by all laws together"
     if books.violations:
         worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
         return f"{residuals}; ENTROPY DESTROYED by {worst}"
     least = min(books.least.values())
-    rounding = ", which is rounding" if least < 0 else ""
-    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){rounding})"
+    error = ", within the error of the run" if least < 0 else ""
+    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){error})"
 
 
 def check_summary(

@@ -15,7 +15,7 @@ import numpy as np
 from surfacechem import case as cases
 from surfacechem import choice, spatial
 from surfacechem.accuracy import CellErrors
-from surfacechem.achieved import accuracy, check_way
+from surfacechem.achieved import accuracy, check_way, unknown
 from surfacechem.case import Case
 from surfacechem.document import from_plain
 from surfacechem.errors import InputError, Place, suggestion
@@ -97,7 +97,8 @@ class Simulation:
         if settings.solver == AUTO:
             trajectory, estimate = choice.verified(trajectory)
         case = chosen.case
-        exact = (case.reference.name, case.reference.options) if case.reference else None
+        unused = case.reference.fixed if case.reference and self._departs(values) else case.unused
+        exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
 
         def cell_errors() -> CellErrors:
             nonlocal cells
@@ -107,8 +108,10 @@ class Simulation:
         found = (
             accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
             if len(trajectory.result.times)
-            else None
+            else unknown("the run ended at its start")
         )
+        if unused and error == "auto":
+            found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
             trajectory,
             title=case.title,
@@ -121,6 +124,11 @@ class Simulation:
             error_from=error,
             notes=spatial.missed(case.scene, cells or CellErrors(), found),
         )
+
+    def _departs(self, values: Mapping[str, float]) -> bool:
+        """Whether values are other than those of the case."""
+        own = self.model.values()
+        return any(own[path] != value for path, value in values.items())
 
     def _as_accurate(self, run: Run) -> Simulation:
         """The same with cells as accurate as the run is asked to be, where an accuracy chooses them."""

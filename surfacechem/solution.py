@@ -137,8 +137,8 @@ class Solution:
     def _inaccurate(self) -> list[str]:
         """An error well beyond what was asked for, or so large that the result is none."""
         found = self.accuracy
-        if found is not None and self.status == "finished" and EARLIER in found.source:
-            return [f"the error is not known: {found.source.partition('since ')[2]}"]
+        if found is not None and math.isnan(found.error) and self.status == "finished":
+            return [f"the error is not known: {found.source.partition(': ')[2]}"]
         if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
             return []
         wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from surfacechem import grids
-from surfacechem.accuracy import FLOOR, MARGIN, UNKNOWN, CellErrors, relative_error
-from surfacechem.achieved import EVENTS, beside_jumps, difference, event_error
+from surfacechem.accuracy import MARGIN, UNKNOWN, CellErrors, relative_error
+from surfacechem.achieved import EVENTS, beside_jumps, difference, event_error, floor
 from surfacechem.compile import compile_function
 from surfacechem.event_table import event_times
 from surfacechem.integrate import Run, Trajectory
@@ -239,7 +239,7 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
     shared = 1 + np.flatnonzero(np.full(len(times), True) if other else beside_jumps(times, better, worse))
     exact, values = _curves(better), _curves(worse)
     names = [name for name in exact if name in values]
-    errors = {name: relative_error(*_on_same(values[name], exact[name], shared), FLOOR) for name in names}
+    errors = {name: relative_error(*_on_same(values[name], exact[name], shared), floor(better, name)) for name in names}
     if other:
         errors[EVENTS] = math.inf
     elif found:

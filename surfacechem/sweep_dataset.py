@@ -210,7 +210,9 @@ class SweepSolution:
         sweep, run = self.sweep, self.sweep.run
         error: dict[str, str | float] = {}
         if self.accuracy:
-            error = {"error": float(np.max(self.accuracy.errors)), "error_source": self.accuracy.source}
+            known = self.accuracy.errors[np.isfinite(self.accuracy.errors)]
+            worst = float(np.max(known)) if len(known) else np.nan
+            error = {"error": worst, "error_source": self.accuracy.source}
         return {
             "Conventions": CONVENTIONS,
             "title": self.title,

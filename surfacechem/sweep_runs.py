@@ -48,17 +48,26 @@ def prepared(system: System, plan: Plan) -> System:
 
 
 def solve(
-    model: Model, plan: Plan, run: Run, changes: Mapping[str, float] | None = None, threads: int | None = None
+    model: Model,
+    plan: Plan,
+    run: Run,
+    changes: Mapping[str, float] | None = None,
+    threads: int | None = None,
+    *,
+    nudged: bool = False,
 ) -> Sweep:
-    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception.
+
+    Where ``nudged``, loads differ in their last digit, as in the second run of an estimate.
+    """
     run = model.chosen(run)
     values = [model.values({**(changes or {}), **point}) for point in plan.points]
     if (suited := model.suited(values)) is not model:
         model, values = suited, [suited.adopted(point) for point in values]
     runs = settings(model.system, plan, run, values)
     if model.system.transitions or model.system.fit or run.solver != Radau.name:
-        return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)))
-    problems = [model.problem(*pair) for pair in zip(runs, values, strict=True)]
+        return _one_by_one(model, plan, run, list(zip(runs, values, strict=True)), nudged)
+    problems = [model.problem(*pair, nudged=nudged) for pair in zip(runs, values, strict=True)]
     Radau().prepare()
     start = time.perf_counter()
     solved = _batch(problems, threads or os.cpu_count() or 1)
@@ -92,8 +101,10 @@ def _alike(problems: Sequence[Problem], threads: int) -> Batch:
     )
 
 
-def _one_by_one(model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]]) -> Sweep:
-    trajectories = [model.solve_values(*pair) for pair in pairs]
+def _one_by_one(
+    model: Model, plan: Plan, run: Run, pairs: Sequence[tuple[Run, Mapping[str, float]]], nudged: bool
+) -> Sweep:
+    trajectories = [model.solve_values(*pair, nudged=nudged) for pair in pairs]
     seconds = sum(trajectory.seconds for trajectory in trajectories)
     results = [trajectory.result for trajectory in trajectories]
     values, problems = [trajectory.values for trajectory in trajectories], [result.problem for result in results]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import references, sweep_runs
-from surfacechem.accuracy import FLOOR, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.accuracy import ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.achieved import apart, floor, stated
 from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
 from surfacechem.references._start import Start
@@ -38,8 +39,10 @@ def solution(case: Case, done: Sweep, changes: Mapping[str, float], threads: int
 def _accuracy(
     case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Cells
 ) -> SweepAccuracy:
-    if case.reference is None:
-        return _against_tighter(done, changes, threads, cells())
+    if case.reference is None or case.reference.options:
+        unused = case.reference.fixed if case.reference else case.unused
+        estimate = _against_tighter(done, changes, threads, cells())
+        return replace(estimate, source="; ".join(filter(None, (estimate.source, unused))))
     try:
         return _against_exact(case, done, case.reference)
     except InputError as error:
@@ -65,7 +68,7 @@ def _against_exact(case: Case, done: Sweep, named: Reference) -> SweepAccuracy:
         for which, values in found.items():
             values[i] = getattr(reference, which)
         errors[i] = _of_statistics(done, i, reference) if found else _of_quantities(done, i, reference)
-    return SweepAccuracy(errors, f"exact solution {named.name}", found)
+    return SweepAccuracy(np.maximum(errors, ROUNDING), f"exact solution {named.name}", found)
 
 
 def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
@@ -77,30 +80,32 @@ def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics
 def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> float:
     """Largest error of states and named quantities."""
     run, reached = done[i], done.reached[i]
-    states = {state.name for state in done.model.system.states}
     exact = beside_events(lambda t: renamed(reference.solution(t), run), run)
     ours = {name: done.named[name][i][reached] for name in exact}
-    return max(relative_error(ours[name], exact[name], FLOOR if name in states else 1.0) for name in exact)
+    return stated({name: relative_error(ours[name], exact[name], floor(run, name)) for name in exact})
 
 
 def _against_tighter(
     done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Sequence[CellErrors]
 ) -> SweepAccuracy:
-    """Errors of states and statistics, estimated from a second sweep, with those of the cells of each run added; not
+    """Errors of states, events and statistics, estimated from a second sweep, with those of the cells of each run; not
     numbers where they are not known.
     """
     other = second_tolerance(done.run.rtol)
     atol = None if done.run.atol is None else done.run.atol * other / done.run.rtol
-    second = sweep_runs.solve(done.model, done.plan, replace(done.run, rtol=other, atol=atol), changes, threads)
-    names = [state.name for state in done.model.system.states]
-    both = done.reached & second.reached
+    run = replace(done.run, rtol=other, atol=atol)
+    second = sweep_runs.solve(done.model, done.plan, run, changes, threads, nudged=True)
     errors = np.full(len(done), np.nan)
     for i in range(len(done)):
         if done.statistics:
-            errors[i] = _of_statistics(done, i, second.statistics[i])
-        elif both[i].any() and np.array_equal(done.reached[i], second.reached[i]):
-            parts = [relative_error(done.named[n][i][both[i]], second.named[n][i][both[i]], FLOOR) for n in names]
-            errors[i] = max(parts)
+            errors[i] = max(_of_statistics(done, i, second.statistics[i]), ROUNDING)
+        elif (
+            done.reached[i].any()
+            and np.array_equal(done.reached[i], second.reached[i])
+            and "failed" not in (done[i].status, second[i].status)
+        ):
+            differences, _ = apart(done[i], second[i])
+            errors[i] = stated(differences) if differences else np.nan
     errors += [found.largest for found in cells]
     source = f"estimate: a second sweep at rtol {other:.0e}"
     ways = dict.fromkeys(found.source for found in cells if found.variables)

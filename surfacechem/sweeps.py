@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import spectrum
-from surfacechem.audit import EPSILON, SLACK, Audit, audit
+from surfacechem.audit import SLACK, Audit, audit, lost
 from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run, Trajectory
 from surfacechem.jumps import VIOLATES
@@ -213,30 +213,21 @@ class Sweep:
 
     @cached_property
     def violations(self) -> NDArray[np.bool_]:
-        """Which runs have a law that destroys entropy beyond their tolerance."""
-        rates = self._productions()
-        largest = [np.nanmax(np.abs(rate), axis=1) for rate in rates]
-        rounding = EPSILON * np.max(largest, axis=0, initial=0.0)
-        low = [np.nanmin(rate, axis=1) for rate in rates]
-        pairs = zip(low, largest, strict=True)
-        found = [least < -(SLACK * self.run.rtol * high + rounding) for least, high in pairs]
-        return np.any(found, axis=0) if found else np.zeros(len(self), dtype=bool)
+        """Which runs have laws that destroy entropy beyond their tolerance, alone or together."""
+        system, lengths = self.model.system, np.diff(self.times)
+        both = self.reached[:, 1:] & self.reached[:, :-1]
+        suspect = np.zeros(len(self), dtype=bool)
+        accounts = [(j, f"sigma_{a.law}") for j, a in enumerate(system.ledger) if a.kind == "entropy production"]
+        for j, name in accounts:
+            booked = np.diff(np.where(self.reached, self.batch.ledger_outputs[:, :, j], 0.0))
+            seen = self.named[name][:, 1:] * lengths
+            amount, whole = lost(np.where(both, booked, 0.0), np.where(both, seen, 0.0))
+            suspect |= ~(amount <= SLACK * self.run.rtol * whole)
+        return np.array([doubt and self.books(i).destroys for i, doubt in enumerate(suspect)], dtype=bool)
 
-    def _productions(self) -> list[Array]:
-        """Entropy production of each law, [run, output], where rounding has carried no bonds below none."""
-        system, rows = self.model.system, self._inputs[self.reached]
-        bonds = {account.law for account in system.ledger if account.kind == "bonds"}
-        columns = [1 + j for j, state in enumerate(system.states) if state.name in bonds]
-        rows[:, columns] = np.maximum(rows[:, columns], 0.0)
-        outputs = self.model.output_function(rows)
-        laws = [account.law for account in system.ledger if account.kind == "entropy production"]
-        names = [item.name for item in system.outputs]
-        found = []
-        for name in (f"sigma_{law}" for law in laws if f"sigma_{law}" in names):
-            values = np.full(self.reached.shape, np.nan)
-            values[self.reached] = outputs[:, names.index(name)]
-            found.append(values)
-        return found
+    def books(self, i: int) -> Audit:
+        """The audit of one run."""
+        return audit(self[i])
 
     def _residual(self, total: str, prefix: str, booked: Sequence[Array], exchanged: Sequence[Array]) -> Array:
         """What a total changed by without being booked, relative to the largest part that was exchanged."""
@@ -292,10 +283,14 @@ class Separate(Sweep):
         """Largest residual of the site balances of each run."""
         return np.array([books.site_error for books in self._audits])
 
+    def books(self, i: int) -> Audit:
+        """The audit of one run."""
+        return self._audits[i]
+
     @cached_property
     def violations(self) -> NDArray[np.bool_]:
-        """Which runs have a law that destroys entropy beyond their tolerance."""
-        return np.array([bool(books.violations) for books in self._audits])
+        """Which runs have laws that destroy entropy beyond their tolerance, alone or together."""
+        return np.array([books.destroys for books in self._audits], dtype=bool)
 
     @cached_property
     def entropy_destroyed(self) -> Array:

@@ -1,5 +1,6 @@
 """Every run carries its own error, and says where it is from."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 import surfacechem
-from surfacechem.achieved import EVENTS, against_tighter, difference, event_error
+from surfacechem.achieved import EVENTS, against_tighter, apart, difference, event_error
 from surfacechem.cli import app
 from surfacechem.errors import InputError
 from surfacechem.event_table import event_times
+from surfacechem.report import run_summary, sweep_summary
 
 
 @pytest.fixture(scope="module")
@@ -67,14 +69,14 @@ def test_other_events_in_the_second_run_are_said(stick_slip, monkeypatch):
     assert EVENTS not in accuracy.variables
 
 
-def test_a_second_run_that_ends_earlier_leaves_the_balances(monkeypatch):
+def test_a_second_run_that_ends_earlier_leaves_the_error_unknown(monkeypatch):
     simulation = surfacechem.load("exothermic")
     trajectory = simulation.model.solve(simulation.case.run)
     short = simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0)))
     monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: short)
     accuracy = against_tighter(trajectory)
-    assert accuracy.source.startswith("balances only, since a second run at rtol 1e-13 ended earlier")
-    assert np.isfinite(accuracy.error)
+    assert accuracy.source.startswith("unknown: a second run at rtol 1e-13 ended earlier")
+    assert np.isnan(accuracy.error)
 
 
 def test_the_end_of_a_stopped_run_is_an_event():
@@ -124,3 +126,102 @@ run: {{times: [0, 1, {time!r}, 5], rtol: 1e-6}}
     run = surfacechem.load(case).run()
     assert run.trajectory.jumps[0].t == pytest.approx(time, rel=1e-7)
     assert run.accuracy.error < 1e-7
+
+
+@pytest.mark.parametrize("reference", [{}, {"reference": ""}])
+def test_a_run_that_ends_before_its_second_output_knows_its_end(reference):
+    """It reaches zero temperature at 300 s."""
+    solution = surfacechem.run("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}, **reference})
+    assert len(solution.trajectory.result.times) == 1
+    true = abs(solution.trajectory.result.t / 300.0 - 1)
+    assert set(solution.accuracy.variables) == {EVENTS}
+    assert true / 10 < solution.accuracy.error < 1e-9
+
+
+def test_balances_tell_nothing_of_a_run_that_ends_before_its_second_output():
+    solution = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}}).run(error="balances")
+    assert np.isnan(solution.accuracy.error)
+    assert "unknown: the run ended before its second output" in run_summary(solution, None)
+    assert np.isnan(solution.attributes["error"])
+
+
+def test_the_error_of_the_tightest_run_is_not_that_of_a_looser_one():
+    settings = {"run": {"until": "2.5 s", "rtol": 1e-13}}
+    exact = surfacechem.run("exothermic", settings).accuracy
+    estimate = surfacechem.run("exothermic", {**settings, "reference": ""}).accuracy
+    assert estimate.source == "estimate: a second run at rtol 3e-14"
+    assert exact.error / 3 < estimate.error < 3 * exact.error
+
+
+@pytest.mark.parametrize("part", [1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_film_that_all_but_closes_is_known_to_the_last_digit_of_its_mean(tmp_path, part):
+    """Its heat is eta v^2 / sqrt(g^2 - a^2) per second; the last digit of g is a large part of what is left, g - a."""
+    g, eta, v, C = 1e-5, 0.01, 5e-4, 800.0
+    a = g * (1 - part)
+    case = tmp_path / "film.yaml"
+    case.write_text(f"""
+T_0: 300 K
+bodies:
+  lower: {{temperature: T, capacity: constant, C: {C / 2}}}
+  upper: {{temperature: T, capacity: constant, C: {C / 2}}}
+interface: {{temperature: T, friction: [viscous: {{eta: {eta}}}]}}
+loading: {{v: {v}, g_n: {{harmonic: {{mean: {g!r}, amplitude: {a!r}, frequency: 0.1}}}}}}
+initial: {{T: 300 K}}
+run: {{until: 20 s}}
+""")
+    solution = surfacechem.run(case)
+    T = 300 + 20 * eta * v**2 / math.sqrt((g - a) * (g + a)) / C
+    assert abs(float(solution.dataset["T"][-1]) / T - 1) < solution.accuracy.error < 1e-4
+
+
+def test_species_that_never_exceed_the_absolute_tolerance_are_no_error():
+    """A state of 1e-31 that two runs know to no digit is known as well as its tolerance asks."""
+    trajectory = surfacechem.run("exothermic").trajectory
+    first, second = (
+        replace(trajectory, result=replace(trajectory.result, outputs=trajectory.result.outputs * [part, 1.0]))
+        for part in (1e-31, 3e-31)
+    )
+    errors, _ = apart(first, second)
+    assert errors["phi"] < 1e-24
+
+
+STRENGTH = "interface.limits.tensile-strength.t_max"
+
+
+@pytest.mark.parametrize("error", ["auto", "estimate"])
+def test_an_event_that_falls_on_the_end_is_no_error(error):
+    """At 1 um/s the strength of 100 MPa is reached at the very end; rounding decides whether a run sees it."""
+    simulation = surfacechem.load("debonding")
+    assert simulation.run({STRENGTH: "100 MPa"}, error=error).accuracy.error < 1e-12
+    swept = simulation.sweep({STRENGTH: ["20 MPa", "60 MPa", "100 MPa"]})
+    assert swept.accuracy.source == "exact solution pulled-to-debonding"
+    assert np.all(swept.accuracy.errors < 1e-12)
+
+
+def test_an_exact_solution_with_parameters_of_its_own_is_of_the_scene_as_written():
+    """A separation that differs by 1e-15 of itself leaves the equations as they are, not the time of the passage."""
+    w_n = 1.1063772254722603e-07
+    simulation = surfacechem.load("slow-passage")
+    why = "is not of this scene: it is given with delta_w, and the scene was changed"
+    changed = surfacechem.run("slow-passage", {"loading.w_n": w_n * (1 + 1e-9)})
+    for accuracy in (
+        changed.accuracy,
+        simulation.run({"loading.w_n": w_n * (1 + 1e-9)}).accuracy,
+        simulation.sweep({"loading.w_n": [w_n, w_n * (1 + 1e-9)]}).accuracy,
+    ):
+        assert accuracy.source.startswith("estimate")
+        assert accuracy.source.endswith(why)
+    assert "g_n_exact" not in changed.dataset
+    for same in (simulation.run({"loading.w_n": w_n}), surfacechem.run("slow-passage", ["run.outputs=31"])):
+        assert same.accuracy.source == "exact solution overdamped-pull-off"
+
+
+def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
+    """Runs that end before their second output have the error of their end; without it that of a sweep is unknown."""
+    swept = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}, "reference": ""}).sweep(
+        {"initial.T": [290.0, 300.0]}
+    )
+    assert np.all((swept.accuracy.errors > 0) & (swept.accuracy.errors < 1e-9))
+    nothing = replace(swept, accuracy=replace(swept.accuracy, errors=np.full(2, np.nan)))
+    assert "error      unknown (estimate: a second sweep at rtol 1e-13)" in sweep_summary(nothing, None)
+    assert np.isnan(nothing.attributes["error"])

@@ -12,8 +12,8 @@ import thermodynamics as laws
 
 import surfacechem
 from surfacechem import spatial
-from surfacechem.accuracy import FLOOR, relative_error
-from surfacechem.achieved import against_exact, against_tighter
+from surfacechem.accuracy import relative_error
+from surfacechem.achieved import against_exact, against_tighter, floor
 from surfacechem.assembly import assemble
 from surfacechem.case import names
 from surfacechem.errors import InputError
@@ -73,9 +73,10 @@ def test_the_error_of_cells_chosen_by_an_accuracy_is_that_against_many():
         "epoxy-cure-thick", {"bodies.laminate.conduction.cells": 128, "bodies.tool.conduction.cells": 32}
     )
     for name in ("phi", "T", "T_2"):
-        error = relative_error(chosen.dataset[name].values, many.dataset[name].values, FLOOR)
+        error = relative_error(chosen.dataset[name].values, many.dataset[name].values, floor(chosen.trajectory, name))
         assert error < 1e-4
-        assert chosen.accuracy.variables[name] == pytest.approx(error, rel=0.05)
+        # An estimate from two grids leaves out the next order, a few hundredths of itself here.
+        assert chosen.accuracy.variables[name] == pytest.approx(error, rel=0.1)
 
 
 @every_case
@@ -164,7 +165,11 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         ("coulomb-stop", "loading.p={ramp: {start: 30 kPa, rate: 10 MPa/s}}", "it misses the equation of v"),
         ("debonding", "loading.w_n={table: {times: [0 s, 9 s], values: [0, 9 um]}}", "it needs w_dot"),
         ("debonding-cooling", "loading.w_n.ramp.start=0.1 um", "its w_n is"),
-        ("compliant-debonding", "loading.g_n={table: {times: [0 s, 8 s], values: [0, 8.1 um]}}", "its g_n is"),
+        (
+            "compliant-debonding",
+            "loading.g_n={table: {times: [0 s, 8 s], values: [0, 8.1 um]}}",
+            "with g_1, speed, and the scene was changed",
+        ),
         ("compliant-debonding", "reference.g_f=30 um", "it is given for g_f = 3e-05 m; the scene has 2.425e-05 m"),
         ("rate-and-state-slip-law", "reference.v_step=9 um/s", "its v is 9e-06, the scene's 1e-05"),
         ("stick-slip-rebonding", "initial.phi=1e-9", "it starts from phi = 0, the scene from 1e-09"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from surfacechem import data, document, overrides, solvers
@@ -66,6 +66,8 @@ class Case:
     mechanism_text: str | None
     places: Mapping[str, Place]
     file: str
+    unused: str = ""
+    """Why the exact solution that the case names does not count after a change; empty where it does."""
 
     def system(self) -> System:
         """The assembled scene; errors have their place in the case file."""
@@ -116,13 +118,27 @@ def load_text(
 ) -> Case:
     """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given."""
     tree = document.parse(text, file or f"{name}.yaml")
+    unused = ""
     if overrides:
-        tree = _overridden(tree, overrides)
+        before, tree = tree, _overridden(tree, overrides)
+        tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     whole = csvtable.embedded(tree, str(base))
     if whole != tree:
         tree, text = whole, document.dump(whole)
-    return _read(tree, text, name, Source({}, str(base), mechanism_text))
+    return replace(_read(tree, text, name, Source({}, str(base), mechanism_text)), unused=unused)
+
+
+def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
+    """The document without an exact solution whose parameters were given for another scene, and why."""
+    old, new = ({key: child.plain() for key, child in (tree.value or {}).items()} for tree in (before, after))
+    scene = {*old, *new} - {"title", "source", "description", "run", "sweep", "reference"}
+    if all(old.get(key) == new.get(key) for key in scene) or old.get("reference") != new.get("reference"):
+        return after, ""
+    found = read_reference(after.value["reference"]) if "reference" in new else None
+    if found is None or not found.fixed:
+        return after, ""
+    return replace(after, value={key: child for key, child in after.value.items() if key != "reference"}), found.fixed
 
 
 def names() -> list[str]:

@@ -42,6 +42,14 @@ class Reference:
     options: Mapping[str, float] = field(default_factory=dict)
     place: Place | None = None
 
+    @property
+    def fixed(self) -> str:
+        """Why it belongs to no other scene than that of the case, in words; empty where it follows changes."""
+        if not self.options:
+            return ""
+        own = f"it is given with {', '.join(self.options)}, and the scene was changed"
+        return f"the exact solution {self.name} is not of this scene: {own}"
+
 
 def read_run(tree: Tree) -> Run:
     """The section ``run``."""

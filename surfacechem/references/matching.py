@@ -39,6 +39,9 @@ ROUNDING = 8 * float(np.finfo(float).eps)
 PROBES = 7
 """Times at which the equations are tested; as many stretches between events, where there are so many."""
 
+STEEPER = 10.0
+"""A solution jumps where it changes by so many times as much as over an equal time before."""
+
 EDGE = 0.01
 """Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
@@ -60,22 +63,37 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
 
 
 def beside_events(solution: Solution, run: Trajectory) -> dict[str, Array]:
-    """Exact values at the output times; where one of them is that of a jump, on the side on which the run has it."""
+    """Exact values at the output times; where one of them is that of a jump, on the side on which the run has it.
+
+    That may be a jump of the run, or one of the solution at the very end, of which rounding decides whether a run
+    still has it.
+    """
     times, jumps = run.result.times, np.array([jump.t for jump in run.jumps])
-    exact = solution(times)
-    if not len(jumps):
-        return exact
-    near = np.flatnonzero(np.abs(times[:, None] - jumps).min(axis=1) <= SIDE * times)
-    names = [*(state.name for state in run.model.system.states), *(item.name for item in run.model.system.outputs)]
-    ours = np.concatenate([run.result.outputs[near], run.outputs[near]], axis=1)
-    for way in (-SIDE, SIDE):
-        other = solution(times[near] * (1 + 2 * way))
-        for name, values in exact.items():
-            own = ours[:, names.index(name)]
-            nearer = np.abs(other[name] - own) < np.abs(values[near] - own)
-            exact[name] = np.array(values)
-            exact[name][near] = np.where(nearer, other[name], values[near])
+    exact = {name: np.array(values) for name, values in solution(times).items()}
+    near = np.any(np.abs(times[:, None] - jumps) <= SIDE * times[:, None], axis=1)
+    for way in (-SIDE, SIDE) if near.any() else ():
+        _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+    if len(times) and not near[-1]:
+        last = np.arange(len(times)) == len(times) - 1
+        before = solution(times[-1] * (1 - SIDE * np.array([2.0, 4.0])))
+        jumped = {
+            name: other[:1]
+            for name, other in before.items()
+            if abs(exact[name][-1] - other[0]) > STEEPER * abs(other[0] - other[1]) + SAME * abs(other[0])
+        }
+        _take_nearer(exact, jumped, run, last)
     return exact
+
+
+def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:
+    """Put other values at some outputs in the place of those that are farther from the run's."""
+    names = [*(state.name for state in run.model.system.states), *(item.name for item in run.model.system.outputs)]
+    ours = np.concatenate([run.result.outputs[at], run.outputs[at]], axis=1)
+    for name, other in others.items():
+        if name in names:
+            own = ours[:, names.index(name)]
+            nearer = np.abs(other - own) < np.abs(exact[name][at] - own)
+            exact[name][at] = np.where(nearer, other, exact[name][at])
 
 
 def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> Reference:

@@ -168,6 +168,10 @@ def largest_error(expected: Exact, trajectory: Trajectory) -> tuple[float, str]:
     ours = computed(trajectory)
     exact = expected.values(trajectory.result.times)
     known = {*expected.also, *(state.name for state in trajectory.model.system.states)}
-    errors = {name: relative_error(ours[name], np.asarray(exact[name]), FLOOR) for name in exact if name in known}
+    errors = {
+        name: relative_error(ours[name], np.asarray(exact[name]), FLOOR * float(np.max(np.abs(exact[name]))))
+        for name in exact
+        if name in known
+    }
     worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
     return errors[worst], f"in {worst}"

@@ -1,7 +1,7 @@
 """Errors of a run against the truth: final, largest and root mean square in time, and of the times of events.
 
-All are relative to the true value at the same time, or to FLOOR (states; 1 for other variables) of its largest value if
-that is more.
+All are relative to the true value at the same time, or to a floor if that is more: of a state the size at which its
+absolute tolerance is as much as the relative one, of another variable its largest value.
 """
 
 from __future__ import annotations
