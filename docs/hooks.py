@@ -22,7 +22,7 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.stability import page as matrix
 from surfacechem.stability import stability
 from surfacechem.stability.regimes import regimes
-from surfacechem.terms import Law, Spec, reads
+from surfacechem.terms import Law, Potential, Spec, reads
 
 PLACES = {
     "capacity": "bodies.NAME.capacity, with its parameters beside it",
@@ -165,6 +165,7 @@ def law_section(law: type[Law]) -> str:
     meanings = {name: quantity.long_name for name, quantity in VARIABLES.items()} | {"N_c": "nominal site density"}
     found = [f"{meanings[name]} `{name}`" for name in reads(getattr(law, law.formula)) if name in meanings]
     parts += [f"Reads: {', '.join(found)}."] if found else []
+    parts += [f"Per {law.per} area."] if issubclass(law, Potential) else []
     return "\n\n".join(parts)
 
 

@@ -23,7 +23,11 @@ from surfacechem.units import quotient
 
 @dataclass(frozen=True)
 class Spec:
-    """What a parameter is: unit ("[x]" stands for the unit of the loaded quantity), meaning and allowed range."""
+    """What a parameter is: unit ("[x]" stands for the unit of the loaded quantity), meaning and allowed range.
+
+    ``stretch`` is the power of the area stretch J_c with which the formula sees what is given: -1 where that is a
+    density per reference area of what stays with the material, and the formula reads one per current area.
+    """
 
     unit: str
     text: str
@@ -31,6 +35,7 @@ class Spec:
     at_least: float = -math.inf
     at_most: float = math.inf
     varies: bool = True
+    stretch: int = 0
 
     def resolved(self, x: str) -> Spec:
         """The specification with the unit that "[x]" stands for."""
@@ -69,12 +74,14 @@ def parameter(
     at_least: float = -math.inf,
     at_most: float = math.inf,
     varies: bool = True,
+    stretch: int = 0,
 ) -> Any:
     """A numeric parameter of a law, in SI units; ``varies`` lets a case make it depend on a variable by factors.
 
+    ``stretch`` is the power of the area stretch that multiplies it, see :class:`Spec`.
     With the default None the formula says what stands for what is not given.
     """
-    spec = Spec(unit, text, above, at_least, at_most, varies)
+    spec = Spec(unit, text, above, at_least, at_most, varies, stretch)
     return field(default=default, metadata={"spec": spec})
 
 

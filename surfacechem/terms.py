@@ -52,10 +52,16 @@ __all__ = [
 
 
 class Potential(Law):
-    """A term of the interface's Helmholtz free energy per unit reference area [J/m^2]."""
+    """A term of the interface's Helmholtz free energy per area [J/m^2].
+
+    As the surface stretches, its energy stays with the material (bonds, debris) or is a property of the surface that is
+    there (tractions, films): a law says which by ``per``.
+    """
 
     contract = "potential"
     formula = "energy"
+    per: ClassVar[Literal["reference", "current"]] = "reference"
+    """Area that the energy is per; the assembly multiplies those per current area by the area stretch."""
 
     energy: ClassVar[Callable[..., Expression]]
     repulsion: ClassVar[Callable[..., Expression]]

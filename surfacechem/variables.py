@@ -162,6 +162,13 @@ class Variables:
         return law.bind(values)
 
     def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
+        """The symbol of a parameter as the formula sees it: where the surface stretches, not always what is given."""
+        symbol = self._symbol(law, name, spec, suffix)
+        if spec.stretch and symbol is not None and self.has("J_c"):
+            return symbol * self.get("J_c", law) ** spec.stretch
+        return symbol
+
+    def _symbol(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
         value = getattr(law, name)
         path = f"{law.path}.{name}"
         if isinstance(value, Varying):

@@ -274,7 +274,6 @@ def test_what_stores_energy_cannot_jump(name):
 
 FOREIGN = {
     "p": (BondEnergy(K_0=varying(1.0, Linear(of="p", slope=1e-6))), {"p": Ramp(rate=1.0)}),
-    "J_c": (BondEnergy(K_0=varying(1.0, Linear(of="J_c", slope=0.1))), {"J_c": Ramp(start=1.0, rate=0.1)}),
     "T_1": (InterfaceCapacity(C_c=varying(1.0, LinearInTemperature(of="T_1", slope=1e-3))), {}),
 }
 

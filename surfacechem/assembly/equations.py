@@ -57,7 +57,7 @@ def _centre(build: Build, free: Mapping[str, Expression]) -> str:
 
 def _rates(build: Build) -> dict[Any, Expression]:
     """Time derivatives of what the free energy depends on beside temperature."""
-    rates = {bond.symbol: bond.dot for bond in build.bonding.values()} | _gaps(build)
+    rates = {bond.symbol: bond.dot for bond in build.bonding.values()} | _gaps(build) | _stretching(build)
     phi = symengine.Symbol("phi")
     if phi not in rates and depends(build.psi, phi):
         rates[phi] = build.rate_of("phi")
@@ -78,6 +78,19 @@ def _gaps(build: Build) -> dict[Any, Expression]:
                 build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
             _give_power(build, power)
     return rates
+
+
+def _stretching(build: Build) -> dict[Any, Expression]:
+    """Rate of the area stretch where the potential depends on it; books the work of stretching the surface."""
+    J_c = symengine.Symbol("J_c")
+    if not depends(build.psi, J_c):
+        return {}
+    rate = build.rate_of("J_c")
+    power = derivative(build.psi, J_c) * rate
+    if power != 0:
+        build.supply("W_J", "work done in stretching the surface", power, None)
+        _give_power(build, power)
+    return {J_c: rate}
 
 
 def _give_power(build: Build, power: Expression) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -171,7 +171,9 @@ def free_energy(build: Build) -> None:
         )
     _tractions(build)
     if depends(build.psi, symengine.Symbol("g_n")):
-        borne = [build.variables.call(b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()]
+        borne = [
+            _per_reference_area(build, b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()
+        ]
         contact = partial(_contact_pressure, build, [_in_modes(build, F) for F in borne])
         build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
         _warn_of_net_pressure(build)
@@ -196,7 +198,7 @@ def _energies(
     friction slides on.
     """
     series = in_series(build)
-    found = {law: build.variables.call(b, b.statement, gaps[law]) for law, b in bounds.items()}
+    found = {law: _per_reference_area(build, b, b.statement, gaps[law]) for law, b in bounds.items()}
     for law in in_parallel(build):
         if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
             build.motion.rubs *= build.variables.call(bounds[law], unbonded)
@@ -245,6 +247,21 @@ def _reads_net_pressure(law: Law) -> bool:
     return law_reads(law, "p") and not (isinstance(law, UnderPressure) and law.pressure == "contact")
 
 
+def _per_reference_area(
+    build: Build,
+    law: Potential,
+    formula: Callable[..., Expression],
+    gaps: Mapping[str, Expression] | None = None,
+) -> Expression:
+    """Free energy of a bound law per reference area, as a function of the area stretch where it depends on that."""
+    F = build.variables.call(law, formula, gaps)
+    if not build.variables.has("J_c"):
+        return F
+    F = build.stretch * F if law.per == "current" else F
+    n_c = symengine.Symbol("n_c")
+    return F.subs({n_c: build.variables.get("N_c", law) / build.stretch}) if depends(F, n_c) else F
+
+
 def _sides_of_touch(build: Build) -> None:
     """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
@@ -282,8 +299,8 @@ def _rests(build: Build) -> bool:
 
 
 def _known(build: Build) -> set[Any]:
-    """What the balance of the interface accounts for: its own temperature, bonds and gaps."""
-    names = {"phi", "g_n", "g_t", "u_t", "u_t2", *build.bonding}
+    """What the balance of the interface accounts for: its own temperature, bonds, gaps and the stretch of its area."""
+    names = {"phi", "g_n", "g_t", "u_t", "u_t2", "J_c", *build.bonding}
     if build.interface.temperature is not None:
         names.add(build.node_of["interface"].name)
     return {symengine.Symbol(name) for name in names}

@@ -12,6 +12,8 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Body
 
 GAPS = ("g_n", "g_t", "u_t", "u_t2")
+GEOMETRY = (*GAPS, "J_c")
+"""What moves the surfaces rather than their bonds."""
 
 
 def by_channel(build: Build, k: int, body: Body) -> Expression:
@@ -57,7 +59,7 @@ def _friction(build: Build) -> Expression:
 def _reaction(build: Build, T: Expression) -> Expression:
     """Heat of all reactions: minus the change of the internal energy with the bonds."""
     U = balances.internal_energy(build.psi, T)
-    bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GAPS}
+    bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
     return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
 
 
@@ -65,5 +67,8 @@ def _exchanges(build: Build) -> bool:
     """Whether anything but friction and reactions brings heat to the bodies and the interface."""
     supplied = any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
     return (
-        bool(build.scene.heat) or supplied or any(str(x) in GAPS for x in build.rates) or bool(build.motion.far_fields)
+        bool(build.scene.heat)
+        or supplied
+        or any(str(x) in GEOMETRY for x in build.rates)
+        or bool(build.motion.far_fields)
     )

@@ -9,12 +9,15 @@ from surfacechem.terms import Potential, parameter
 
 
 class InteractingSites(Potential):
-    """Densities of sites on both surfaces, strength and range of the interaction of a pair."""
+    """Densities of sites on both surfaces, strength and range of the interaction of a pair.
+
+    The sites stay with the surfaces: their densities are those on the reference area.
+    """
 
     positive = ("g_n",)
 
-    n_1: float = parameter("1/m^2", "density of interacting sites on body 1", at_least=0)
-    n_2: float = parameter("1/m^2", "density of interacting sites on body 2", at_least=0)
+    n_1: float = parameter("1/m^2", "density of interacting sites on body 1", at_least=0, stretch=-1)
+    n_2: float = parameter("1/m^2", "density of interacting sites on body 2", at_least=0, stretch=-1)
     psi_0: float = parameter("J", "interaction energy of a pair", at_least=0)
     g_0: float = parameter("m", "range of the interaction", above=0)
 

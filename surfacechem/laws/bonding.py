@@ -1,8 +1,8 @@
-"""Chemical part of the interface's free energy: bond energy, linear enthalpy, lattice gas, bond springs."""
+"""Chemical part of the interface's free energy: bond energy, linear enthalpy, mixtures, bond springs."""
 
 from __future__ import annotations
 
-from surfacechem.expressions import Expression, mixing
+from surfacechem.expressions import Expression, log, mixing
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.terms import Potential, parameter
 
@@ -71,6 +71,35 @@ class LatticeGas(Potential):
     def energy(self, phi: Expression, T_c: Expression, N_c: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return N_c * BOLTZMANN * T_c * (mixing(phi) + mixing(1 - phi)) - N_c * self.epsilon * phi
+
+
+class PartnerMixing(Potential):
+    r"""Ideal mixing of bonds and of free partners that move on both surfaces, with a constant bond energy.
+
+    .. math:: \psi = -\varepsilon n_b + k_B T \sum_{x = b, 1, 2} n_x' [\ln (n_x' a) - 1], \quad
+              n_b = n_c \phi, \quad n_{1,2}' = n_{1,2} - n_b
+
+    The natural partner of bimolecular kinetics: equilibrium is :math:`n_b / (n_1' n_2') = a\,e^{\varepsilon / k_B T}`,
+    its :math:`k_f / k_r`. Partners that have more room meet less often: stretching the surface breaks bonds, and takes
+    up the work :math:`k_B T \ln J_c` of each particle that moves on it. Source: ideal gas in two dimensions (Hill, An
+    Introduction to Statistical Thermodynamics, 1960, ch. 4 and 10); K in two dimensions as in Dembo, Torney, Saxman &
+    Hammer (1988), doi 10.1098/rspb.1988.0038. Per current area. 0 < phi < min(n_1, n_2) / n_c.
+
+    >>> mixing = PartnerMixing(epsilon=6e-20, a=1e-18)
+    >>> round(mixing.energy(phi=0.5, T_c=300.0, n_c=1e16, n_1=1e16, n_2=2e16), 9)
+    -0.000883927
+    """
+
+    per = "current"
+
+    epsilon: float = parameter("J", "energy released per bond")
+    a: float = parameter("m^2", "area of a site, from which the bond energy counts", above=0)
+
+    def energy(self, phi: Expression, T_c: Expression, n_c: Expression, n_1: Expression, n_2: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        parts = (phi, n_c), (1 - phi * n_c / n_1, n_1), (1 - phi * n_c / n_2, n_2)
+        moving = sum(n * (mixing(part) + part * (log(n * self.a) - 1)) for part, n in parts)
+        return BOLTZMANN * T_c * moving - self.epsilon * n_c * phi
 
 
 class BondSprings(Potential):

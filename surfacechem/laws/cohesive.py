@@ -27,7 +27,8 @@ class ExponentialCohesiveZone(TangentialPotential):
     concave in T takes capacity away.
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. ex:psi_czm and ex:bt_czm, with the sign of tension and a signed
-    normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible.
+    normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible. Per current
+    area.
 
     >>> zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
     >>> round(zone.energy(g_n=0.0), 10), round(zone.energy(g_n=1e-8), 10)
@@ -35,6 +36,8 @@ class ExponentialCohesiveZone(TangentialPotential):
     >>> round(zone.energy(g_n=0.6e-8, g_t=0.8e-8), 10), round(zone.energy(g_n=-1e-8, g_t=1e-8), 10)
     (-0.02, 0.03)
     """
+
+    per = "current"
 
     t_max: float = parameter("Pa", "strength, largest tensile traction", at_least=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
@@ -70,12 +73,14 @@ class XuNeedleman(TangentialPotential):
 
     Source: Xu & Needleman (1993), doi 10.1088/0965-0393/1/2/001. Any g_n, g_t; r other than 1. For q other than 1 the
     coupling is known to be weakly founded: incomplete sliding can leave more normal work than there was
-    (van den Bosch, Schreurs & Geers, Engineering Fracture Mechanics 73, 2006). Reversible.
+    (van den Bosch, Schreurs & Geers, Engineering Fracture Mechanics 73, 2006). Reversible. Per current area.
 
     >>> zone = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8)
     >>> zone.energy(g_n=0.0, g_t=0.0), round(zone.energy(g_n=1e-8, g_t=2e-8), 10)
     (-0.1, -0.0270670566)
     """
+
+    per = "current"
 
     Phi_n: float = parameter("J/m^2", "work of normal separation", at_least=0)
     g_0: float = parameter("m", "normal gap at the normal strength", above=0)

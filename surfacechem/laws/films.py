@@ -129,12 +129,15 @@ class FilmCapacity(Potential):
     .. math:: \Psi = d_m f_m(T_c), \quad -T_c\,f_m'' = \rho_m c_{p,m}
 
     :math:`f_m` is the exact double integral of the heat capacity, zero with its slope at the start. The film keeps its
-    thickness; the work of its thermal expansion goes to its surroundings at constant pressure. Source: classical
+    thickness; the work of its thermal expansion goes to its surroundings at constant pressure. Per current area: what
+    flows in as the surface stretches comes from the reference temperature, reversibly. Source: classical
     thermodynamics.
 
     >>> FilmCapacity().energy(d_m=1e-6, f_m=-2.5e7)
     -25.0
     """
+
+    per = "current"
 
     def energy(self, d_m: Expression, f_m: Expression) -> Expression:
         """Free energy [J/m^2]."""

@@ -116,7 +116,9 @@ class Bimolecular(RateLaw):
 
     .. math:: R = k_f (n_1 - n_c \phi)(n_2 - n_c \phi) - k_r n_c \phi
 
-    Source: Sauer, Duong & Mandadapu (2021), section 4, for n_b = n_c phi bonds. phi <= min(n_1, n_2) / n_c.
+    Source: Sauer, Duong & Mandadapu (2021), section 4, for n_b = n_c phi bonds. phi <= min(n_1, n_2) / n_c. Admissible
+    with `partner-mixing` if :math:`k_f / k_r = a\,e^{\varepsilon / k_B T}`. Its equilibrium depends on the densities,
+    and so on the stretch of the surface, as that potential does.
 
     >>> Bimolecular(k_f=1e-16, k_r=1.0).rate(phi=0.5, n_c=1e16, n_1=1e16, n_2=2e16)
     2500000000000000.0

@@ -1,7 +1,8 @@
 r"""Long-range interaction of surfaces that do not touch: Lennard-Jones type, van der Waals, electrostatic.
 
-Between flats the energy is per area. Between a sphere and a plane it is divided by a reference area, the one that all
-other quantities of the scene are per: the tension is the attractive force over that area. The force of a sphere of
+Between flats the energy is per current area. Between a sphere and a plane it is divided by a reference area, the one
+that all other quantities of the scene are per: the tension is the attractive force over that area. Sites and charges
+stay with the surfaces, so that both thin out as these stretch; radii stay. The force of a sphere of
 sites on its surface is exact, :math:`F = -2\pi R\,[W(g_n) - W(g_n + 2R)]` with the energy W(g_n) between flats.
 Derjaguin's approximation drops the second term.
 """
@@ -38,6 +39,8 @@ class LennardJonesFlatFlat(InteractingSites):
     >>> round(flats.energy(g_n=3e-9), 12)
     -0.002261946673
     """
+
+    per = "current"
 
     @property
     def peaks(self) -> Mapping[str, Expression]:
@@ -144,6 +147,8 @@ class VanDerWaalsFlatFlat(Potential):
     -0.063331
     """
 
+    per = "current"
+
     A_H: float = parameter("J", "Hamaker constant", at_least=0)
     D_0: float = parameter("m", "distance of the outermost atoms in contact", default=ATOMIC, above=0)
 
@@ -207,8 +212,10 @@ class ElectrostaticFlatFlat(Potential):
     0.00112941
     """
 
-    s_1: float = parameter("C/m^2", "charge density of body 1")
-    s_2: float = parameter("C/m^2", "charge density of body 2")
+    per = "current"
+
+    s_1: float = parameter("C/m^2", "charge density of body 1", stretch=-1)
+    s_2: float = parameter("C/m^2", "charge density of body 2", stretch=-1)
     epsilon: float = parameter("F/m", "permittivity of the medium", default=8.8541878128e-12, above=0)
 
     def energy(self, g_n: Expression) -> Expression:
@@ -232,8 +239,8 @@ class ElectrostaticSpherePlane(Potential):
     0.01419257
     """
 
-    s_1: float = parameter("C/m^2", "charge density of the sphere")
-    s_2: float = parameter("C/m^2", "charge density of the plane")
+    s_1: float = parameter("C/m^2", "charge density of the sphere", stretch=-1)
+    s_2: float = parameter("C/m^2", "charge density of the plane", stretch=-1)
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
     epsilon: float = parameter("F/m", "permittivity of the medium", default=8.8541878128e-12, above=0)

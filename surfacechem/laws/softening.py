@@ -26,8 +26,8 @@ class CompliantDebonding(RateLaw):
     (1.0, 0.166666666667)
     """
 
-    t_max: float = parameter("Pa", "tensile strength", above=0)
-    E_b: float = parameter("Pa/m", "stiffness of complete bonding", above=0)
+    t_max: float = parameter("Pa", "tensile strength", above=0, stretch=1)
+    E_b: float = parameter("Pa/m", "stiffness of complete bonding, per reference area", above=0)
     g_f: float = parameter("m", "gap at which the last bonds break", above=0)
 
     def peak(self) -> Expression:
