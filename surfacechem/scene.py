@@ -99,7 +99,9 @@ class Mounting(Law):
     contract = "mechanics"
 
     k: float = parameter("Pa/m", "stiffness of both bodies in series", default=0.0, at_least=0, varies=False)
-    m: float = parameter("kg/m^2", "effective mass", default=0.0, at_least=0, varies=False)
+    m: float = parameter(
+        "kg/m^2", "reduced mass of both bodies, m_1 m_2 / (m_1 + m_2)", default=0.0, at_least=0, varies=False
+    )
     c_b: float = parameter(
         "Pa s/m", "damper beside the stiffness; heats the bodies", default=0.0, at_least=0, varies=False
     )

@@ -52,6 +52,9 @@ DATASET_NAMES = {
 """Names that differ in the dataset, where no two may be the same but for their case."""
 
 
+CLASSES = {"exothermic": 1, "endothermic": -1}
+"""Classes of reactions, with the sign of their heat."""
+
 EARLIER = "ended earlier"
 """What is said of a second run that did not come as far."""
 
@@ -270,6 +273,7 @@ class Solution:
             "reason": self.reason,
             "warnings": "; ".join(self.warnings) or "none",
             "regime": self.trajectory.model.system.regime,
+            **self._reaction(),
             "solver": run.solver,
             "rtol": float(run.rtol),
             **{f"cells_{p.number}": len(p.points) - 1 for p in self.trajectory.model.system.profiles},
@@ -292,6 +296,15 @@ class Solution:
             return {}
         asked = {} if found.asked is None else {"error_asked": float(found.asked)}
         return {"error": float(found.error), "error_source": found.source, **asked}
+
+    def _reaction(self) -> dict[str, str]:
+        """Class of what the reactions do, where they have a heat; what the tolerance does not resolve is none."""
+        heat = self.trajectory.everywhere.get("q_reaction")
+        if heat is None:
+            return {}
+        felt = self.trajectory.run.rtol * _largest(heat)
+        found = [name for name, sign in CLASSES.items() if np.any(sign * heat > felt)]
+        return {"reaction": " and ".join(found) or "isothermic"}
 
     def _departures(self) -> dict[str, str]:
         """In which way the run was not that of its case, for running it again."""

@@ -181,10 +181,17 @@ def test_bonds_that_soften_bear_the_same_traction_on_the_current_area():
     stretched = same(make, ["phi", "t_n", "g_n"], times=np.linspace(0.0, 1.4, 15))
     assert max(stretched["t_n"]) == pytest.approx(3e5, rel=0.1)
     assert min(stretched["phi"]) < 0.9
-    moving = make(1.0)
-    moving = dataclasses.replace(moving, loading=moving.loading | {"J_c": Ramp(start=1.0, rate=0.1)})
-    with pytest.raises(InputError, match="compliant-debonding holds for a surface of constant stretch"):
-        assemble(moving)
+
+
+def test_bonds_stay_on_their_envelope_as_the_surface_stretches():
+    law = CompliantDebonding(t_max=3e5, E_b=1e14, g_f=4e-8)
+    plain = mounted(1.0, [BondStiffness(E_b=1e14, E_n=1e15)], reactions=[law])
+    scene = dataclasses.replace(plain, loading=plain.loading | {"J_c": Ramp(start=1.0, rate=0.1)})
+    values = computed(Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 1.4, 15))))
+    areas = 1.0 + 0.1 * np.linspace(0.0, 1.4, 15)
+    left = [law.bind({"t_max": 3e5 * area}).envelope(g_n=g) for area, g in zip(areas, values["g_n"], strict=True)]
+    assert values["phi"] == pytest.approx(np.minimum(left, 1.0), rel=1e-7)
+    assert values["phi"][-1] < 0.9
 
 
 # -- work of stretching -----------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ def by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
     """
     node = build.node_of[body.name]
     share = -node.T * balances.second(node.energies[body.name], node.T) / _capacity(build, node)
-    made = {"friction": _friction(build), "reaction": _reaction(build, node.T)}
+    made = {"friction": _friction(build), "reaction": heat_of_reaction(build)}
     parts = {name: share * heat for name, heat in made.items() if heat != 0}
     if not parts or len(parts) + _exchanges(build) < 2:
         return
@@ -56,9 +56,10 @@ def _friction(build: Build) -> Expression:
     return symengine.Add(*(symengine.Symbol(f"D_{label}") for label in build.dissipation if label in build.frictions))
 
 
-def _reaction(build: Build, T: Expression) -> Expression:
+def heat_of_reaction(build: Build) -> Expression:
     """Heat of all reactions: minus the change of the internal energy with the bonds."""
-    U = balances.internal_energy(build.psi, T)
+    node = build.node_of.get("interface")
+    U = balances.internal_energy(build.psi, node.T) if node else build.psi
     bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
     return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
 

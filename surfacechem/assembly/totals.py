@@ -7,10 +7,10 @@ import symengine
 from surfacechem import balances
 from surfacechem.assembly.build import Build
 from surfacechem.assembly.exchange import takers
-from surfacechem.assembly.sources import by_channel, by_source
+from surfacechem.assembly.sources import GAPS, GEOMETRY, by_channel, by_source, heat_of_reaction
 from surfacechem.balances import Node
 from surfacechem.errors import InputError
-from surfacechem.expressions import Expression
+from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
 from surfacechem.system import Account
@@ -32,12 +32,27 @@ def totals(build: Build) -> None:
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
+    _enthalpy(build)
     for mode in build.modes:
         if len(mode.words) > 1:
             words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
             build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
     if build.interface.bonds:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
+
+
+def _enthalpy(build: Build) -> None:
+    """Heat of reaction and contact enthalpy per bonding site, where bonds alone change on the interface."""
+    bonds = [x for x in build.rates if str(x) not in GEOMETRY and depends(build.psi, x)]
+    if not bonds or any(law.taken is not None for law in build.interface.reactions):
+        return
+    text = "heat of reaction at constant temperature and gap, positive where exothermic"
+    build.name(Quantity("q_reaction", "W/m^2", text), heat_of_reaction(build))
+    if build.variables.has("N_c"):
+        borne = sum((symengine.Symbol(g) * derivative(build.psi, symengine.Symbol(g)) for g in GAPS), 0)
+        site = build.variables.get("N_c", "the contact enthalpy")
+        text = "contact enthalpy per bonding site"
+        build.name(Quantity("e_c", "J", text), (symengine.Symbol("U_c") - borne) / site)
 
 
 def _sum(terms: list[Expression]) -> Expression:

@@ -27,8 +27,8 @@ class ExponentialCohesiveZone(TangentialPotential):
     concave in T takes capacity away.
 
     Source: Sauer, Duong & Mandadapu (2021), eqs. ex:psi_czm and ex:bt_czm, with the sign of tension and a signed
-    normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible. Per current
-    area.
+    normal gap: with its magnitude in the norm the zone would soften in compression too. Any g_n, g_t; reversible.
+    Per current area.
 
     >>> zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
     >>> round(zone.energy(g_n=0.0), 10), round(zone.energy(g_n=1e-8), 10)

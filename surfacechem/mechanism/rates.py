@@ -90,11 +90,11 @@ class SurfaceReaction(MechanismReaction):
     r"""Mass action on a surface, per current area.
 
     .. math:: R = k(T) \left[ \prod_k n_k^{\,r_k}
-              - e^{\Delta g / k_B T} \prod_k (n_k^\circ)^{-\nu_k} \prod_k n_k^{\,p_k} \right],
+              - e^{(\Delta g + \Delta w) / k_B T} \prod_k (n_k^\circ)^{-\nu_k} \prod_k n_k^{\,p_k} \right],
               \quad n_k = n_k^\circ \theta_k
 
     r are the orders, p the coefficients of the products, :math:`\nu = p - r`, and :math:`n_k^\circ = N_k / J_c` the
-    amount of species k per current area at full coverage. The bracket vanishes where the reaction's affinity does.
+    amount of species k per current area at full coverage, w the elastic energy of bonds across the gap. The bracket vanishes where the reaction's affinity does.
     """
 
     kind: ClassVar[str] = ""
