@@ -43,7 +43,7 @@ def test_the_class_of_a_reaction(energy, expected, tmp_path):
     data = solution.dataset
     assert solution.attributes["reaction"] == expected
     assert data["phi"][-1] > 0.5
-    kept = -sum(data[name] for name in data if name.startswith("Q_T") or name.startswith("Q_300"))
+    kept = -sum(data[name] for name in data if name.startswith("Q_T"))
     np.testing.assert_allclose(data["q_reaction"], kept, atol=1e-12)
 
 

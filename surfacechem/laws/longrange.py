@@ -33,7 +33,8 @@ class LennardJonesFlatFlat(InteractingSites):
     The sum of :math:`\psi_{12} = \psi_0 [\frac1{45} (g_0/r)^{10} - \frac13 (g_0/r)^4]` over all pairs. No traction at
     :math:`g_0 15^{-1/6}`, where the adhesion energy is :math:`\frac{15^{1/3}}8 A g_0^2`; strength
     :math:`\frac{2\sqrt5}9 A g_0` at :math:`g_0 5^{-1/6}`. Source: Sauer, Duong & Mandadapu (2021), eqs. e:psi12ex and
-    e:bt_sr. g_n > 0; below :math:`0.01\,g_0` the energy goes on as its parabola.
+    e:bt_sr. g_n > 0; below :math:`0.01\,g_0` the energy goes on as its parabola. Per current area, of densities on the
+    reference area.
 
     >>> flats = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
     >>> round(flats.energy(g_n=3e-9), 12)
@@ -141,7 +142,7 @@ class VanDerWaalsFlatFlat(Potential):
     bear it.
 
     Source: Hamaker (1937), doi 10.1016/S0031-8914(37)80203-7; cut-off of Israelachvili, Intermolecular and Surface
-    Forces (2011), ch. 13. Not retarded: gaps below about 10 nm.
+    Forces (2011), ch. 13. Not retarded: gaps below about 10 nm. Per current area.
 
     >>> round(VanDerWaalsFlatFlat(A_H=6.5e-20).energy(g_n=0.0), 6)
     -0.063331
@@ -206,7 +207,7 @@ class ElectrostaticFlatFlat(Potential):
 
     Charges of one sign repel. The traction does not fall with the gap as long as that is small against the flats.
     Source: Coulomb's law summed over two planes (Jackson, Classical Electrodynamics, 1999, ch. 1); Sauer, Duong &
-    Mandadapu (2021), remark r:59. Fixed charges; any g_n.
+    Mandadapu (2021), remark r:59. Fixed charges; any g_n. Per current area, of charge densities on the reference area.
 
     >>> round(ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4).energy(g_n=1e-6), 8)
     0.00112941

@@ -94,7 +94,8 @@ class SurfaceReaction(MechanismReaction):
               \quad n_k = n_k^\circ \theta_k
 
     r are the orders, p the coefficients of the products, :math:`\nu = p - r`, and :math:`n_k^\circ = N_k / J_c` the
-    amount of species k per current area at full coverage, w the elastic energy of bonds across the gap. The bracket vanishes where the reaction's affinity does.
+    amount of species k per current area at full coverage; w is the elastic energy of bonds across the gap. The bracket
+    vanishes where the reaction's affinity does.
     """
 
     kind: ClassVar[str] = ""
