@@ -50,7 +50,7 @@ def sample(law, on: float, **given: float):
         stated = per_reference or issubclass(law, BodyEnergy) or spec.stretch == -1 or "per reference" in spec.text
         stated = stated or spec.unit == "J s/m^2"
         values[name] = min(max(usual, low + 0.1 * (usual < low)), high) * on ** (EXTENSIVE.get(spec.unit, 0) * stated)
-    return law(**values, **{name: OPTIONS[name] for name, _ in law.options()})
+    return law(**values, **{name: OPTIONS[name] for name, _ in law.options() if name in OPTIONS})
 
 
 def scene(on: float, potentials=(), loading=(), C=50.0, heat=(), **more) -> Scene:
