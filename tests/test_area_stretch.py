@@ -189,7 +189,10 @@ def test_bonds_stay_on_their_envelope_as_the_surface_stretches():
     scene = dataclasses.replace(plain, loading=plain.loading | {"J_c": Ramp(start=1.0, rate=0.1)})
     values = computed(Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 1.4, 15))))
     areas = 1.0 + 0.1 * np.linspace(0.0, 1.4, 15)
-    left = [law.bind({"t_max": 3e5 * area}).envelope(g_n=g) for area, g in zip(areas, values["g_n"], strict=True)]
+    left = [
+        law.bind({"t_max": float(3e5 * area)}).envelope(g_n=float(g))
+        for area, g in zip(areas, values["g_n"], strict=True)
+    ]
     assert values["phi"] == pytest.approx(np.minimum(left, 1.0), rel=1e-7)
     assert values["phi"][-1] < 0.9
 
