@@ -16,13 +16,16 @@ from surfacechem.achieved import computed
 from surfacechem.case import Case
 from surfacechem.errors import InputError
 from surfacechem.integrate import OWN, Model, Run, Trajectory
+from surfacechem.stability.condition import condition
 from surfacechem.stability.regime import Exact, Problem, Refused, Regime, Stops
 
 log = logging.getLogger(__name__)
 
-SOLVED, REFUSED, FAILED, WRONG = "solved", "refused", "failed", "wrong"
-OUTCOMES = (SOLVED, REFUSED, FAILED, WRONG)
-"""Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer that does not."""
+SOLVED, REFUSED, FAILED, WRONG, SENSITIVE = "solved", "refused", "failed", "wrong", "sensitive"
+OUTCOMES = (SOLVED, REFUSED, FAILED, WRONG, SENSITIVE)
+"""Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer; an answer to a
+problem whose condition leaves no digits at the tolerance.
+"""
 
 RTOL, STEPS = 1e-10, 1500
 """Tolerance of every solver, and the steps after which a run has failed."""
@@ -47,6 +50,13 @@ class Cell:
     residuals: int
     seconds: float
     reason: str
+    condition: float = math.nan
+    """Condition number of the problem: relative change of its answer over that of its data; none where not known."""
+
+    @property
+    def possible(self) -> float:
+        """Digits that rounding of the data leaves to any solver."""
+        return digits_left(self.condition, np.finfo(float).eps)
 
     @property
     def kept(self) -> float:
@@ -98,7 +108,17 @@ def attempt(problem: Problem, solvers: Sequence[str] = SOLVERS, rtol: float = RT
         model = Model(read(problem).system())
     except InputError as error:
         return [_refusal(problem, error)] * len(solvers)
-    return [solve(problem, model, solver, rtol) for solver in solvers]
+    known = condition(problem, [state.name for state in model.system.states])
+    return [replace(solve(problem, model, solver, rtol, known), condition=known) for solver in solvers]
+
+
+def digits_left(condition: float, change: float) -> float:
+    """Digits of an answer that a relative change of the data leaves.
+
+    >>> round(digits_left(1e6, 1e-10), 9), digits_left(1.0, 1e-20), digits_left(1e20, 1e-10)
+    (4.0, 16.0, 0.0)
+    """
+    return digits_of(condition * change) if math.isfinite(condition) else math.nan
 
 
 def read(problem: Problem) -> Case:
@@ -109,8 +129,8 @@ def read(problem: Problem) -> Case:
     return replace(case, reference=None)  # the regime has its own expectation
 
 
-def solve(problem: Problem, model: Model, solver: str, rtol: float) -> Cell:
-    """One run and what came of it."""
+def solve(problem: Problem, model: Model, solver: str, rtol: float, known: float = math.nan) -> Cell:
+    """One run and what came of it, by the ``known`` condition of its problem."""
     times = (0.0, *problem.times) if problem.times[0] else tuple(problem.times)
     run = Run(times=times, rtol=rtol, solver=solver, max_steps=STEPS)
     try:
@@ -118,6 +138,8 @@ def solve(problem: Problem, model: Model, solver: str, rtol: float) -> Cell:
             warnings.simplefilter("ignore")  # libraries warn of what the status says
             trajectory = model.solve(run)
             outcome, digits, reason = _judged(problem, trajectory)
+        if outcome in (SOLVED, REFUSED) and digits < LEAST:
+            outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
     except InputError as error:
         return _refusal(problem, error)
     counters = trajectory.result.counters
@@ -138,18 +160,13 @@ def _judged(problem: Problem, trajectory: Trajectory) -> tuple[str, float, str]:
     if isinstance(expected, Stops):
         if status != "stopped" or expected.reason not in reason:
             return WRONG, 0.0, reason
-        return _graded(REFUSED, abs(trajectory.result.t - expected.t) / (expected.t or 1.0), reason)
+        return REFUSED, digits_of(abs(trajectory.result.t - expected.t) / (expected.t or 1.0)), reason
     if status == "stopped" or isinstance(expected, Refused):
         return (FAILED if status == "stopped" else WRONG), 0.0, reason
     if expected.events is not None and len(trajectory.jumps) != expected.events:
         return WRONG, 0.0, f"{len(trajectory.jumps)} events, not {expected.events}"
     error, where = largest_error(expected, trajectory)
-    return _graded(SOLVED, error, where)
-
-
-def _graded(outcome: str, error: float, reason: str) -> tuple[str, float, str]:
-    found = digits_of(error)
-    return (outcome if found >= LEAST else WRONG), found, reason
+    return SOLVED, digits_of(error), where
 
 
 def digits_of(error: float) -> float:

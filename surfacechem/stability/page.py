@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,17 @@ import numpy as np
 from surfacechem.netcdf import Column
 from surfacechem.solvers import names as known_solvers
 from surfacechem.stability.figure import COLOURS, MARKS
-from surfacechem.stability.matrix import FAILED, LEAST, MOST, OUTCOMES, REFUSED, STEPS, WRONG, Cell, Matrix, Row
+from surfacechem.stability.matrix import (
+    FAILED,
+    LEAST,
+    MOST,
+    OUTCOMES,
+    STEPS,
+    Cell,
+    Matrix,
+    Row,
+    digits_left,
+)
 from surfacechem.stability.search import Corner
 from surfacechem.studyreport import Page, Section, Table
 
@@ -22,7 +33,9 @@ TITLE = "Stability of the solvers in dangerous regimes"
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
     "the right reason, with the digits of the time of its end. ×: failed, and said so. !: an answer that is wrong, to "
-    f"less than {LEAST:g} digits."
+    f"less than {LEAST:g} digits. ~: so few digits, too, but the problem leaves no more at this tolerance. Its "
+    "condition number is the relative change of the answer over that of the data: what rounding of the data, or a "
+    "tolerance, changes by itself. Possible digits are those that rounding leaves."
 )
 
 
@@ -32,8 +45,9 @@ def cell_text(cell: Cell) -> str:
     >>> cell_text(Cell("solved", 9.87, 20, 300, 1e-4, "in T")), cell_text(Cell("failed", 0.0, 0, 0, 0.0, "stiff"))
     ('9.9', '×')
     """
-    digits = f"{cell.digits:.1f}"
-    return {REFUSED: f"R {digits}", FAILED: MARKS[FAILED], WRONG: f"! {digits}"}.get(cell.outcome, digits)
+    if cell.outcome == FAILED:
+        return MARKS[FAILED]
+    return " ".join([*([MARKS[cell.outcome]] if cell.outcome in MARKS else []), f"{cell.digits:.1f}"])
 
 
 def kept(row: Row, solver: int) -> str:
@@ -51,19 +65,46 @@ def summary(matrix: Matrix) -> Table:
     for row in matrix.rows:
         label = row.regime.label
         span = f"{row.regime.symbol}: {label(row.values[0])} .. {label(row.values[-1])}"
-        rows.append((row.regime.name, span, *(kept(row, j) for j in range(len(matrix.solvers)))))
-    caption = f"Least digits kept over all values, at rtol {matrix.rtol:g}"
-    return Table(("regime", "from .. to", *matrix.solvers), rows, caption)
+        worst = max((cells[0].condition for cells in row.cells if math.isfinite(cells[0].condition)), default=math.nan)
+        told = condition_texts(worst, matrix.rtol)
+        rows.append((row.regime.name, span, *told, *(kept(row, j) for j in range(len(matrix.solvers)))))
+    caption = f"Least digits kept over all values, at rtol {matrix.rtol:g}, and the largest condition number"
+    return Table(("regime", "from .. to", *condition_headings(matrix.rtol), *matrix.solvers), rows, caption)
 
 
-def details(row: Row, solvers: Sequence[str]) -> Table:
+def condition_headings(rtol: float) -> tuple[str, str, str]:
+    """Headings of a condition number, the digits that are possible, and those that it leaves at the tolerance."""
+    return "condition", "possible", f"at rtol {rtol:g}"
+
+
+def condition_texts(condition: float, rtol: float) -> tuple[str, str, str]:
+    """A condition number, the digits that are possible, and those that it leaves at the tolerance.
+
+    >>> condition_texts(5e11, 1e-10), condition_texts(math.nan, 1e-10)
+    (('5e+11', '4.0', '0.0'), ('', '', ''))
+    """
+    if not math.isfinite(condition):
+        return "", "", ""
+    changes = (np.finfo(float).eps, rtol)
+    possible, left = (f"{digits_left(condition, change):.1f}" for change in changes)
+    return f"{condition:.0e}", possible, left
+
+
+def details(row: Row, solvers: Sequence[str], rtol: float) -> Table:
     """Every cell of a regime, with what was said of the first solver's."""
     rows = [
-        (row.regime.label(value), *(cell_text(cell) for cell in cells), str(cells[0].steps), cells[0].reason)
+        (
+            row.regime.label(value),
+            *condition_texts(cells[0].condition, rtol),
+            *(cell_text(cell) for cell in cells),
+            str(cells[0].steps),
+            cells[0].reason,
+        )
         for value, cells in zip(row.values, row.cells, strict=True)
     ]
     marked = [i for i, cells in enumerate(row.cells) if any(cell.outcome in COLOURS for cell in cells)]
-    heading = (row.regime.symbol, *solvers, f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
+    of_first = (f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
+    heading = (row.regime.symbol, *condition_headings(rtol), *solvers, *of_first)
     return Table(heading, rows, row.regime.title, marked)
 
 
@@ -87,7 +128,7 @@ def page(matrix: Matrix, corners: Sequence[Corner], command: str, figure: Figure
     sections = [
         Section("Digits kept", [MEANING], [summary(matrix)], [figure]),
         *([Section("Corners", tables=[corners_table(corners)])] if corners else []),
-        Section("Every cell", tables=[details(row, matrix.solvers) for row in matrix.rows], details=True),
+        Section("Every cell", tables=[details(row, matrix.solvers, matrix.rtol) for row in matrix.rows], details=True),
     ]
     return Page(TITLE, command, sections, left_out)
 
@@ -113,12 +154,13 @@ def columns(matrix: Matrix) -> list[Column]:
     """The matrix with dimensions regime, decade and solver; where a regime has fewer values, nothing."""
     width = max(len(row.values) for row in matrix.rows)
     shape = (len(matrix.rows), width, len(matrix.solvers))
-    values = np.full(shape[:2], np.nan)
+    values, conditions, possible = (np.full(shape[:2], np.nan) for _ in range(3))
     numbers = {name: np.full(shape, np.nan) for name in ("digits", "steps", "residuals", "seconds")}
     words = {name: np.full(shape, "", dtype=object) for name in ("outcome", "reason")}
     for i, row in enumerate(matrix.rows):
         values[i, : len(row.values)] = row.values
         for k, cells in enumerate(row.cells):
+            conditions[i, k], possible[i, k] = cells[0].condition, cells[0].possible
             for j, cell in enumerate(cells):
                 for name, array in (*numbers.items(), *words.items()):
                     array[i, k, j] = getattr(cell, name)
@@ -138,6 +180,8 @@ def columns(matrix: Matrix) -> list[Column]:
         Column("solver", ("solver",), np.array(matrix.solvers, dtype=object), "1", "solver"),
         Column("symbol", ("regime",), np.array([r.regime.symbol for r in matrix.rows], dtype=object), "1", "parameter"),
         Column("value", ("regime", "decade"), values, "1", "value of the parameter"),
+        Column("condition", ("regime", "decade"), conditions, "1", "relative change of the answer over its data's"),
+        Column("possible", ("regime", "decade"), possible, "1", "digits that rounding of the data leaves"),
         *(
             Column(name, everywhere, array, "s" if name == "seconds" else "1", long_names[name])
             for name, array in (*numbers.items(), *words.items())

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar, TypeAlias
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.references.base import Reference
+
 Array: TypeAlias = NDArray[np.float64]
+
+Values: TypeAlias = Mapping[str, Array | float]
+
+R = TypeVar("R", bound=Reference)
 
 
 @dataclass(frozen=True)
@@ -20,9 +26,22 @@ class Exact:
     States are compared, and named quantities that are listed; each value relative to itself.
     """
 
-    values: Callable[[Array], Mapping[str, Array | float]]
+    values: Callable[[Array], Values]
     also: Sequence[str] = ()
     events: int | None = None
+    data: Mapping[str, float] = field(default_factory=dict)
+    again: Callable[[Mapping[str, float], Array], Values] | None = None
+    """The values for other data, which tell how well the problem determines them."""
+
+    @classmethod
+    def of(cls, reference: R, read: Callable[[R, Array], Values] = Reference.solution, **more: Any) -> Exact:
+        """What an exact solution says, as it is or as ``read`` off it; its parameters are the data."""
+        return cls(
+            lambda t: read(reference, t),
+            data=_data(reference),
+            again=lambda data, t: read(_changed(reference, data), t),
+            **more,
+        )
 
 
 @dataclass(frozen=True)
@@ -31,6 +50,22 @@ class Stops:
 
     reason: str
     t: float
+    data: Mapping[str, float] = field(default_factory=dict)
+    again: Callable[[Mapping[str, float]], float] | None = None
+    """The time for other data, which tell how well the problem determines it."""
+
+    @classmethod
+    def of(cls, reason: str, reference: R, read: Callable[[R], float] = lambda one: one.end_time) -> Stops:
+        """The end of an exact solution, or what is ``read`` off it; its parameters are the data."""
+        return cls(reason, read(reference), data=_data(reference), again=lambda data: read(_changed(reference, data)))
+
+
+def _data(reference: Reference) -> dict[str, float]:
+    return {item.name: getattr(reference, item.name) for item in fields(reference)}  # type: ignore[arg-type]
+
+
+def _changed(reference: R, data: Mapping[str, float]) -> R:
+    return type(reference)(**{name: data[name] for name in _data(reference)})
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
 from surfacechem.references.bonding import Bonding
+from surfacechem.references.cooling_to_zero import CoolingToZero
 from surfacechem.references.endothermic_bonding import EndothermicBonding
 from surfacechem.references.exothermic_bonding import ExothermicBonding
 from surfacechem.references.exponential_affinity import ExponentialAffinity
@@ -47,7 +48,7 @@ class Endothermic(Regime):
         if value == 0.0:
             return Problem("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
         exact = EndothermicBonding(C_1=1.0, C_2=1.0, T_0=256.0, K_2=K_2, tau=1.0)
-        return Problem("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact(exact.solution), changes)
+        return Problem("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact.of(exact), changes)
 
     def label(self, value: float) -> str:
         return f"2^{math.log2(value):.0f}" if value else "0"
@@ -78,7 +79,7 @@ class ScaleRatio(Regime):
             "loading.v": 1.0,
             "initial.T": T,
         }
-        return Problem("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact(exact.solution), changes)
+        return Problem("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact.of(exact), changes)
 
 
 class Seconds(Regime):
@@ -92,7 +93,7 @@ class Seconds(Regime):
     def problem(self, value: float) -> Problem:
         exact = ExothermicBonding(C_1=1.0, C_2=1.0, T_0=300.0, K_0=300.0, tau=value)
         changes = {"interface.bonding.linear-affinity.c_r": N_C / 300.0 / value}
-        return Problem("exothermic", [value * k / 4 for k in range(1, 21)], Exact(exact.solution), changes)
+        return Problem("exothermic", [value * k / 4 for k in range(1, 21)], Exact.of(exact), changes)
 
 
 class Affinity(Regime):
@@ -119,7 +120,7 @@ class Affinity(Regime):
             "interface.potential.bond-energy.K_0": K,
             "interface.bonding.exponential-affinity.C_r": rate * n * n / K,
         }
-        return Problem("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact(exact.solution), changes)
+        return Problem("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact.of(exact), changes)
 
 
 class Runaway(Regime):
@@ -134,8 +135,18 @@ class Runaway(Regime):
         E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
         exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
         changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
-        times = exact.time(np.array([0.01, 0.1, 0.3, 0.5, 0.7, 0.9])).tolist()
-        return Problem("adiabatic-arrhenius", times, Exact(exact.solution), changes)
+        phi = np.array([0.01, 0.1, 0.3, 0.5, 0.7, 0.9])
+        times = exact.time(phi)
+        speeds = (1 - phi) * np.exp(value - E_a / (GAS_CONSTANT * (300.0 + 80.0 * phi)))
+
+        def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
+            """Bonds for other data, to first order, from when as many are reached, which needs no root of a runaway."""
+            other = AdiabaticArrhenius(**data)
+            bonds = phi + speeds * (t - other.time(phi))
+            return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
+
+        data = {"A": A, "E_a": E_a, "T_i": 300.0, "delta_T": 80.0}
+        return Problem("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
 
 
 class ColdBodies(Regime):
@@ -145,14 +156,10 @@ class ColdBodies(Regime):
     title = "Cooling towards T = 0"
     symbol = "T / T_0"
     values = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
-    END = 300.0
 
     def problem(self, value: float) -> Problem:
+        exact = CoolingToZero(C=100.0, T_0=300.0, T_i=300.0, Q=50.0)
         if value == 0.0:
-            return Problem("cooling-to-zero", [2 * self.END], Stops("the temperature T reached zero", self.END))
-        last = self.END * (1.0 - value**2)
-        return Problem("cooling-to-zero", [last / 2, last], Exact(self._cooled))
-
-    def _cooled(self, t: Array) -> dict[str, Array]:
-        """Quadratic energy: T = T_0 sqrt(1 - t / t_0)."""
-        return {"T": 300.0 * np.sqrt((self.END - t) / self.END)}
+            return Problem("cooling-to-zero", [2 * exact.end_time], Stops.of("the temperature T reached zero", exact))
+        last = exact.end_time * (1.0 - value**2)
+        return Problem("cooling-to-zero", [last / 2, last], Exact.of(exact))

@@ -43,7 +43,7 @@ class Bell(Regime):
         changes = {"loading.f": force, "interface.bonding.bell.k_off": k}
         span = math.exp(-min(exact.log_rate, IMMEDIATE))
         times = [span * part for part in (0.01, 0.1, 0.5, 1.0, 3.0)]
-        return Problem("bond-constant-force", times, Exact(exact.solution), changes)
+        return Problem("bond-constant-force", times, Exact.of(exact), changes)
 
 
 class Rupture(Regime):
@@ -60,9 +60,7 @@ class Rupture(Regime):
         changes = {"loading.t_n": value * sites * FORCE}
         if value > 300.0:
             return Problem("shared-load-rupture", [1.0], Refused("the bonds ruptured"), changes)
-        return Problem(
-            "shared-load-rupture", [2.0 * exact.end_time], Stops("the bonds ruptured", exact.end_time), changes
-        )
+        return Problem("shared-load-rupture", [2.0 * exact.end_time], Stops.of("the bonds ruptured", exact), changes)
 
 
 class Debonding(Regime):
@@ -79,9 +77,10 @@ class Debonding(Regime):
         strength = 38.72983346207417e6
         exact = SuddenDebonding(C=2.0, T_0=300.0, T_i=300.0, K_0=K_0, t_n=strength, k=1e13)
         if value > 1.25:
-            return Problem("debonding-cooling", [10.0], Stops("which is impossible", strength / 1e13 / 1e-6), changes)
+            impossible = Stops.of("which is impossible", exact, lambda bonds: bonds.t_n / bonds.k / 1e-6)
+            return Problem("debonding-cooling", [10.0], impossible, changes)
 
-        def after(t: Array) -> dict[str, Array]:
-            return {"T": np.where(t < 9.0, 300.0, exact.final_temperature)}
+        def after(bonds: SuddenDebonding, t: Array) -> dict[str, Array]:
+            return {"T": np.where(t < 9.0, 300.0, bonds.final_temperature)}
 
-        return Problem("debonding-cooling", [1.0, 10.0], Exact(after, events=1), changes)
+        return Problem("debonding-cooling", [1.0, 10.0], Exact.of(exact, after, events=1), changes)

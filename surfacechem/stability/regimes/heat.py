@@ -31,7 +31,7 @@ def three_temperatures(parameters: Mapping[str, float]) -> Problem:
     }
     layer = p["C_c"] / (p["h_1"] + p["h_2"])
     times = [float(t) for t in np.geomspace(min(layer, 1.0), 10.0, 25)]
-    return Problem("three-temperatures", times, Exact(exact.solution), changes)
+    return Problem("three-temperatures", times, Exact.of(exact), changes)
 
 
 class Capacity(Regime):
@@ -119,7 +119,12 @@ class LostCapacity(Regime):
         changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
         if value < 0:
             return Problem(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
-        return Problem(MEDIUM, [1.0], Exact(lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)}), changes)
+        settled = Exact(
+            lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
+            data={"T_1": 300.0, "T_2": 300.0},
+            again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
+        )
+        return Problem(MEDIUM, [1.0], settled, changes)
 
 
 FILM = (
@@ -155,5 +160,4 @@ class Ignition(Regime):
         if value < 0:
             return Problem(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
         exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
-        T = float(exact.solution(0.0)["T_c"])
-        return Problem(FILM, [1.0], Exact(lambda t: {"T_c": np.full_like(t, T)}), changes)
+        return Problem(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)

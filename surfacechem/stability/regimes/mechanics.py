@@ -27,11 +27,11 @@ class Film(Regime):
     values = (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0)
 
     def problem(self, value: float) -> Problem:
-        if value == 0.0:
-            return Problem("closing-film", [20.0], Stops("g_n reached zero", 10.0))
         exact = ClosingFilm(eta=1e-2, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
+        if value == 0.0:
+            return Problem("closing-film", [20.0], Stops.of("g_n reached zero", exact))
         last = 10.0 * (1.0 - value)
-        return Problem("closing-film", [last / 2, last], Exact(exact.solution))
+        return Problem("closing-film", [last / 2, last], Exact.of(exact))
 
 
 PENALTY = """\
@@ -60,7 +60,7 @@ class Penalty(Regime):
     def problem(self, value: float) -> Problem:
         exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
         changes = {"interface.potential.normal-stiffness.E_n": value}
-        return Problem(PENALTY, [0.25, 0.5, 1.0], Exact(exact.solution, also=["t_n"]), changes)
+        return Problem(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
 
 
 class Chatter(Regime):
@@ -88,11 +88,11 @@ class Chatter(Regime):
             "mechanics.tangential.k": point["k"],
         }
 
-        def at_rest(t: Array) -> dict[str, Array]:
-            found = exact.solution(t)
+        def at_rest(cycle: StickSlip, t: Array) -> dict[str, Array]:
+            found = cycle.solution(t)
             return {"u_t": found["u_t"], "v": np.zeros_like(t), "t_t": found["spring_traction"]}
 
-        return Problem("stick-slip", times, Exact(at_rest, also=["t_t"], events=6), changes)
+        return Problem("stick-slip", times, Exact.of(exact, at_rest, also=["t_t"], events=6), changes)
 
 
 class Stop(Regime):
@@ -107,7 +107,7 @@ class Stop(Regime):
         exact = CoulombStop(m=5.0, mu=0.25, p=3e4, v_i=value, C=100.0, T_0=300.0, T_i=300.0)
         end = exact.stop_time
         times = [end * part for part in (0.25, 0.5, 0.9, 1.1, 2.0)]
-        return Problem("coulomb-stop", times, Exact(exact.solution, events=1), {"initial.v": value})
+        return Problem("coulomb-stop", times, Exact.of(exact, events=1), {"initial.v": value})
 
 
 class Fold(Regime):
@@ -123,11 +123,22 @@ class Fold(Regime):
     def problem(self, value: float) -> Problem:
         exact = OverdampedPullOff(t_max=1e6, g_0=1e-8, k=1e13, c=2e5, delta_w=value * _fold())
         gaps = exact.bodies.opening().g + exact.width * np.linspace(-3.0, 3.0, 7)
+        times = np.array([exact.time(g) for g in gaps])
+        ahead = np.array([exact.time(g) for g in gaps + SHORTEST * exact.width])
+        speeds = SHORTEST * exact.width / (ahead - times)
 
-        def passed(t: Array) -> dict[str, Array]:
-            return {"g_n": np.append(0.0, gaps)}
+        def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
+            """Gaps for other data, to first order, from when these are reached; given is the far-field displacement."""
+            given = {name: data[name] for name in ("t_max", "g_0", "k", "c")}
+            beyond = data["w"] - OverdampedPullOff(**given, delta_w=1.0).bodies.opening().w
+            if beyond <= 0:
+                raise InputError("the fold is not reached.")
+            other = OverdampedPullOff(**given, delta_w=beyond)
+            return {"g_n": gaps + speeds * (t - np.array([other.time(g) for g in gaps]))}
 
-        return Problem("slow-passage", [exact.time(g) for g in gaps], Exact(passed), {"loading.w_n": exact.w})
+        data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
+        passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
+        return Problem("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
 
 
 def _fold() -> float:
