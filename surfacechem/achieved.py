@@ -19,7 +19,7 @@ from surfacechem.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, relative_
 from surfacechem.audit import audit
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.event_table import SIDE, event_times
-from surfacechem.integrate import Trajectory
+from surfacechem.integrate import Run, Trajectory
 from surfacechem.profiles import profile_values
 from surfacechem.scene import Scene
 from surfacechem.solution import EARLIER, Accuracy
@@ -104,7 +104,7 @@ def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> 
     errors, note = apart(trajectory, second)
     if not errors:
         return unknown("the run ended before its second output")
-    source = second_run(other)
+    source = second_run(second.run)
     found = Accuracy(stated(errors), f"{source}, which had {note}" if note else source, errors)
     return with_cells(found, cells) if cells else found
 
@@ -119,9 +119,9 @@ def stated(errors: Mapping[str, float]) -> float:
     return max(*errors.values(), ROUNDING)
 
 
-def second_run(rtol: float) -> str:
-    """What an estimate is from, in words."""
-    return f"estimate: a second run at rtol {rtol:.0e}"
+def second_run(run: Run, kind: str = "run") -> str:
+    """What an estimate is from, in words: what is briefer, and that no law tells of, may be missed by both runs."""
+    return f"estimate: a second {kind} at rtol {run.rtol:.0e} that sees what lasts 1/{run.samples:.0f} of it"
 
 
 def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:

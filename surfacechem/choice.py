@@ -48,7 +48,7 @@ def compared(first: Trajectory, second: Trajectory) -> Accuracy:
     rtol = second.run.rtol
     if second.status == "failed":
         return unknown(f"a second run at rtol {rtol:.0e} failed: {second.reason}")
-    source = second_run(rtol)
+    source = second_run(second.run)
     if first.status != second.status:
         return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
     errors, others = apart(first, second)

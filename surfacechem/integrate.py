@@ -72,6 +72,13 @@ class Run:
         if len(self.times) < 2 or self.times[0] != 0 or any(b <= a for a, b in pairwise(self.times)):
             raise InputError("output times must start at 0 and increase from each to the next, at least two.")
 
+    def second(self, rtol: float) -> Run:
+        """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
+        looks at the equations, elsewhere.
+        """
+        atol = None if self.atol is None else self.atol * rtol / self.rtol
+        return replace(self, rtol=rtol, atol=atol, samples=CLOSER * self.samples)
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -296,14 +303,11 @@ class Model:
         return {path: values.get(path, own) for path, own in self.values().items()}
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
-        """The same run at another tolerance, its absolute tolerance in proportion, looked at more closely elsewhere.
+        """The same run at another tolerance, looked at elsewhere and more often.
 
         Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
         """
-        run = trajectory.run
-        atol = None if run.atol is None else run.atol * rtol / run.rtol
-        closer = replace(run, rtol=rtol, atol=atol, samples=CLOSER * run.samples)
-        return self.solve_values(closer, trajectory.values, nudged=True)
+        return self.solve_values(trajectory.run.second(rtol), trajectory.values, nudged=True)
 
     def chosen(self, run: Run) -> Run:
         """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surfacechem import references, sweep_runs
 from surfacechem.accuracy import ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
-from surfacechem.achieved import apart, floor, stated
+from surfacechem.achieved import apart, floor, second_run, stated
 from surfacechem.case import Case, Reference
 from surfacechem.errors import InputError
 from surfacechem.references._start import Start
@@ -92,9 +92,7 @@ def _against_tighter(
     numbers where they are not known.
     """
     other = second_tolerance(done.run.rtol)
-    atol = None if done.run.atol is None else done.run.atol * other / done.run.rtol
-    run = replace(done.run, rtol=other, atol=atol)
-    second = sweep_runs.solve(done.model, done.plan, run, changes, threads, nudged=True)
+    second = sweep_runs.solve(done.model, done.plan, done.run.second(other), changes, threads, nudged=True)
     errors = np.full(len(done), np.nan)
     for i in range(len(done)):
         if done.statistics:
@@ -107,7 +105,7 @@ def _against_tighter(
             differences, _ = apart(done[i], second[i])
             errors[i] = stated(differences) if differences else np.nan
     errors += [found.largest for found in cells]
-    source = f"estimate: a second sweep at rtol {other:.0e}"
+    source = second_run(second.run, "sweep")
     ways = dict.fromkeys(found.source for found in cells if found.variables)
     unknown = sum(not found.converged for found in cells)
     said = f"; unknown in {unknown} of {len(cells)} runs: {UNKNOWN}" if unknown else ""

@@ -71,8 +71,7 @@ class _Tables:
         self.outputs = np.empty((runs, times.shape[-1], n + q))
         self.steps = np.empty((runs, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(runs)
         self.events = np.empty((runs, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(runs)
-        spacings = np.broadcast_to(spacing, (runs,))
-        self.own_times = (spacings, segments, times) if segments.ndim == 2 else None
+        self.own_times = (np.broadcast_to(spacing, (runs,)), segments, times) if segments.ndim == 2 else None
         self.arguments = (
             program.addresses,
             program.algebraic_mask,
@@ -84,7 +83,7 @@ class _Tables:
             max_steps,
             self.stop,
             min(rtol, LOOSEST),
-            float(np.min(spacings)),
+            spacing if isinstance(spacing, float) else float(np.min(spacing)),
             atol,
             _kinds(margins),
             y0,

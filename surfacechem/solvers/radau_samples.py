@@ -86,9 +86,8 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
     It ``begins`` or ``ends`` where something may be narrow.
     """
     points = int(h / spacing)
-    if not (points > 0 or (h > BRIEF * spacing and (begins or ends))):
-        return 1.0
-    keep_polynomial(w)
+    if points > 0 or begins or ends:
+        keep_polynomial(w)
     if begins:
         for k in range(DECADES, 0, -1):
             if _differs(w, h, 10.0**-k, remaining):

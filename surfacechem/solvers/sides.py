@@ -6,6 +6,8 @@ from surfacechem.solvers.native import (
     BASE,
     M_BEFORE,
     M_EARLIER,
+    M_FIRST,
+    M_FIRST_SIDE,
     M_LARGEST,
     M_NOW,
     M_SIDE,
@@ -14,6 +16,7 @@ from surfacechem.solvers.native import (
     TAU,
     YDOT,
     Y,
+    clear,
     compiled,
     copy,
     evaluate,
@@ -62,6 +65,21 @@ def start_margins(w: Any, kinds: Any) -> None:
             w.margin[M_SIDE, m] = 1.0
         else:
             w.margin[M_SIDE, m] = BEYOND if is_limit(kinds, m) else -1.0
+
+
+@compiled
+def keep_sides(w: Any) -> None:
+    """Remember the margins at the start of a step."""
+    copy(w.margin[M_SIDE], w.margin[M_FIRST_SIDE])
+    copy(w.margin[M_BEFORE], w.margin[M_FIRST])
+
+
+@compiled
+def restore_sides(w: Any) -> None:
+    """Go back to the margins at the start of a step that is made again; none has fired."""
+    copy(w.margin[M_FIRST_SIDE], w.margin[M_SIDE])
+    copy(w.margin[M_FIRST], w.margin[M_BEFORE])
+    clear(w.fired)
 
 
 @compiled

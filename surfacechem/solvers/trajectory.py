@@ -44,9 +44,9 @@ from surfacechem.solvers.radau_advance import (
     store_polynomial,
 )
 from surfacechem.solvers.radau_outputs import write_outputs
-from surfacechem.solvers.radau_samples import unseen
+from surfacechem.solvers.radau_samples import BRIEF, unseen
 from surfacechem.solvers.radau_step import first_size, growing_size, loosening
-from surfacechem.solvers.sides import mark_at_end, start_margins
+from surfacechem.solvers.sides import keep_sides, mark_at_end, restore_sides, start_margins
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
@@ -208,6 +208,7 @@ def _run_segment(
             continue
         size = h
         if kinds.shape[0] > 0:
+            keep_sides(w)
             size = find_event(w, h, kinds)
         if size == AT_START:
             _write_events(w, events, kinds, counts)
@@ -216,12 +217,15 @@ def _run_segment(
             h *= 0.25
             w.clock[H_FACTORED] = 0.0
             continue
-        seen = unseen(w, size, spacing, left, w.clock[TAU] == 0.0, size == left or any_true(w.fired))
+        seen = 1.0
+        if size > BRIEF * spacing:
+            seen = unseen(w, size, spacing, left, w.clock[TAU] == 0.0, size == left or any_true(w.fired))
         if seen < 1.0:
             # A step ends there, so that its last stage feels what the others have missed.
             h = seen * size
             aim = w.clock[TAU] + h
-            clear(w.fired)
+            if kinds.shape[0] > 0:
+                restore_sides(w)
             w.count[REJECTED] += 1
             w.clock[H_FACTORED] = 0.0
             continue
