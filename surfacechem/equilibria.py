@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile import Function, Program, compile_function
+from surfacechem.damped import KICK, Field, Indices, come_to_rest, stiffness, unstable_way
 from surfacechem.expressions import Expression, derivative
-from surfacechem.marching import march, zero_ahead
+from surfacechem.marching import Curve, march, push_ahead, zero_ahead
 from surfacechem.system import System
-from surfacechem.transitions import SIDE, SLIP, Equilibrium, Fold
+from surfacechem.transitions import FOLD, SIDE, SLIP, Equilibrium, Fold
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -22,9 +23,8 @@ Heat = Callable[[Array], Array]
 DRIFT = 100.0
 """Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
 
-SWEEPS, STILL, TINY = 60, 1e-12, 1e-9
-"""Rounds in which gaps in equilibrium with each other are found, and the change at which they rest: relative, of at
-least a nanometre."""
+TINY = 1e-9
+"""Gap [m] below which the size of a gap counts as this one, a nanometre."""
 
 DIGITS = 64 * float(np.finfo(float).eps)
 """Last digits of a sum of tractions."""
@@ -136,7 +136,9 @@ class Equilibria:
 
     def _jumped(self, point: Point, way: Way, gaps: Sequence[float] | Array) -> Array:
         """The same in a jump, with what follows the gaps."""
-        rows = self._rows(point, way, gaps)
+        return self._followed(self._rows(point, way, gaps))
+
+    def _followed(self, rows: Array) -> Array:
         if self.followers:
             rows[:, self.followers] = self._follow(rows)
         return rows
@@ -146,6 +148,10 @@ class Equilibria:
         rows = np.repeat(point.inputs()[None], len(gaps), axis=0)
         rows[:, 1 : 1 + len(point.y)] += np.outer(np.asarray(gaps) - point.y[way.column], way.moves)
         rows[:, 1 + way.column] = gaps
+        return self._on_their_side(rows)
+
+    def _on_their_side(self, rows: Array) -> Array:
+        """Inputs with the mode of touch that belongs to their gaps."""
         if self._side is not None:
             # A law that changes at touch holds on its own side only; beyond it may have poles.
             column, g = self._side, rows[:, 1 + self.states.index("g_n")]
@@ -165,41 +171,184 @@ class Equilibria:
     def march(self, point: Point, way: Way, direction: float = 0.0, heat: Heat | None = None) -> Point | None:
         """The next point along a way at which the driving traction along it ends, in the direction in which it pushes.
 
-        A ``direction`` other than zero is that in which a fold has let go.
+        A ``direction`` other than zero is that in which an unstable balance lets go.
         """
-        moved = self._rows if heat is None else self._jumped
-
-        def driving(gaps: Sequence[float] | Array) -> Array:
-            rows = moved(point, way, gaps)
-            if heat is not None:
-                heated = heat(rows)
-                rows = np.where(np.isfinite(heated), heated, rows)
-            tractions = np.atleast_2d(self._balance(rows))[:, ::2]
-            return np.asarray(np.where(way.pulls != 0, tractions, 0.0) @ way.pulls)
-
-        def noise(gaps: Sequence[float] | Array) -> Array:
-            sizes = np.atleast_2d(self._balance(moved(point, way, gaps)))[:, 1::2]
-            return np.asarray(DIGITS * np.where(way.pulls != 0, sizes, 0.0) @ np.abs(way.pulls))
-
+        driving, noise = self._along(point, way, heat)
         gap = march(driving, float(point.y[way.column]), direction, noise)
         if gap is not None and abs(gap) < ATOM and abs(driving([0.0])) <= noise([0.0]):
             gap = 0.0  # laws that end with the gap shall know it
-        return None if gap is None else self._moved(point, moved(point, way, [gap])[0])
+        return self._at(point, way, gap, heat)
 
-    def settle(self, point: Point, heat: Heat | None = None) -> Point | None:
-        """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat."""
+    def _at(self, point: Point, way: Way, gap: float | None, heat: Heat | None) -> Point | None:
+        return None if gap is None else self._moved(point, self._reached(point, way, [gap], heat)[0])
+
+    def _reached(self, point: Point, way: Way, gaps: Sequence[float] | Array, heat: Heat | None) -> Array:
+        """Inputs with the gaps along a way, as in a jump where that makes heat."""
+        return (self._rows if heat is None else self._jumped)(point, way, gaps)
+
+    def _along(self, point: Point, way: Way, heat: Heat | None) -> tuple[Curve, Curve]:
+        """Driving traction along a way and its rounding, as functions of the gap that counts the way."""
+
+        def driving(gaps: Sequence[float] | Array) -> Array:
+            pushes = self._pushes(self._reached(point, way, gaps, heat), heat)
+            return np.asarray(np.where(way.pulls != 0, pushes, 0.0) @ way.pulls)
+
+        def noise(gaps: Sequence[float] | Array) -> Array:
+            sizes = np.atleast_2d(self._balance(self._reached(point, way, gaps, heat)))[:, 1::2]
+            return np.asarray(DIGITS * np.where(way.pulls != 0, sizes, 0.0) @ np.abs(way.pulls))
+
+        return driving, noise
+
+    def _pushes(self, rows: Array, heat: Heat | None) -> Array:
+        """Driving tractions at inputs with the temperatures that a jump to them gives, shape (rows, equilibria)."""
+        return np.asarray(np.atleast_2d(self._balance(self._warmed(rows, heat)))[:, ::2])
+
+    def _warmed(self, rows: Array, heat: Heat | None) -> Array:
+        """Inputs with the temperatures that a jump to them gives, where it gives any."""
+        if heat is None:
+            return rows
+        warmed = heat(rows)
+        return np.where(np.isfinite(warmed), warmed, rows)
+
+    def settle(self, point: Point, heat: Heat | None = None, balanced: float = BALANCED) -> Point | None:
+        """The point with all gaps in equilibrium; each may move the others through pressure, shear and heat.
+
+        A single gap is found by a search along it, several at the end of the damped motion that they begin. Where the
+        tractions are ``balanced`` within this part, what slides runs on only if that balance is unstable.
+        """
         if not self.items:
             return point
-        moved: Point | None = point
-        for _ in range(SWEEPS):
-            last = moved
-            for way in self._ways(point):
-                moved = moved and self.march(moved, way, heat=heat)
-            if moved is None or last is None:
+        unstable = self._unstable(point, heat) if self._is_balanced(point, balanced) else None
+        return self._released(point, heat, unstable)
+
+    def _released(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
+        """Where what is not held comes to rest, from an equilibrium that is lost or from tractions out of balance."""
+        free = self._free(point)
+        if len(free) > 1:
+            return self._damped(point, heat, lost)
+        if len(free) == 0:
+            return point
+        way, direction = (lost.way, lost.direction) if lost else (self._ways(point)[free[0]], 0.0)
+        onward = self._onward_along(point, way)
+        if onward and not direction:
+            return self._slid(point, way, onward, heat)
+        return self.march(point, way, direction, heat)
+
+    def _slid(self, point: Point, way: Way, onward: float, heat: Heat | None) -> Point | None:
+        """Where what slides has come to balance; friction pulls nothing back.
+
+        It has begun to slide as the push was above what sticking bears by no less than rounding. Where the stiffness is
+        hardly more than none, as at a fold that is reached in time alone, this makes a way that can be seen.
+        """
+        driving, noise = self._along(point, way, heat)
+        start = float(point.y[way.column])
+        now, least = onward * float(driving([start])[0]), float(noise([start])[0])
+        beyond = march(lambda gaps: driving(gaps) + onward * least, start, onward, noise) if now > -least else start
+        if beyond is None or abs(beyond - start) * self._own_slope(point, way) > BALANCED / DIGITS * least:
+            return self._at(point, way, beyond, heat)
+        return self._at(point, way, march(driving, start, 0.0, noise), heat) if now > 0 else point
+
+    def _own_slope(self, point: Point, way: Way) -> float:
+        """Stiffness [Pa/m] along a way at constant temperature."""
+        return float(np.abs(way.pulls) @ np.abs(self._tangents(point.inputs())[1::2]))
+
+    def _free(self, point: Point) -> Indices:
+        """Indices of the gaps that are not held."""
+        return np.nonzero(self._active(point.inputs()))[0]
+
+    def _is_balanced(self, point: Point, balanced: float) -> bool:
+        values = self._balance(point.inputs())
+        return bool(np.all(np.abs(values[::2]) <= balanced * values[1::2]))
+
+    def _onward(self, point: Point) -> Array:
+        """Direction in which each gap moves as the interface slides on; zero for what may move in both."""
+        slip = 0.0 if self.slip is None else point.parameters[self.slip]
+        return np.array([slip * e.slides for e in self.items])
+
+    def _onward_along(self, point: Point, way: Way) -> float:
+        """Direction of a way in which the interface slides on; zero where nothing slides along it."""
+        return float(np.sign(self._onward(point) @ way.pulls))
+
+    def _unstable(self, point: Point, heat: Heat | None) -> Lost | None:
+        """The way in which gaps run away from a balance, where that is unstable: a fold that is passed already.
+
+        Friction that falls with its own heat has no steady sliding on a spring that is softer than this fall. What
+        nothing pushes yet, as where it is symmetric, is pushed by what the loads do next.
+        """
+        onward = self._onward(point)
+        pushes = onward if onward.any() else self._next_pushes(point.inputs())
+        free = self._free(point)
+        if not pushes[free].any():
+            return None
+        change = stiffness(*self._field(point, heat), np.zeros(len(free)))
+        found = unstable_way(change) if np.all(np.isfinite(change)) else None
+        if found is None:
+            return None
+        weights = np.zeros(len(onward))
+        weights[free] = found
+        way, direction = self._together(self._ways(point), weights), float(np.sign(weights @ pushes))
+        if not direction:
+            return None
+        driving, noise = self._along(point, way, heat)
+        start = float(point.y[way.column])
+        left = np.abs(driving([start]))  # the balance was left by no more than the integration explains
+        begins = push_ahead(driving, start, direction, lambda gaps: noise(gaps) + left, lost=False)
+        return None if begins is None else Lost(point, way, direction)
+
+    @cached_property
+    def _next_pushes(self) -> Function:
+        """Rate at which the loads alone change the driving traction of each gap."""
+        rates = [derivative(self.system.expand(e.residual), self.system.t) for e in self.items]
+        return compile_function(self.system.inputs, rates)
+
+    def _together(self, ways: Sequence[Way], weights: Array) -> Way:
+        """Several gaps that move together, counted by the one that moves the most, whose weight is 1."""
+        first = ways[int(np.abs(weights).argmax())]
+        moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
+        # What follows another gap would move twice where that gap has a share of its own.
+        return Way(moves, first.column, weights)
+
+    def _moves(self, point: Point) -> tuple[Array, Array]:
+        """Change of the states with each gap that is not held, and the columns of these gaps."""
+        ways, free = self._ways(point), self._free(point)
+        return np.array([ways[j].moves for j in free]), np.array([ways[j].column for j in free])
+
+    def _field(self, point: Point, heat: Heat | None) -> tuple[Field, Array]:
+        """Driving tractions of the gaps that are not held, by how far they have moved; and the size of these gaps."""
+        free, (moves, columns), n = self._free(point), self._moves(point), len(point.y)
+
+        def driving(moved: Array) -> Array:
+            rows = np.repeat(point.inputs()[None], len(moved), axis=0)
+            rows[:, 1 : 1 + n] += moved @ moves
+            return self._pushes(self._arrived(rows, heat), heat)[:, free]
+
+        return driving, np.maximum(np.abs(point.y[columns]), TINY)
+
+    def _damped(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
+        """Where several gaps come to rest together."""
+        (driving, scale), free = self._field(point, heat), self._free(point)
+        moves, columns = self._moves(point)
+        begins = np.zeros(len(free))
+        if lost is not None:
+            along, noise = self._along(point, lost.way, heat)
+            start = float(point.y[lost.way.column])
+            gap = push_ahead(along, start, lost.direction, noise, lost=True)
+            if gap is None:
                 return None
-            if len(self.items) < 2 or np.all(np.abs(moved.y - last.y) <= STILL * (np.abs(moved.y) + TINY)):
-                return moved
-        return None
+            way = lost.direction * lost.way.pulls[free]
+            # What is less drowns in the rounding of the other gaps.
+            begins = way * max(abs(gap - start), KICK / float(np.max(np.abs(way) / scale)))
+        rest = come_to_rest(driving, scale, self._onward(point)[free], begins)
+        if rest is None:
+            return None
+        y = point.y + rest @ moves
+        y[columns] = np.where(np.abs(y[columns]) < ATOM, 0.0, y[columns])  # laws that end with the gap shall know it
+        return self._moved(point, self._arrived(replace(point, y=y).inputs()[None], heat)[0])
+
+    def _arrived(self, rows: Array, heat: Heat | None) -> Array:
+        """Inputs with what follows gaps that have moved."""
+        rows = self._on_their_side(rows)
+        return rows if heat is None else self._followed(rows)
 
     def pushed(self, before: Point, point: Point) -> bool:
         """Whether loads have changed a balance of tractions by more than rounding."""
@@ -223,13 +372,17 @@ class Equilibria:
             parameters[self.slip] = slip
         return replace(point, parameters=parameters)
 
-    def is_pushed_back(self, point: Point, drift: float) -> bool:
+    def is_pushed_back(self, point: Point, drift: float, heat: Heat | None = None) -> bool:
         """Whether the tractions would pull what slides back, by more than the ``drift`` of their balance."""
-        j, sign = next((j, e.slides) for j, e in enumerate(self.items) if e.slides)
-        residual, slope = self._tangents(point.inputs())[2 * j : 2 * j + 2]
-        size = self._balance(point.inputs())[2 * j + 1]
+        onward = self._onward(point)
+        if not onward.any():
+            return False
+        j = int(np.abs(onward).argmax())
+        inputs = self._warmed(point.inputs()[None], heat)[0]
+        residual, slope = self._tangents(inputs)[2 * j : 2 * j + 2]
+        size = self._balance(inputs)[2 * j + 1]
         # Where nothing elastic holds it, it cannot stick.
-        return bool(slope < 0 and point.parameters[self.slip] * sign * residual < -drift * size)
+        return bool(slope < 0 and onward[j] * residual < -drift * size)
 
     def polished(self, point: Point) -> Point:
         """The point without the drift that integration has left in its gaps."""
@@ -254,23 +407,27 @@ class Equilibria:
 
     def _compiled_fold(self, fold: Fold) -> tuple[Function, Function]:
         inputs, expand = self.system.inputs, self.system.expand
-        entries = [*fold.falls, *fold.warming, *(entry for row in fold.stiffness for entry in row)]
+        warming = [rise.get(name, 0) for rise in fold.warming for name in self.states]
+        entries = [*fold.falls, *warming, *(entry for row in fold.stiffness for entry in row)]
         return compile_function(inputs, [expand(fold.tangent)]), compile_function(inputs, [*map(expand, entries)])
 
     def at_fold(self, index: int, point: Point) -> Lost | None:
         """The fold itself, from a point close to it; None where it is out of reach.
 
-        Equilibrium is lost like a square root in time, so that a run ends a little before the fold.
+        Equilibrium is lost like a square root in time, so that a run ends a little before the fold. Where the stiffness
+        rises as the interface slides on, only time leads to the fold, and nothing pushes the interface there.
         """
         found = self._folds[index]
         assert found is not None
         tangent, shape = found
-        values = np.atleast_1d(shape(point.inputs()))
         n = len(self.items)
-        falls, warming, stiffness = values[:n], values[n : 2 * n], values[2 * n :].reshape(n, n)
-        way, weights = self._lost_way(point, stiffness)
-        direction = float(np.sign(falls @ weights))
-        there = replace(way, moves=way.moves + self._warms * (warming @ weights))
+        values = np.atleast_1d(shape(point.inputs()))
+        falls, warming, stiffness = values[:n], values[n : -n * n].reshape(n, -1), values[-n * n :].reshape(n, n)
+        way = self._lost_way(point, stiffness)
+        direction, onward = float(np.sign(falls @ way.pulls)), self._onward_along(point, way)
+        if onward and direction != onward:
+            return None
+        there = replace(way, moves=way.moves + warming.T @ way.pulls)
 
         def ahead(gaps: Sequence[float] | Array) -> Array:
             return np.asarray(tangent(self._rows(point, there, gaps))).reshape(-1)
@@ -279,15 +436,16 @@ class Equilibria:
         return None if at is None else Lost(self._moved(point, self._rows(point, there, [at])[0]), way, direction)
 
     def held_at(self, index: int, lost: Lost) -> Lost | None:
-        """The same fold where sticking holds what slides; None where that holds all."""
+        """The same fold where sticking holds what slides; None where that keeps the equilibrium."""
         found = self._folds[index]
         assert found is not None
+        tangent, shape = found
         point, n = self.with_slip(lost.point, 0.0), len(self.items)
-        if not self._active(point.inputs()).any():
+        if tangent(point.inputs())[0] > FOLD:
             return None
-        values = np.atleast_1d(found[1](point.inputs()))
-        way, weights = self._lost_way(point, values[2 * n :].reshape(n, n))
-        return Lost(point, way, float(np.sign(values[:n] @ weights)))
+        values = np.atleast_1d(shape(point.inputs()))
+        way = self._lost_way(point, values[-n * n :].reshape(n, n))
+        return Lost(point, way, float(np.sign(values[:n] @ way.pulls)))
 
     @cached_property
     def _approaches(self) -> list[Function | None]:
@@ -331,22 +489,13 @@ class Equilibria:
         except np.linalg.LinAlgError:
             return np.zeros_like(point.y)
 
-    @cached_property
-    def _warms(self) -> Array:
-        """One for the temperature of the interface."""
-        nodes = {item.fold.node for item in self.system.transitions if item.fold}
-        return np.array([float(name in nodes) for name in self.states])
-
-    def _lost_way(self, point: Point, A: Array) -> tuple[Way, Array]:
+    def _lost_way(self, point: Point, A: Array) -> Way:
         """The way that costs no traction: the gaps by which the stiffness is singular."""
         ways, active = self._ways(point), np.nonzero(self._active(point.inputs()))[0]
         weights = np.zeros(len(ways))
         weights[active] = np.linalg.svd(A[np.ix_(active, active)])[2][-1] if len(active) > 1 else 1.0
         weights /= weights[np.abs(weights).argmax()]
-        first = ways[int(np.abs(weights).argmax())]
-        moves = sum((w * way.moves for w, way in zip(weights, ways, strict=True)), np.zeros(len(self.states)))
-        # What follows another gap would move twice where that gap has a share of its own.
-        return Way(moves, first.column, weights), weights
+        return self._together(ways, weights)
 
     def lost(self, point: Point, rtol: float) -> int | None:
         """The fold that is so close to a point that time cannot tell them apart."""
@@ -362,5 +511,4 @@ class Equilibria:
 
     def let_go(self, lost: Lost, parameters: Array, heat: Heat) -> Point | None:
         """Where the gaps come to rest from a fold, with the parameters that hold then."""
-        landed = self.march(replace(lost.point, parameters=parameters), lost.way, lost.direction, heat)
-        return self.settle(landed, heat) if landed is not None and len(self.items) > 1 else landed
+        return self._released(replace(lost.point, parameters=parameters), heat, lost)

@@ -19,9 +19,9 @@ from surfacechem.rebounds import ENDLESS, MANY, MISSED, Rebounds
 from surfacechem.solvers.contract import Problem, Result, Solver, Status
 from surfacechem.solvers.radau import consistent
 from surfacechem.stalls import solve
-from surfacechem.stretches import Part, across_kink, changed, merged, piece
+from surfacechem.stretches import Part, across_kink, changed, merged
 from surfacechem.system import START, System
-from surfacechem.transitions import HELD, SLIP
+from surfacechem.transitions import RESTS
 from surfacechem.watching import sizes, to_pass
 
 Array = NDArray[np.float64]
@@ -44,15 +44,10 @@ LATE, RENEWALS = 1e-6, 4
 AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
 
-SLIDING = ("stop", "slip", "slip forward", "slip backward")
-HOLDABLE = (*SLIDING, "touch", "release", "impact", "rub")
-HOLD, LONGEST_HOLD = 1e-9, 1e-4
-"""Transitions whose chatter is resolved, and the parts of a piece of time for which it is: the first time, then
-longer, and at most."""
+SHARPENED = 1e-9
+"""Part of a run after which the largest margins seen may be forgotten again."""
 
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
-MOMENT = 1e-15
-"""Part of the time that is told from it."""
 
 
 @dataclass
@@ -71,7 +66,6 @@ class Hybrid:
     largest: Array = field(default_factory=lambda: np.zeros(0))
     booked: Array = field(default_factory=lambda: np.zeros(0))
     """Ledger now."""
-    hold: float = HOLD
     calm: int = 0
     """Number of transitions before the last chatter that was resolved."""
     sharpened: float = -np.inf
@@ -223,7 +217,7 @@ class Hybrid:
         """The point after all transitions that are due at its own time."""
         if self.problem.program.margins is None:
             return point
-        while not self._chatters(point.t) or self._hold(point):
+        while not self._chatters(point.t) or self._calmed(point):
             now = self._margins(point)
             if self._ended(now):
                 return None
@@ -254,25 +248,19 @@ class Hybrid:
         moment = REACHED * max(t, LATE * self.problem.segments[-1])
         return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - moment
 
-    def _hold(self, point: Point) -> bool:
-        """Let what begins and ends without end stay as it is for a while, and friction stick; whether that could be.
+    def _calmed(self, point: Point) -> bool:
+        """Whether what follows itself without end comes to an end, though nothing has stopped it so far.
 
         It may only seem to do so where what moves now is rounding of what has moved before: that is forgotten first.
+        Rebounds that follow each other faster than time can tell have come to rest.
         """
-        if point.t > self.sharpened + HOLD * self.problem.segments[-1]:
+        if point.t > self.sharpened + SHARPENED * self.problem.segments[-1]:
             self.sharpened, self.calm, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
             return True
-        columns = {p.path: j for j, p in enumerate(self.system.parameters)}
-        if HELD not in columns or len(self.jumps) - self.calm > 2 * AT_ONCE or self.hold > LONGEST_HOLD:
+        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
+        if rests is None or self.jumps[-1].transition.returns is None or point.parameters[rests] == point.t:
             return False
-        name = self.jumps[-1].transition.name
-        if name in HOLDABLE:
-            if name in SLIDING:
-                point.parameters[columns[SLIP]] = 0.0
-            point.parameters[columns[HELD]] = point.t + max(
-                self.hold * piece(self.problem.segments, point.t), MOMENT * point.t
-            )
-            self.hold, self.calm = 10 * self.hold, len(self.jumps)
+        point.parameters[rests], self.calm = point.t, len(self.jumps)
         return True
 
     def _margins(self, point: Point) -> Array:

@@ -18,7 +18,7 @@ from surfacechem.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.expressions import Expression, derivative
 from surfacechem.springs import stored
 from surfacechem.system import Account, System
-from surfacechem.transitions import HELD, INTERFACE, Sink, Transition
+from surfacechem.transitions import INTERFACE, RESTS, Sink, Transition
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class Jumper:
         self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system, program)
         mode_symbols = {mode.symbol for mode in system.modes}
-        kept = [p.symbol in mode_symbols or p.path == HELD for p in system.parameters]
+        kept = [p.symbol in mode_symbols or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
     @cached_property
@@ -227,9 +227,15 @@ class Jumper:
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
         before = lost.point if lost is not None else before
         values = self._maps[index](before.inputs())
+        if self._ends_sliding(before, values):
+            # What the integration has left of the balance would look like a push to what sticks from here on.
+            before = self.equilibria.polished(before)
+            values = self._maps[index](before.inputs())
         n = len(before.y)
         parameters = before.parameters.copy()
         parameters[self.mode_columns] = values[n:]
+        if item.fold is not None and lost is None and self.equilibria.slip is not None:
+            parameters[self.equilibria.slip] = 0.0  # there is no steady sliding, and nothing pushes it on
         start = Point(before.t, values[:n], np.zeros(n), parameters)
         if not np.isfinite(self._books(start.inputs())[0]):
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
@@ -249,10 +255,19 @@ class Jumper:
             obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
+        if item.settles and self.equilibria.is_pushed_back(final, balanced):
+            final = self.equilibria.with_slip(final, 0.0)
         jump = Jump(
             before.t, item, before, final, released, taken, ADMISSIBLE, since, lift, heat_out=out, entropy_out=taken
         )
         return self._judged(jump, books, noise)
+
+    def _ends_sliding(self, before: Point, values: Array) -> bool:
+        """Whether the new modes ``values`` end with make what slides in balance stick."""
+        slip = self.equilibria.slip
+        if slip is None:
+            return False
+        return bool(before.parameters[slip]) and not values[len(before.y) + self.mode_columns.index(slip)]
 
     @cached_property
     def _pulls(self) -> Function:
@@ -293,20 +308,19 @@ class Jumper:
         """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
         found = self.equilibria
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
-        if slip:
-            stuck = None if lost is None else found.held_at(index, lost)
-            if lost is not None and stuck is None:
-                return self._found(start, lost, heat)
-            trial = self._found(found.with_slip(start, 0.0), stuck, heat)
-            if trial is not None:
-                onward = found.with_slip(trial, slip)
-                return trial if found.is_pushed_back(onward, balanced) else found.settle(onward, heat)
-        return self._found(start, lost, heat)
-
-    def _found(self, start: Point, lost: Lost | None, heat: Heat) -> Point | None:
-        if lost is None:
-            return self.equilibria.settle(start, heat)
-        return self.equilibria.let_go(lost, start.parameters, heat)
+        if not slip:
+            return found.let_go(lost, start.parameters, heat) if lost else found.settle(start, heat)
+        stuck = None if lost is None else found.held_at(index, lost)
+        at_rest = found.with_slip(start, 0.0)
+        trial = found.let_go(stuck, at_rest.parameters, heat) if stuck else found.settle(at_rest, heat)
+        if trial is None:
+            return None
+        onward = found.with_slip(trial, slip)
+        if found.is_pushed_back(onward, balanced, heat):
+            return trial
+        if lost is not None and stuck is None:  # it is sliding that is lost
+            return found.let_go(lost, onward.parameters, heat)
+        return found.settle(onward, heat, balanced)
 
     def _beyond(self, item: Transition, after: Point | None) -> str:
         """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""

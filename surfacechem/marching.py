@@ -34,13 +34,30 @@ def march(driving: Curve, start: float, direction: float, noise: Curve) -> float
     return zero_ahead(driving, start, direction or push, direction or push, noise if direction else None)
 
 
+def steps_ahead(start: float, direction: float) -> Array:
+    """Gaps in ever longer steps from a gap in a direction."""
+    size = FIRST * max(abs(start), SMALLEST_GAP)
+    return np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))
+
+
+def push_ahead(driving: Curve, start: float, direction: float, least: Curve, *, lost: bool) -> float | None:
+    """The first gap in a direction at which the driving traction pushes on by more than the ``least`` that counts.
+
+    None where there is none, or where it resists before and the balance is not known to be ``lost``.
+    """
+    gaps = steps_ahead(start, direction)
+    values, small = direction * driving(gaps), least(gaps)
+    first = int(np.argmax(values > small))
+    resists = not lost and bool(np.any(values[:first] < -small[:first]))
+    return float(gaps[first]) if values[first] > small[first] and not resists else None
+
+
 def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise: Curve | None = None) -> float | None:
     """The first zero in a direction of what has a sign before it; it may start with the other one within rounding."""
     with PREPARING:
         from scipy.optimize import brentq
 
-    size = FIRST * max(abs(start), SMALLEST_GAP)
-    gaps: Array = np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))
+    gaps = steps_ahead(start, direction)
     values = sign * curve(gaps)
     least = 0.0 if noise is None else noise(gaps)
     first = int(np.argmax(values > least))

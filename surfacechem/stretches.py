@@ -46,12 +46,6 @@ def across_kink(states: Sequence[State], point: Point) -> Point | None:
     return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
 
 
-def piece(segments: Array, t: float) -> float:
-    """Length of the piece of time in which a time lies [s]: no brief pulse is held through."""
-    j = int(np.clip(np.searchsorted(segments, t, side="right"), 1, len(segments) - 1))
-    return float(segments[j] - segments[j - 1])
-
-
 def joined(blocks: Sequence[Array], width: int) -> Array:
     """Blocks of rows after each other; no rows of that width where there are no blocks."""
     if blocks:

@@ -17,8 +17,11 @@ SLIP = "mode.slip"
 INTERFACE = "interface"
 """Who makes heat in a jump, where it is not the support of an axis."""
 
-HELD = "run.held_until"
-"""Path of the time until which a mode is held where it would begin and end without end: sticking, or contact."""
+FOLD = 1e-7
+"""Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
+
+RESTS = "run.rebounds_rest_at"
+"""Path of the time at which rebounds rest that follow each other faster than time can tell."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,8 @@ class Fold:
     """How fast the stiffness falls along each gap; it tells which way they run."""
     stiffness: tuple[tuple[Expression, ...], ...]
     """Fall of the driving traction of each gap along each gap, relative to the stiffness of the former."""
-    warming: tuple[Expression, ...]
-    """Rise of the interface temperature along each gap without heat from outside [K/m]."""
-    node: str
-    """The state that is this temperature, if any is."""
+    warming: tuple[Mapping[str, Expression], ...]
+    """Rise of the temperatures that follow each gap, by the heat of its own motion [K/m]."""
 
 
 @dataclass(frozen=True)

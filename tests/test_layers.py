@@ -44,6 +44,7 @@ FLOORS = {
     "time": [
         "solvers.*",
         "marching",
+        "damped",
         "domains",
         "equilibria",
         "jumps",

@@ -17,7 +17,7 @@ from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.quantities import Quantity
 from surfacechem.system import Account, Margin, Named, Range
 from surfacechem.terms import Friction, Law, Load, Spec, optional
-from surfacechem.transitions import HELD, Mode
+from surfacechem.transitions import Mode
 from surfacechem.variables import unit_of
 
 MANY = range(2, 1000)
@@ -127,13 +127,6 @@ class Build(Draft):
     def find_mode(self, name: str) -> Any:
         """The symbol of a mode, None where the scene has none of that name."""
         return next((mode.symbol for mode in self.modes if mode.name == name), None)
-
-    @property
-    def held_until(self) -> Expression:
-        """Time until which what begins and stops without end is held as it is; made once."""
-        spec = Spec("s", "time until which a mode is held")
-        known = next((p.symbol for p in self.parameters.items if p.path == HELD), None)
-        return known if known is not None else self.constant("held_until", HELD, spec, 0.0, internal=True)
 
     def at_start(self, expression: Expression) -> float:
         """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""

@@ -2,24 +2,30 @@ r"""Mechanical folds: where gaps that are in equilibrium together lose it.
 
 With the driving traction :math:`r_i` of each gap :math:`g_i` that has neither mass nor damper, the stiffness is
 :math:`A_{ij} = -\partial r_i/\partial g_j`, of which gaps that share a potential have off-diagonal parts: shear softens
-what is opened. In perfect contact or with a capacity of its own the interface keeps its heat, and the stiffness is
-isentropic, :math:`A_{ij} = -\partial r_i/\partial g_j - \partial r_i/\partial T\, T \Psi_{T g_j} / C`.
+what is opened. A gap that runs away takes no time, so that what it warms keeps its heat: with the temperatures
+:math:`T_k` the stiffness is :math:`A_{ij} = -\partial r_i/\partial g_j - \sum_k \partial r_i/\partial T_k\,
+\partial T_k/\partial g_j`. The rise of the temperatures follows from the energy balances of their nodes. That of what
+is elastic is isentropic, :math:`T \Psi_{T g_j} / C`; that of what slides is the heat of its friction, so that friction
+that falls with temperature loses its balance with a spring that is softer than this fall.
 Equilibrium is stable while det A > 0; where all gaps but one are eliminated this is the Schur complement of that one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import symengine
 
+from surfacechem import balances
 from surfacechem.assembly.build import Build
+from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
-from surfacechem.transitions import Equilibrium, Fold, Transition
+from surfacechem.transitions import FOLD, Equilibrium, Fold, Transition
 
-FOLD = 1e-7
-"""Tangent stiffness, relative to its parts, at which a quasi-static gap counts as having lost its equilibrium."""
+Rise = Mapping[Any, Expression]
+"""Rise of temperatures along a gap [K/m]."""
 
 Matrix = Sequence[Sequence[Expression]]
 
@@ -29,16 +35,20 @@ def folds(build: Build) -> None:
     gaps = {symengine.Symbol(e.state) for e in build.equilibria}
     if not gaps:
         return
-    A = [[_stiffness(build, i, j) for j in build.equilibria] for i in build.equilibria]
+    residuals = [build.expanded(e.residual) for e in build.equilibria]
+    rises = [_rises(build, e, residuals) for e in build.equilibria]
+    pairs = list(zip(build.equilibria, rises, strict=True))
+    A = [[_stiffness(i, r, j, rise) for j, rise in pairs] for i, r in zip(build.equilibria, residuals, strict=True)]
     sizes = [e.active * _size(build, e, A[i][i]) + 1 - e.active for i, e in enumerate(build.equilibria)]
     relative = tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
     tangent = determinant(relative)
     moved = {symengine.Symbol(name) for e in build.equilibria for name in e.along} | gaps
+    moved |= {T for rise in rises for T in rise}
     if symengine.Symbol("g_n") not in gaps and not tangent.free_symbols & moved:
         return
     whole = determinant(A)
-    falls = tuple(-_along(whole, e) for e in build.equilibria)
-    warming = tuple(_rise(build, e) for e in build.equilibria)
+    falls = tuple(-_along(whole, e, rise) for e, rise in pairs)
+    warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
     build.transitions.append(
         Transition(
             "snap",
@@ -46,7 +56,7 @@ def folds(build: Build) -> None:
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
             settles=True,
             sinks="snap",
-            fold=Fold(tangent, falls, relative, warming, str(_temperature(build))),
+            fold=Fold(tangent, falls, relative, warming),
         )
     )
 
@@ -56,47 +66,54 @@ def _bounded(x: Expression) -> Expression:
     return x / (1 + absolute(x))
 
 
-def _along(expression: Expression, e: Equilibrium) -> Expression:
-    """Derivative along a gap and what moves with it."""
+def _along(expression: Expression, e: Equilibrium, rise: Rise) -> Expression:
+    """Derivative along a gap, what moves with it, and the temperatures that follow."""
     slope = derivative(expression, symengine.Symbol(e.state))
-    return slope + sum((w * derivative(expression, symengine.Symbol(x)) for x, w in e.along.items()), 0)
+    slope += sum((w * derivative(expression, symengine.Symbol(x)) for x, w in e.along.items()), 0)
+    return slope + sum((warmer * derivative(expression, T) for T, warmer in rise.items()), 0)
 
 
-def _stiffness(build: Build, i: Equilibrium, j: Equilibrium) -> Expression:
+def _stiffness(i: Equilibrium, residual: Expression, j: Equilibrium, rise: Rise) -> Expression:
     """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
-    residual = build.expanded(i.residual)
-    fall = -_along(residual, j) - _thermal(build, residual, j)
     same = symengine.Integer(1 if i is j else 0)
+    fall = -_along(residual, j, rise)
     return fall if i.active == 1 else i.active * fall + (1 - i.active) * same
 
 
-def _thermal(build: Build, residual: Expression, j: Equilibrium) -> Expression:
-    """What the temperature adds that follows a gap without heat from outside."""
-    T = _temperature(build)
-    return derivative(residual, T) * _rise(build, j) if T is not None and depends(residual, T) else symengine.Integer(0)
+def _rises(build: Build, e: Equilibrium, residuals: Sequence[Expression]) -> Rise:
+    """Rise of the temperatures that the balances of tractions feel along a gap, by the heat of its own motion [K/m].
+
+    It is what the energy balances say of motion that is faster than any flow of heat.
+    """
+    free = [node for node in build.nodes.values() if not node.prescribed]
+    felt = [node for node in free if any(depends(residual, node.T) for residual in residuals)]
+    _refuse_no_capacity(felt)
+    motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((e.state, symengine.Integer(1)), *e.along.items())}
+    rest = {state.dot: symengine.Integer(0) for state in build.states}
+    rows = {node.name: build.expanded(balances.node_row(node, build.rates, build.about)) for node in free}
+
+    def made(row: Expression) -> Expression:
+        return -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))
+
+    # A node that stores nothing passes on what it gets.
+    passing = {x.T: made(rows[x.name]) / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
+    rises = {}
+    for node in felt:
+        passed = sum((derivative(rows[node.name], T).subs(rest) * warmer for T, warmer in passing.items()), 0)
+        heat = made(rows[node.name]) - passed
+        if heat != 0:
+            rises[node.T] = heat / node.capacity()
+    return rises
 
 
-def _temperature(build: Build) -> Expression | None:
-    """The temperature of the interface where it follows the gaps."""
-    node = build.node_of.get("interface")
-    return None if node is None or node.prescribed else node.T
-
-
-def _rise(build: Build, e: Equilibrium) -> Expression:
-    """Rise of the interface temperature along a gap without heat from outside [K/m]."""
-    T = _temperature(build)
-    coupling = symengine.Integer(0) if T is None else derivative(_along(build.psi, e), T)
-    if coupling == 0:
-        return symengine.Integer(0)
-    node = build.node_of["interface"]
-    capacity = node.capacity()
-    if capacity == 0:
-        raise InputError(
-            f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the interface "
-            "one, or mount the bodies with a damper or a mass.",
-            Place(path="interface.temperature"),
-        )
-    return T * coupling / capacity
+def _refuse_no_capacity(felt: Sequence[Node]) -> None:
+    for node in felt:
+        if node.capacity() == 0:
+            raise InputError(
+                f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the "
+                "interface one, or mount the bodies with a damper or a mass.",
+                Place(path="interface.temperature"),
+            )
 
 
 def _size(build: Build, e: Equilibrium, own: Expression) -> Expression:

@@ -22,7 +22,7 @@ from surfacechem.assembly.rubbing import FINITE, INFINITE, rubbing
 from surfacechem.expressions import Expression, absolute, where
 from surfacechem.system import TOLERANCE
 from surfacechem.terms import Spec
-from surfacechem.transitions import Transition
+from surfacechem.transitions import RESTS, Transition
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 G, V = symengine.symbols("g_n v_n")
@@ -48,8 +48,6 @@ def impacts(build: Build) -> None:
     assert mount is not None
     margin, shut = where(closed > 0, 1, G), {G: NONE}
     if not mount.inertial:
-        # Where a pull begins, the gap may seem to close again by rounding.
-        margin = where(build.t < build.held_until, 1, margin)
         build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals, shut, settles=True))
         return
     far = far_field(build, mount)
@@ -92,7 +90,8 @@ def _rests(
     # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
     brief = pressing * build.t * ((1 - far.e) * nothing + BRIEF)
     slow = where(rebound < nothing * (swift + SLOWEST), 1, where(2 * rebound < brief, 1, 0))
-    return where(build.t < build.held_until, 1, slow), {fastest: swift}
+    at_once = build.constant("rests_at", RESTS, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
+    return where(build.t > at_once, slow, 1), {fastest: swift}
 
 
 def missed(build: Build) -> None:

@@ -49,7 +49,7 @@ from surfacechem.assembly.planar import (
     unit_vector,
 )
 from surfacechem.assembly.plane_springs import PATH, on_springs
-from surfacechem.assembly.slip import NONE, UNSTABLE, evolve, name_traction
+from surfacechem.assembly.slip import NONE, STILL, UNSTABLE, evolve, name_traction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, norm, sqrt, where
 from surfacechem.quantities import VARIABLES
@@ -60,9 +60,6 @@ WORDS = {0.0: "sticks", 1.0: "slides"}
 
 MOMENT, SLOWEST = 1e-12, 1e-18
 """Part of the time so far, and speed [m/s], below which the turn of what stops is not resolved."""
-
-STILL = 1e-14
-"""Part of what sticking bears that a balance counts as none."""
 
 SWIFT, RADIAN = 0.1, 1e6
 """Scales of the speed [m/s] and of the turn [rad]: what rounding of the pull makes of either as sliding begins is no
@@ -216,7 +213,7 @@ def _transitions(build: Build, sides: Sequence[Side], still: Expression) -> None
     kind, left, aimed = sides[0].kind, borne(sides), aim(build, sides)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = {**(broken(build, breaking) if breaking is not None else {}), TURNED: NONE}
-    margin = where(SLIDES > 0, 1, where(build.t < build.held_until, 1, left))
+    margin = where(SLIDES > 0, 1, left)
     modes, reason = {SLIDES: symengine.Integer(1), **aimed}, "sticking gives way and the interface slides"
     begins = Transition("slip", margin, reason, modes, jump, rate_independent(kind), "local", to_pass=True)
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.

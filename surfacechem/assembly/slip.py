@@ -35,6 +35,9 @@ from surfacechem.transitions import Equilibrium, Transition
 NONE = symengine.Integer(0)
 CREEP = 1e-25
 """Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
+STILL = 1e-14
+"""Part of the tractions that cancel in a balance that counts as none: a hundred times the rounding of one of them."""
+
 UNSTABLE = (
     "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
     "resists; a mass or a viscous resistance would give one"
@@ -169,7 +172,7 @@ def motion(build: Build, kind: Kind) -> None:
         _elastic_rows(build, kind, slides, t_f, t_e, v)
     name_traction(build, d, slides, t_a + carried, t_a + (carried if kind.elastic else needed))
     if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
-        _transitions(build, kind, needed, v)
+        _transitions(build, kind, needed, _still(build, kind, needed, t_f, v))
 
 
 def beside(far: FarField, t_a: Expression) -> FarField:
@@ -307,7 +310,27 @@ def _is_damped(kind: Kind) -> bool:
     return kind.mount is not None and kind.mount.damped and not kind.elastic
 
 
-def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) -> None:
+def _still(build: Build, kind: Kind, needed: Expression, t_f: Expression, v: Expression) -> Expression:
+    """What is zero where sliding stops, positive in the direction of sliding.
+
+    Where tractions alone give a velocity, in proportion, it is their balance at rest: what is left of this as sliding
+    begins is rounding, which must not stop it.
+    """
+    slip = build.variables.get("direction", "sliding")
+    if _has_pace(build, kind):
+        return slip * symengine.Symbol(PACE)
+    if str(v) not in build.motion.slides_by or build.motion.creeping is not None:
+        return slip * v
+    driving = build.expanded(needed - t_f).subs({v: 0})
+    slope = derivative(build.expanded(build.rows[str(v)]), v)
+    if depends(slope, v):
+        return slip * v
+    far = build.motion.far_fields.get(kind.d.axis)
+    size = absolute(needed) if kind.elastic or far is None else far.size(symengine.Symbol(kind.d.displacement))
+    return slip * driving + STILL * (size + absolute(t_f) + absolute(derivative(build.psi, symengine.Symbol("u_t"))))
+
+
+def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
     limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.motion.rubs)
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
@@ -317,7 +340,7 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
     balanced = not (kind.inertial and not kind.elastic)
     settles = bool(jump) or (balanced and not kind.rate_dependent)  # other gaps follow the bonds and their heat
     for s, word in ((1, "forward"), (-1, "backward")):
-        margin = where(slip**2 > 0, 1, where(build.t < build.held_until, 1, bears - s * needed))
+        margin = where(slip**2 > 0, 1, bears - s * needed)
         reason = f"sticking gives way and the interface slides {word}"
         build.transitions.append(
             Transition(
@@ -333,9 +356,8 @@ def _transitions(build: Build, kind: Kind, needed: Expression, v: Expression) ->
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = NONE if balanced else where(absolute(needed) <= limit, 0, sign(needed))
-    moving, onto = (symengine.Symbol(PACE), {CREEPS: symengine.Integer(1)}) if _has_pace(build, kind) else (v, {})
-    stop = {} if balanced else {moving: NONE}
-    stops = where(slip**2 > 0, slip * moving, 1)
-    build.transitions.append(
-        Transition("stop", stops, "sliding comes to a stop", {slip: onward, **onto}, stop, to_pass=True)
-    )
+    paced, velocity = _has_pace(build, kind), symengine.Symbol(kind.d.velocity)
+    stop = {} if balanced else {symengine.Symbol(PACE) if paced else velocity: NONE}
+    onto = {CREEPS: symengine.Integer(1)} if paced else {}
+    stops, reason = where(slip**2 > 0, still, 1), "sliding comes to a stop"
+    build.transitions.append(Transition("stop", stops, reason, {slip: onward, **onto}, stop, to_pass=True))
