@@ -279,3 +279,33 @@ run: {until: 3, outputs: 4}
     (load,) = (jump for jump in jumped.trajectory.jumps if jump.transition.name == "load")
     assert float(jumped.dataset["T_c"][-1]) == pytest.approx(300 + load.released / 10, rel=1e-7)
     assert load.released > 10 * (float(moved.dataset["T_c"][-1]) - 300) > 0
+
+
+def test_bonds_yield_where_a_slip_heats_what_they_bear():
+    """The strength falls with the heat of a slip, at once; the gap follows, and both stay in balance."""
+    text = """
+T_0: 300
+bodies:
+  a: {temperature: T, C: 50, capacity: constant}
+  b: {temperature: T, C: 50, capacity: constant}
+interface:
+  temperature: T
+  sites: 1e18
+  potential: [bond-stiffness: {E_b: 1e12, E_n: 1e12}]
+  bonding: [compliant-debonding: {t_max: {value: 1e6, times: [power: {exponent: -3}]}, E_b: 1e12, g_f: 5e-6}]
+  friction: [mohr-coulomb: {mu: 0.4, mu_s: 0.8, t_n_max: 3e6}]
+mechanics: {normal: {k: 1e12}, tangential: {k: 1e9}}
+loading: {w_n: {ramp: {rate: 0.5 um/s}}, w_t: {ramp: {rate: 0.3 mm/s}}}
+initial: {T: 300, phi: 1, g_n: 0}
+run: {until: 10, outputs: 101}
+"""
+    solution = Simulation(load_text(text)).run(error="balances")
+    assert {"slip forward", "yield"} <= set(names(solution))
+    data = solution.dataset
+    g, T, phi = (data[name].values for name in ("g_n", "T", "phi"))
+    strongest = 1e-6 * (T / 300) ** -3.0
+    left = strongest / np.maximum(g, 1e-7) * (5e-6 - g) / (5e-6 - strongest)
+    softened = data.time.values > solution.trajectory.jumps[-1].t
+    np.testing.assert_allclose(phi[softened], left[softened], atol=2e-9)
+    np.testing.assert_allclose(1e12 * (data.w_n.values - g), phi * 1e12 * g, atol=1e-8 * 5e6)
+    assert solution.audit.energy_error < 1e-9
