@@ -33,6 +33,8 @@ class NarrowScene:
     narrow: str
     size: float = 0.0
     """What errors are relative to, where not to the values themselves."""
+    rounded: float = 0.0
+    """What the last digits of the time of a steep history make of that, at most."""
 
 
 @dataclass
@@ -101,7 +103,7 @@ def integral(function: Callable[[Array], Array], end: float, marks: list[float])
     cuts = np.array([0.0, end, *(m + s * d for m in (0.0, end, *marks) for d in (0.0, *near) for s in (-1, 1))])
     points = np.unique(cuts[(cuts >= 0) & (cuts <= end)])
     rough, fine = (_gauss(function, points, order) for order in (24, 32))
-    assert abs(fine - rough) <= 1e-10 * abs(fine)
+    assert abs(fine - rough) <= 1e-8 * abs(fine)
     return fine
 
 
@@ -126,7 +128,7 @@ def scaled(
 ) -> tuple[float, float]:
     """A factor and the integral of a function times it, such that what is narrow is felt."""
     whole, wanted = integral(function, end, marks), float(rng.uniform(0.1, 2.0))
-    return wanted / whole, wanted
+    return (wanted / whole, wanted) if whole > 1e-12 * end else (1.0, whole)  # a history may come nowhere near
 
 
 def around(gap: History, places: list[float], end: float) -> list[float]:
@@ -343,7 +345,11 @@ def worked(
     text = f"title: {family}\n{ONE}{interface}\nloading: {{g_n: {gap.text}}}\nrun: {{until: {end!r} s}}\n"
     start, stop = energy(float(gap.value(0.0))), energy(float(gap.value(end)))
     size = max(abs(energy(float(gap.value(t)))) for t in (0.0, end, *gap.marks, *gap.passes(0.0, end)))
-    return NarrowScene(family, text, {"W_g_n": stop - start}, scale, size)
+    digits = 4 * np.finfo(float).eps
+    steep = [*gap.marks, *(t for level in (1e-9, 1e-8, 1e-7, 1e-6) for t in gap.passes(level, end))]
+    beside = [[energy(float(gap.value(t * (1 + s * digits)))) for s in (-1, 1)] for t in steep]
+    rounded = max((abs(after - before) for before, after in beside), default=0.0)
+    return NarrowScene(family, text, {"W_g_n": stop - start}, scale, size, rounded / size if size else 0.0)
 
 
 def zone(rng: np.random.Generator) -> NarrowScene:

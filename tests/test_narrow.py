@@ -40,7 +40,7 @@ def check_scene(seed):
     assert solution.trajectory.status == "finished", case.text
     for name, value in case.expected.items():
         error = abs(found[name] - value) / (case.size or abs(value) or 1.0)
-        assert error <= CLOSE + 10 * solution.accuracy.error, (name, found[name], value, case.text)
+        assert error <= CLOSE + case.rounded + 10 * solution.accuracy.error, (name, found[name], value, case.text)
 
 
 @pytest.mark.parametrize("seed", range(2 * len(FAMILIES)))
