@@ -194,11 +194,22 @@ def test_both_ways_of_bell_run_alike(tmp_path):
 
 def test_without_a_length_a_prescribed_force_is_refused(tmp_path):
     law = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm}}"
-    for load in ("loading: {f: 0 pN}", "loading: {t_n: 1 kPa}"):
+    for load in ("loading: {f: 1 pN}", "loading: {f: {ramp: {rate: 0}}}", "loading: {t_n: 1 kPa}"):
         with pytest.raises(
             InputError, match=r"held.yaml:8: .* same equilibrium under any prescribed force.* Give `x_on`"
         ):
             held(tmp_path, law, load).run()
+
+
+def test_a_force_that_a_case_holds_at_zero_needs_no_length(tmp_path):
+    """It does no work, so that the equilibrium is that of the potential; another force is refused all the same."""
+    law = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm}}"
+    case = held(tmp_path, law, "loading: {f: 0 pN}")
+    length_given = held(tmp_path, REVERSIBLE, "loading: {f: 0 pN}").run().dataset["phi"]
+    np.testing.assert_allclose(case.run().dataset["phi"], length_given, rtol=1e-9)
+    for change in (lambda: case.run({"loading.f": "5 pN"}), lambda: case.sweep({"loading.f": ["0 pN", "5 pN"]})):
+        with pytest.raises(InputError, match="same equilibrium under any prescribed force"):
+            change()
 
 
 def test_a_length_beside_springs_is_refused(tmp_path):

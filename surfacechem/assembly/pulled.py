@@ -34,7 +34,7 @@ from surfacechem.assembly.mounting import driven
 from surfacechem.assembly.pairs import Opposed
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
-from surfacechem.terms import RateLaw, reads
+from surfacechem.terms import Load, RateLaw, reads
 
 Array = NDArray[np.float64]
 Change = Mapping[str, int | float]
@@ -46,8 +46,13 @@ NO_PART = 1e-12
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
     given = _prescribed(build)
-    for law in laws.values():
-        (_refuse_unknown_length if given else _refuse_idle_length)(law)
+    unknown = next((law for law in laws.values() if _lacks_length(law)), None)
+    if given and unknown is not None:
+        if _is_held_at_zero(build):
+            return {}
+        raise _unknown_length(unknown)
+    for law in laws.values() if not given else ():
+        _refuse_idle_length(law)
     found = lengths(laws, pairs) if given else {}
     if not found:
         return {}
@@ -62,23 +67,36 @@ def _prescribed(build: Build) -> bool:
     return driven(build, "f") or (shares and driven(build, "t_n"))
 
 
+def _is_held_at_zero(build: Build) -> bool:
+    """Whether the case holds the force at zero, where it does no work. Any other force is assembled anew."""
+    load = build.scene.loading.get("f")
+    if not isinstance(load, Load) or getattr(load, "level", None) != 0.0:
+        return False
+    build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
+    return True
+
+
 def by_affinity(law: RateLaw) -> bool:
     """Whether a law goes by an affinity that the work of a force is part of."""
     return law.length is not None or "mu" in reads(law.statement)
 
 
-def _refuse_unknown_length(law: RateLaw) -> None:
-    if law.balanced and law.length is None and "f" in reads(law.statement):
-        remedy = (
-            "Give `x_on`, 0 m where formation does not feel the force"
-            if hasattr(law, "x_on")
-            else "Write it as two reactions with `=>`, each with its own distance to the transition state"
-        )
-        raise InputError(
-            f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
-            f"how far a bond lets the load down as it forms is not known. {remedy}.",
-            law.place,
-        )
+def _lacks_length(law: RateLaw) -> bool:
+    """Whether the rate of a law feels the force and its reverse follows from the affinity, without the work."""
+    return law.balanced and law.length is None and "f" in reads(law.statement)
+
+
+def _unknown_length(law: RateLaw) -> InputError:
+    remedy = (
+        "Give `x_on`, 0 m where formation does not feel the force"
+        if hasattr(law, "x_on")
+        else "Write it as two reactions with `=>`, each with its own distance to the transition state"
+    )
+    return InputError(
+        f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
+        f"how far a bond lets the load down as it forms is not known. {remedy}.",
+        law.place,
+    )
 
 
 def _refuse_idle_length(law: RateLaw) -> None:
