@@ -125,15 +125,17 @@ def untrusted(folder: Path) -> str | None:
     """Why code in this folder could be another user's; None where it cannot be, or the folder is not there."""
     if not hasattr(os, "getuid"):
         return None  # on Windows a user's folder is writable to that user alone
-    paths = [cache_root(), folder, *(path for path in folder.rglob("*") if folder.is_dir())]
-    for path in paths:
+    root = cache_root()
+    # What another process removes meanwhile is passed over.
+    inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
+    for path in (root, folder, *inside):
         try:
-            found = path.stat() if path == paths[0] else path.lstat()
+            found = path.stat() if path == root else path.lstat()
         except OSError:
             continue
         if found.st_uid not in (os.getuid(), 0):
             return f"{path} belongs to another user"
-        shared = path == paths[0] and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
+        shared = path == root and found.st_mode & stat.S_ISVTX  # there others cannot replace what is ours
         if stat.S_ISLNK(found.st_mode) or (found.st_mode & OTHERS and not shared):
             return f"{path} can be written by other users"
     return None
@@ -278,7 +280,7 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, 
     """The compiled function, from the cache if it is sound and ours, else compiled anew, else compiled without a cache;
     parts are the names of the compiled functions that it alone calls.
     """
-    problem = untrusted(folder)
+    kernel, problem = None, untrusted(folder)
     if problem is None:
         for part in _parts(folder):
             if not _is_sound(part):
@@ -295,4 +297,4 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, 
         "SURFACECHEM_CACHE names another folder.",
         stacklevel=2,
     )
-    return _compile(function, signature, None, parts)
+    return _compile(function, signature, None, parts) if kernel is None else kernel

@@ -7,10 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 
 import pytest
 
-from surfacechem import objectcode
+from surfacechem import kernelcache, objectcode
 from surfacechem.kernelcache import is_filled, unsealed
 from surfacechem.solvers import stepper
 
@@ -176,6 +177,36 @@ def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path
 def test_what_is_kept_is_writable_to_oneself_alone(start, tmp_path: Path) -> None:
     assert finish(start(tmp_path / "cache", "import os; os.umask(0o002)"))[0] == "hits 0 filled True"
     assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_a_folder_that_another_process_removes_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "kernel" / "part").mkdir(parents=True)
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    scandir = os.scandir
+
+    def gone(path):
+        if Path(path).name == "part":
+            raise FileNotFoundError(path)
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", gone)
+    assert kernelcache.untrusted(tmp_path / "kernel") is None
+
+
+def test_what_is_compiled_but_cannot_be_sealed_is_not_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+
+    def compiled(*_):
+        made.append(SimpleNamespace(stats=SimpleNamespace(cache_hits={}, cache_path=str(tmp_path / "gone"))))
+        return made[-1]
+
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    monkeypatch.setattr(kernelcache, "_compile", compiled)
+    with pytest.warns(UserWarning, match="cannot be kept"):
+        assert kernelcache.compile_kernel(lambda: None, None, tmp_path / "kernel") is made[0]
+    assert len(made) == 1
 
 
 def test_importing_solvers_is_light() -> None:
