@@ -158,14 +158,14 @@ class Simulation:
         trajectory = chosen._solved(settings, values)
         if chosen is self:
             return self, trajectory, None
-        errors = CellErrors()
+        errors = chosen._halved(trajectory, given=False)
         for _ in range(spatial.TRIALS):
-            errors = chosen._halved(trajectory, given=False)
             finer = spatial.refined(chosen.case.scene, errors, chosen._layers(trajectory))
             if finer is None:
                 break
             chosen = self._with(finer)
             trajectory = chosen._solved(settings, values)
+            errors = chosen._halved(trajectory, given=False)
         return chosen, trajectory, None if spatial.fixed(self.case.scene) else errors
 
     def _solved(self, run: Run, values: Mapping[str, float]) -> Trajectory:
@@ -256,14 +256,15 @@ class Simulation:
             runs = sweeping.settings(self.system, plan, self.case.run, points)
             pairs = zip(runs, points, strict=True)
             chosen = self._graded(points, [spatial.shortest(self.system, *pair) for pair in pairs])
-        done, errors = chosen._swept(plan, values, threads), []
+        done = chosen._swept(plan, values, threads)
+        errors = [chosen._halved(run, given=False) for run in done] if search else []
         for _ in range(spatial.TRIALS if search else 0):
-            errors = [chosen._halved(run, given=False) for run in done]
             finer = spatial.refined(chosen.case.scene, spatial.worst(errors), chosen._layers(*done))
             if finer is None:
                 break
             chosen = self._with(finer)
             done = chosen._swept(plan, values, threads)
+            errors = [chosen._halved(run, given=False) for run in done]
         return chosen, done, [] if spatial.fixed(self.case.scene) else errors
 
     def _swept(self, plan: Plan, values: Mapping[str, float], threads: int | None) -> Sweep:

@@ -10,7 +10,7 @@ import slabs
 from scipy.special import erfcx
 
 import surfacechem
-from surfacechem import plots
+from surfacechem import plots, spatial
 from surfacechem.achieved import against_tighter, with_cells
 from surfacechem.case import load_text
 from surfacechem.errors import InputError
@@ -219,6 +219,14 @@ def test_cells_are_chosen_by_an_accuracy():
     assert np.all(widths[1:] > widths[:-1])
     reached = np.sqrt(0.2 * 2e-3 / 4e3 * 1.0)  # by the first output
     assert widths[0] < reached / 8
+
+
+def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(spatial, "TRIALS", 1)
+    simulation = two("{accuracy: 1e-5}")
+    chosen, trajectory, errors = simulation._resolved(simulation.case.run, {})
+    assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
+    assert errors == chosen._halved(trajectory, given=False)
 
 
 def test_the_error_of_the_cells_is_estimated():
