@@ -253,7 +253,7 @@ class _Books:
         booked = np.diff(points.ledger[:, [self._account(law) for law in laws]].sum(axis=1))
         rates = np.array([self.trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
         if self.trajectory.status == "stopped":  # a law that ends there may have no value
-            rates[-1:] = np.nan_to_num(rates[-1:])
+            rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
         seen = rates[1:] * self._lengths
         amount, whole = lost(booked, seen)
         if amount <= SLACK * self.trajectory.run.rtol * whole:

@@ -100,7 +100,8 @@ class Commands(TyperGroup):
         except OSError as error:
             # Every file is written by what says so itself: this is the standard output, which Python would try again.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            typer.echo(f"surfacechem: standard output: cannot be written: {error.strerror or error}.", err=True)
+            what = f"{error.filename}: cannot be used" if error.filename else "standard output: cannot be written"
+            typer.echo(f"surfacechem: {what}: {error.strerror or error}.", err=True)
             raise typer.Exit(UNWRITTEN) from None
 
 
