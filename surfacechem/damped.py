@@ -94,7 +94,7 @@ def _resisted(pushes: Array, onward: Array) -> Array:
 def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: float) -> Array | None:
     """The stable equilibrium that is as good as reached, to rounding; None where none is.
 
-    In it what has slid is in balance, or friction holds it.
+    In it what has slid is in balance, or friction holds it; what nothing pushes, as where it is symmetric, stays.
     """
     everything = np.arange(len(at))
     moved = np.nonzero(_resisted(driving(at[None]), onward)[0])[0]

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from surfacechem.compile import Program
 from surfacechem.pacing import too_fast
 from surfacechem.solvers.contract import REASONS, Points, Result, Status
-from surfacechem.starting import STABLE
-from surfacechem.system import Margin, State, System
+from surfacechem.system import STABLE, Margin, State, System
 
 Array = NDArray[np.float64]
 

@@ -422,8 +422,8 @@ class Equilibria:
         tangent, shape = found
         n = len(self.items)
         values = np.atleast_1d(shape(point.inputs()))
-        falls, warming, stiffness = values[:n], values[n : -n * n].reshape(n, -1), values[-n * n :].reshape(n, n)
-        way = self._lost_way(point, stiffness)
+        falls, warming = values[:n], values[n : -n * n].reshape(n, -1)
+        way = self._lost_way(point, values[-n * n :].reshape(n, n))
         direction, onward = float(np.sign(falls @ way.pulls)), self._onward_along(point, way)
         if onward and direction != onward:
             return None

@@ -1,4 +1,4 @@
-"""Outputs are tried before anything is computed."""
+"""The trial of an output before anything is computed."""
 
 from __future__ import annotations
 

@@ -255,7 +255,7 @@ class Jumper:
             obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
-        if item.settles and self.equilibria.is_pushed_back(final, balanced):
+        if item.settles and self.equilibria.is_pushed_back(final, balanced):  # friction pulls nothing back
             final = self.equilibria.with_slip(final, 0.0)
         jump = Jump(
             before.t, item, before, final, released, taken, ADMISSIBLE, since, lift, heat_out=out, entropy_out=taken

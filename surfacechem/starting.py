@@ -8,15 +8,12 @@ from numpy.typing import NDArray
 from surfacechem.compile import Program
 from surfacechem.errors import InputError
 from surfacechem.solvers.radau import consistent
-from surfacechem.system import System
+from surfacechem.system import STABLE, System
 
 Array = NDArray[np.float64]
 
 COLDER = 0.95 ** np.arange(1, 40)
 """Parts of the first guess of a temperature that are tried where that leads to an unstable one."""
-
-STABLE = "stable "
-"""How the names of margins begin that tell a stable state from an unstable one."""
 
 
 def stable_start(system: System, program: Program, y: Array, parameters: Array) -> Array:

@@ -24,6 +24,9 @@ from surfacechem.transitions import Equilibrium, Mode, Sink, Transition
 
 Array = NDArray[np.float64]
 
+STABLE = "stable "
+"""How the names of margins begin that tell a stable state from an unstable one."""
+
 START = "run.t_start"
 """Path of the time at which a stretch between events starts; within it time counts from there."""
 

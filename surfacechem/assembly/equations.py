@@ -14,7 +14,7 @@ from surfacechem.balances import Node
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Account, Margin, State
+from surfacechem.system import STABLE, Account, Margin, State
 from surfacechem.terms import Load
 
 _NEWTON = 20
@@ -196,7 +196,7 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
         other = reason
-    build.margins.append(Margin(f"stable {node.name}", slope, reason, below=(produced, other)))
+    build.margins.append(Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other)))
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:

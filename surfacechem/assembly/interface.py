@@ -315,8 +315,8 @@ def _tractions(build: Build) -> None:
     if parallel := in_parallel(build):
         traction = "t_a" if depends(build.psi, symengine.Symbol("u_t")) else "t_e"
         names = " and ".join(law.name() for law in parallel)
-        arrangement = f"{names} in parallel with friction" if build.interface.frictions else names
-        build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", arrangement)
+        text = f"{names} in parallel with friction" if build.interface.frictions else names
+        build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", text)
     if depends(build.psi, symengine.Symbol("g_n")):
         pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
         build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

@@ -53,7 +53,7 @@ from surfacechem.assembly.slip import NONE, STILL, UNSTABLE, evolve, name_tracti
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, norm, sqrt, where
 from surfacechem.quantities import VARIABLES
-from surfacechem.system import Given, Margin
+from surfacechem.system import STABLE, Given, Margin
 from surfacechem.transitions import Transition
 
 WORDS = {0.0: "sticks", 1.0: "slides"}
@@ -205,7 +205,7 @@ def _steady(build: Build, sides: Sequence[Side]) -> Expression:
     build.rows["turn"] = where(SLIDES * norm(*pull) > 0, across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
     stable = -derivative(build.expanded(along), SPEED)
-    build.margins.append(Margin("stable speed", where(SLIDES > 0, stable, 1), UNSTABLE))
+    build.margins.append(Margin(f"{STABLE}speed", where(SLIDES > 0, stable, 1), UNSTABLE))
     return signed
 
 

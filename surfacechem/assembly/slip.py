@@ -29,7 +29,7 @@ from surfacechem.assembly.mounting import KEYS, LENGTH, Direction, FarField, Hel
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.system import Margin, State
+from surfacechem.system import STABLE, Margin, State
 from surfacechem.transitions import Equilibrium, Transition
 
 NONE = symengine.Integer(0)
@@ -303,7 +303,7 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
             "mass or a damper.",
             PLACE,
         )
-    build.margins.append(Margin(f"stable {v}", where(slides > 0, slope, 1), UNSTABLE))
+    build.margins.append(Margin(f"{STABLE}{v}", where(slides > 0, slope, 1), UNSTABLE))
 
 
 def _is_damped(kind: Kind) -> bool:

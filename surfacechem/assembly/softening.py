@@ -100,15 +100,17 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
     begins = where(mode**2 > 0, 1, present)
     beyond = where(mode**2 > 0, 1, where(phi > 0, left - phi + NOTHING, 1))
+    ended = where(mode > 0, left, 1)
     remains = where(left < phi, where(left > 0, left, 0), phi)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
         build.motion.follows[phi] = remains
+    fewer = "a jump leaves fewer bonds than there were"
     build.transitions += [
-        Transition("yield", beyond, "a jump leaves less bonds than there were", {}, {phi: remains}, True, "snap"),
+        Transition("yield", beyond, fewer, jump={phi: remains}, settles=True, sinks="snap"),
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
         Transition("soften", begins, "bonds begin to break as the gap opens", breaks, to_pass=True),
         *_tear(build, mode, phi, left),
-        Transition("part", where(mode > 0, left, 1), "the last bonds break", lost, {phi: none}, True, "snap"),
+        Transition("part", ended, "the last bonds break", lost, {phi: none}, settles=True, sinks="snap"),
         Transition("unload", where(mode > 0, overshoot, 1), "bonds do not reach what the gap leaves", {mode: none}),
     ]
     if forming != 0:
@@ -133,7 +135,7 @@ def _start(build: Build, phi: Expression, left: Expression) -> None:
     build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
     slack = build.variables.get("slack", "the bonds")
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + slack)
-    remedy = "Give less bonds under `initial`, or a smaller gap."
+    remedy = "Give fewer bonds under `initial`, or a smaller gap."
     build.margins.append(
         Margin("bonds within their envelope", given, "there are more bonds than the gap leaves", remedy=remedy)
     )

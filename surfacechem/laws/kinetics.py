@@ -65,6 +65,7 @@ class Relaxation(RateLaw):
 
     def rate(self, mu: Expression, dmu_dphi: Expression, n_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
+        # A time that falls with temperature is an exponential, whose inverse may have a large exponent.
         return -n_c * product(1 / self.tau) * mu / dmu_dphi
 
 
