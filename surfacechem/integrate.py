@@ -68,9 +68,13 @@ class Run:
     """Parts of the run in each of which its steps are held against the equations at least once."""
 
     def __post_init__(self) -> None:
-        """Output times start at zero, where the initial values hold, and increase."""
+        """Output times start at zero, where the initial values hold, and increase; tolerances have a meaning."""
         if len(self.times) < 2 or self.times[0] != 0 or any(b <= a for a, b in pairwise(self.times)):
             raise InputError("output times must start at 0 and increase from each to the next, at least two.")
+        if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
+            raise InputError(
+                f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
+            )
 
     def second(self, rtol: float) -> Run:
         """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more

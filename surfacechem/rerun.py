@@ -90,17 +90,20 @@ def run_again(record: Record) -> Solution | SweepSolution:
     case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=f"case in {record.path}")
     departures = _departures(record)
     solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
-    if solver not in solvers.names or not 0 < rtol < 1:
-        raise record.error(f"no run is made with the solver '{solver}' at rtol {rtol:g}.")
-    run = replace(
-        case.run,
-        solver=solver,
-        rtol=rtol,
-        times=tuple(departures.get("times", case.run.times)),
-        atol=departures.get("atol", case.run.atol),
-        max_steps=departures.get("max_steps", case.run.max_steps),
-        max_seconds=None,
-    )
+    if solver not in solvers.names:
+        raise record.error(f"no run is made with the solver '{solver}'.")
+    try:
+        run = replace(
+            case.run,
+            solver=solver,
+            rtol=rtol,
+            times=tuple(departures.get("times", case.run.times)),
+            atol=departures.get("atol", case.run.atol),
+            max_steps=departures.get("max_steps", case.run.max_steps),
+            max_seconds=None,
+        )
+    except InputError as error:
+        raise error.at(record.place) from None
     if "sweep" not in record.attributes:
         return Simulation(case).run(departures.get("changes"), run, departures.get("error", "auto"))
     try:

@@ -98,6 +98,14 @@ def test_damaged_bytes(files, which, count, tmp_path):
         names = names[len(done.stdout.split()) :]
 
 
+@pytest.mark.parametrize("departures", ['{"atol": -1.0}', '{"atol": NaN}', '{"times": [1, 0]}'])
+def test_settings_that_no_run_has_are_refused_with_the_file(files, tmp_path: Path, departures: str) -> None:
+    with xarray.open_dataset(files["run"]) as dataset:
+        dataset.assign_attrs(departures=departures).to_netcdf(tmp_path / "run.nc")
+    with pytest.raises(InputError, match=r"run\.nc: (output times|rtol)"):
+        rerun.run_again(rerun.read(tmp_path / "run.nc"))
+
+
 def edited(dataset: xarray.Dataset, random: Random) -> xarray.Dataset:
     """A dataset in which something is missing, renamed, replaced or of another kind."""
     name = random.choice(list(dataset.variables))
