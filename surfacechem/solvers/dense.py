@@ -81,18 +81,23 @@ def interpolate(w: Any, x: float) -> None:
 
 
 @compiled
+def change_and_slope(k: int, x: float, row: Any) -> Any:
+    """A polynomial of a step at the fraction x, less its value at the start, and its derivative by x."""
+    top = stage_count(k)
+    value, slope = row[top], 0.0
+    for i in range(top - 1, -1, -1):
+        slope = slope * (x - NEWTON_NODES[k, i]) + value
+        value = value * (x - NEWTON_NODES[k, i]) + row[i]
+    return value * x, slope * x + value
+
+
+@compiled
 def interpolate_rate(w: Any, h: float, x: float) -> None:
     """State at the fraction x of the step, and the derivative of its polynomial."""
-    k = w.count[MEMBER]
-    top = stage_count(k)
     for m in range(w.polynomial.shape[0]):
-        row = w.polynomial[m]
-        value, slope = row[top], 0.0
-        for i in range(top - 1, -1, -1):
-            slope = slope * (x - NEWTON_NODES[k, i]) + value
-            value = value * (x - NEWTON_NODES[k, i]) + row[i]
-        w.vector[TRIAL, m] = w.vector[Y, m] + value * x
-        w.vector[TRIAL_DOT, m] = (slope * x + value) / h
+        change, slope = change_and_slope(w.count[MEMBER], x, w.polynomial[m])
+        w.vector[TRIAL, m] = w.vector[Y, m] + change
+        w.vector[TRIAL_DOT, m] = slope / h
 
 
 @compiled

@@ -9,7 +9,7 @@ nothing in common with its polynomial, a step is too long.
 
 from typing import Any
 
-from surfacechem.solvers.dense import interpolate_rate, keep_polynomial
+from surfacechem.solvers.dense import change_and_slope, interpolate_rate, keep_polynomial
 from surfacechem.solvers.native import (
     BASE,
     ERROR,
@@ -25,9 +25,8 @@ from surfacechem.solvers.native import (
 )
 from surfacechem.solvers.noise import find_noise
 from surfacechem.solvers.quadrature import defect_norm, excused_norm
-from surfacechem.solvers.radau_stages import stage_count
 from surfacechem.solvers.radau_step import MAGNIFIED, error_norm, filter_residual
-from surfacechem.solvers.radau_tables import GAMMA, NEWTON_NODES
+from surfacechem.solvers.radau_tables import GAMMA
 
 FAR = 3.0
 """Errors in units of what a step may have at its start, beyond which it has not seen what is there: between the stages
@@ -59,18 +58,13 @@ def _state_differs(w: Any, h: float, x: float) -> bool:
 def _ledger_differs(w: Any, h: float, x: float, remaining: float) -> bool:
     """Whether the rates of the ledger at a point are far from its polynomial, with the state corrected there."""
     k = w.count[MEMBER]
-    top = stage_count(k)
     for j in range(w.algebraic.shape[0]):
         w.inputs[1 + j] += w.vector[ERROR, j]
         w.inputs[1 + w.algebraic.shape[0] + j] += GAMMA[k] / h * w.vector[ERROR, j]
     evaluate(w, LEDGER, w.ledger[Q_PROBE].ctypes.data)
     for m in range(w.ledger.shape[1]):
-        row = w.q_polynomial[m]
-        value, slope = row[top], 0.0
-        for i in range(top - 1, -1, -1):
-            slope = slope * (x - NEWTON_NODES[k, i]) + value
-            value = value * (x - NEWTON_NODES[k, i]) + row[i]
-        w.ledger[Q_PROBE, m] = h * w.ledger[Q_PROBE, m] - (slope * x + value)
+        _, slope = change_and_slope(k, x, w.q_polynomial[m])
+        w.ledger[Q_PROBE, m] = h * w.ledger[Q_PROBE, m] - slope
     return bool(not defect_norm(w, Q_PROBE, h, remaining) <= FAR and not excused_norm(w, h) <= FAR)
 
 
