@@ -28,7 +28,8 @@ LAST = 3e-14
 """Tolerance of the second run where the first has the tightest one."""
 
 FLOOR = 1e-9
-"""Times of events below this part of the run count as this when their errors are made relative."""
+"""Times of events below this part of the run count as this when their errors are made relative; so do exact answers of
+the stability study below this part of their largest."""
 
 ROUNDING = float(np.finfo(float).eps)
 """No error is claimed to be less than the last digit."""

@@ -29,7 +29,7 @@ from surfacechem.stability.matrix import (
 )
 from surfacechem.stability.matrix import LEAST as LEAST_DIGITS
 from surfacechem.stability.page import cell_text
-from surfacechem.stability.regime import Exact, Refused, Stops
+from surfacechem.stability.regime import Exact, Problem, Refused, Stops
 from surfacechem.stability.regimes import regimes
 from surfacechem.stability.study import stability
 
@@ -130,6 +130,18 @@ def test_the_condition_number_is_that_of_the_exact_solution():
         ratio = (1 - part**2) / (2 * part**2)  # of the relative change of T over that of t / t_0
         found = condition(regimes()["cold"].problem(part), ["T"])
         assert found == pytest.approx(4 * ratio + abs(1 + 2 * ratio), rel=0.05)
+
+
+@pytest.mark.parametrize("size", [1e-15, 1.0, 1e15])
+def test_the_condition_number_knows_no_units(size):
+    """A line through the origin changes with its slope and with the time."""
+
+    def line(data, t):
+        return {"u": data["slope"] * t}
+
+    data = {"slope": size}
+    found = condition(Problem("", [1.0, 2.0], Exact(lambda t: line(data, t), data=data, again=line)), ["u"])
+    np.testing.assert_allclose(found, 2.0, rtol=1e-6)
 
 
 def test_the_condition_number_of_a_runaway_is_its_rate_times_the_time():

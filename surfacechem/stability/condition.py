@@ -54,6 +54,11 @@ def condition(problem: Problem, names: Collection[str]) -> float:
     return float("nan")
 
 
+def least(values: Array | float) -> float:
+    """Size of an exact answer below which its errors are relative to this: a part of its largest value."""
+    return FLOOR * float(np.max(np.abs(values), initial=0.0))
+
+
 def _known(values: Mapping[str, Array | float], names: Collection[str]) -> dict[str, Array]:
     return {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in values.items() if name in names}
 
@@ -108,5 +113,5 @@ def _changes(
         except InputError:
             continue
         done = abs(moved - data[name]) / abs(data[name])
-        return {key: relative_errors(found[key], values, FLOOR) / done for key, values in base.items()}
+        return {key: relative_errors(found[key], values, least(values)) / done for key, values in base.items()}
     return None

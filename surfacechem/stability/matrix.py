@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surfacechem import case as cases
-from surfacechem.accuracy import FLOOR, relative_error
+from surfacechem.accuracy import relative_error
 from surfacechem.achieved import computed
 from surfacechem.case import Case
 from surfacechem.errors import InputError
 from surfacechem.integrate import OWN, Model, Run, Trajectory
-from surfacechem.stability.condition import condition
+from surfacechem.stability.condition import condition, least
 from surfacechem.stability.regime import Exact, Problem, Refused, Regime, Stops
 
 log = logging.getLogger(__name__)
@@ -186,9 +186,7 @@ def largest_error(expected: Exact, trajectory: Trajectory) -> tuple[float, str]:
     exact = expected.values(trajectory.result.times)
     known = {*expected.also, *(state.name for state in trajectory.model.system.states)}
     errors = {
-        name: relative_error(ours[name], np.asarray(exact[name]), FLOOR * float(np.max(np.abs(exact[name]))))
-        for name in exact
-        if name in known
+        name: relative_error(ours[name], np.asarray(exact[name]), least(exact[name])) for name in exact if name in known
     }
     worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
     return errors[worst], f"in {worst}"
