@@ -100,7 +100,8 @@ def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> 
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
     if second.status == "failed" or len(second.result.times) < len(trajectory.result.times):
-        return unknown(f"a second run at rtol {other:.0e} {EARLIER}: {second.reason}")
+        fate = EARLIER if len(second.result.times) <= len(trajectory.result.times) else "failed later"
+        return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
     errors, note = apart(trajectory, second)
     if not errors:
         return unknown("the run ended before its second output")

@@ -18,6 +18,7 @@ from surfacechem.scene import Scene
 from surfacechem.solvers.contract import Problem
 from surfacechem.system import System
 from surfacechem.terms import Law, Varying
+from surfacechem.transitions import INTERFACE
 
 Array = NDArray[np.float64]
 
@@ -192,9 +193,8 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
 
 def warnings(system: System) -> list[str]:
     """What is given but has no effect, beside what the assembly found."""
-    read = {
-        symbol for row in [*system.residual(), *map(system.expand, _audited(system))] for symbol in row.free_symbols
-    }
+    formulas = [*_audited(system), *_heated(system)]
+    read = {symbol for row in [*system.residual(), *map(system.expand, formulas)] for symbol in row.free_symbols}
     idle = [
         p for p in system.parameters if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
@@ -222,6 +222,14 @@ def _audited(system: System) -> list[object]:
         + [c.resistance for c in system.conductors]
         + [x for item in system.transitions for x in (item.margin, *item.modes.values(), *item.jump.values())]
     )
+
+
+def _heated(system: System) -> list[object]:
+    """Parts of the heat of jumps; what slides or snaps makes all of it in the interface, none in supports."""
+    jumps = [item for item in system.transitions if (item.settles or item.jump) and not item.measure]
+    supported = any(item.sinks == "joint" for item in jumps)
+    makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
+    return [sink.share for sinks in makers for sink in sinks]
 
 
 def laws_of(scene: Scene) -> list[Law]:

@@ -25,7 +25,8 @@ REMEDIES = {
     "w_n": "Prescribe `w_n` under `loading` or move it in the programme: 0 m where the far field does not move.",
     "w_t": "Prescribe `w_t` under `loading` or move it in the programme: 0 m where the far field does not move.",
     "w_t2": "Prescribe `w_t2` under `loading`, beside `w_t`: 0 m where the far field does not move across.",
-    "direction": "Prescribe `v` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
+    "direction": "Prescribe `v` under `loading`, or mount the bodies, `mechanics: {tangential: ...}`, and give the "
+    "interface what resists sliding: `friction`, or a potential of the tangential gap.",
     "direction_2": "Prescribe `v` and `v_2` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
     "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
     "p_contact": "Give the interface a potential that reads the normal gap, or prescribe `p`.",

@@ -79,6 +79,14 @@ def test_a_second_run_that_ends_earlier_leaves_the_error_unknown(monkeypatch):
     assert np.isnan(accuracy.error)
 
 
+def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier(monkeypatch):
+    simulation = surfacechem.load("exothermic")
+    first, second = (simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0, 2.0)[:n])) for n in (2, 3))
+    first, second = (replace(each, status="failed") for each in (first, second))
+    monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: second)
+    assert against_tighter(first).source.startswith("unknown: a second run at rtol 1e-13 failed later")
+
+
 def test_the_end_of_a_stopped_run_is_an_event():
     solution = surfacechem.load("cooling-to-zero").run()
     assert solution.status == "stopped"

@@ -88,7 +88,7 @@ def test_a_given_pressure_is_that_of_the_contact():
 @pytest.mark.parametrize("attraction", [ATTRACTION, ElectrostaticFlatFlat(s_1=1e-3, s_2=-1e-3)], ids=lambda x: x.name())
 def test_laws_of_the_net_pressure_beside_attraction_are_told(attraction):
     def told(made):
-        return [text for text in assemble(made).warnings if "reads the net pressure" in text]
+        return [text for text in assemble(made).warnings if "lowers the net pressure" in text]
 
     potentials = [Penalty(E_n=E_N), attraction]
     (text,) = told(in_contact(potentials, "net"))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from surfacechem.case import load_text
+from surfacechem.check import warnings
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.simulation import Simulation
 
@@ -243,3 +244,49 @@ def test_gaps_that_move_together_are_damped_each_by_its_own_support():
     rises = dict(zip((s.name for s in trajectory.model.system.states), jump.after.y - jump.before.y, strict=True))
     assert 700 * rises["T_2"] == pytest.approx((1.8e6) ** 2 / (2 * 4e8), rel=1e-9)
     assert 1000 * rises["T_1"] == pytest.approx(jump.released - (1.8e6) ** 2 / (2 * 4e8), rel=1e-9)
+
+
+@pytest.mark.parametrize("jumps", [True, False])
+def test_check_says_that_the_parts_of_a_support_matter_only_where_it_makes_heat(jumps):
+    """A support without a damper makes heat only as the gap follows a load that jumps."""
+    case = CASE.format(
+        **APART,
+        cells="",
+        C_1=1000,
+        interface="  potential: [penalty: {E_n: 1e13 Pa/m}]",
+        static=", mu_s: 0.6",
+        heat="",
+        mechanics="normal: {k: 1e9 Pa/m, beta_1: 1}, tangential: {k: 1e9 Pa/m}",
+        loading="F_n: {table: {times: [0, 2, %s, 4], values: [-2 MPa, -2 MPa, -1 MPa, -1 MPa]}}, w_n: 0, "
+        "w_t: {ramp: {rate: 0.25 mm/s}}" % ("2" if jumps else "3"),
+        initial="T_1: 300, T_2: 300",
+    )
+    simulation = Simulation(load_text(case))
+    idle = [text for text in warnings(simulation.model.system) if "beta_1 = 1 has no effect" in text]
+    moved = [
+        part.run().dataset.T_2[-1]
+        for part in (simulation, Simulation(load_text(case.replace("beta_1: 1", "beta_1: 0"))))
+    ]
+    assert bool(idle) != jumps
+    assert (abs(float(moved[0] - moved[1])) > 1e-6) == jumps
+
+
+def test_check_knows_that_a_snap_heats_by_the_partition():
+    case = CASE.format(
+        **APART,
+        cells="",
+        C_1=1000,
+        interface="  partition: {slider: 0, base: 1}\n"
+        "  potential: [exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}]",
+        static="",
+        heat="",
+        mechanics="normal: {k: 1e12 Pa/m, beta_1: 1}",
+        loading="w_n: {ramp: {rate: 8 um/s}}",
+        initial="T_1: 300, T_2: 300, g_n: 0",
+    ).replace("  friction: [coulomb: {mu: 0.5}]\n", "")
+    simulation = Simulation(load_text(case))
+    (idle,) = warnings(simulation.model.system)
+    assert "normal.beta_1" in idle
+    end = simulation.run().dataset.isel(time=-1)
+    assert end.T_1 == 300
+    assert end.T_2 > 300.01

@@ -237,9 +237,9 @@ def _warn_of_net_pressure(build: Build) -> None:
     net = [law.name() for law in readers if _reads_net_pressure(law) and not getattr(law, "t_n_max", 0)]
     if attracting and net:
         build.warnings.append(
-            f"{' and '.join(attracting)} attracts, and {' and '.join(dict.fromkeys(net))} reads the net pressure: "
-            "attraction lowers it, although it presses the surfaces together. To read what the contact bears give the "
-            "law `pressure: contact`, or a factor `of: p_contact`."
+            f"The attraction of {' and '.join(attracting)} lowers the net pressure, which is read by "
+            f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
+            "bears give the law `pressure: contact`, or a factor `of: p_contact`."
         )
 
 
