@@ -219,9 +219,9 @@ class Hybrid:
             return point
         while not self._chatters(point.t) or self._calmed(point):
             now = self._margins(point)
-            if self._ended(now):
-                return None
             due = self._due(now[self.first :], point)
+            if self._ended(now, due is not None):
+                return None
             if due is None:
                 self.limits = []
                 return point
@@ -284,13 +284,20 @@ class Hybrid:
         measures = [item.measure for item in self.system.transitions]
         return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
 
-    def _ended(self, now: Array) -> bool:
-        """Whether a jump has carried the state to where a law ends."""
+    @cached_property
+    def _of_modes(self) -> list[bool]:
+        """Which limits read what has no past: it is found anew as modes change."""
+        found = {x for state in self.system.states for x in ((state.symbol,) if state.algebraic else ()) + (state.dot,)}
+        return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
+
+    def _ended(self, now: Array, due: bool) -> bool:
+        """Whether a jump has carried the state to where a law ends; not what modes say that are left at this moment."""
         kinds, margins = self.problem.margins[: self.first], self.system.moving_margins()
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
         least = [0.0 if margin.domain else -NOISE * size for margin, size in zip(margins, self.largest, strict=False)]
         closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < least[i]]
         closed += [i for i in self.limits if now[i] <= NOISE * self.largest[i]]
+        closed = [i for i in closed if not (due and self._of_modes[i])]
         if closed and self.jumps:
             reason = self.system.reason(margins[closed[0]], self.jumps[-1].after.inputs())
             self.status, self.reason = Status.EVENT, reason

@@ -290,3 +290,27 @@ def test_check_knows_that_a_snap_heats_by_the_partition():
     end = simulation.run().dataset.isel(time=-1)
     assert end.T_1 == 300
     assert end.T_2 > 300.01
+
+
+@pytest.mark.parametrize("method", ["radau", "lsoda"])
+def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
+    """The limit rises faster than the spring pulls: sliding stops, as if the pressure had jumped."""
+    runs = []
+    for rise in (0, 1e-3):
+        case = load_text(
+            CASE.format(
+                **THERMAL["paths"],
+                cells="",
+                C_1=1000,
+                static="",
+                mechanics="tangential: {k: 1e9 Pa/m}",
+                loading=f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}, "
+                "w_t: {ramp: {rate: 0.25 mm/s}}",
+                initial="T_1: 300, T_2: 300",
+            )
+        )
+        runs.append(Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances"))
+    assert [run.status for run in runs] == ["finished", "finished"]
+    assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
+    for name in ("u_t", "T_1", "T_2", "T_c"):
+        np.testing.assert_allclose(runs[1].dataset[name][-1], runs[0].dataset[name][-1], rtol=1e-8)
