@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
@@ -72,9 +72,14 @@ def _signals_raised() -> Iterator[None]:
 
 def _leave(code: int, message: str) -> NoReturn:
     """End at once: compiled code may still be running in another thread, which would be waited for."""
-    typer.echo(f"surfacechem: {message}", err=True)
-    sys.stderr.flush()
+    _tell(message)
     os._exit(code)
+
+
+def _tell(message: object) -> None:
+    """A line on stderr; the exit code says it where nothing can be written there."""
+    with suppress(OSError):
+        typer.echo(f"surfacechem: {message}", err=True)
 
 
 class Commands(TyperGroup):
@@ -86,10 +91,10 @@ class Commands(TyperGroup):
             with _signals_raised():
                 return super().invoke(ctx)
         except OutputError as error:
-            typer.echo(f"surfacechem: {error}", err=True)
+            _tell(error)
             raise typer.Exit(UNWRITTEN) from None
         except SurfacechemError as error:
-            typer.echo(f"surfacechem: {error}", err=True)
+            _tell(error)
             raise typer.Exit(BAD_INPUT) from None
         except SignalledError as error:
             (number,) = error.args
@@ -101,7 +106,7 @@ class Commands(TyperGroup):
             # Every file is written by what says so itself: this is the standard output, which Python would try again.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             what = f"{error.filename}: cannot be used" if error.filename else "standard output: cannot be written"
-            typer.echo(f"surfacechem: {what}: {error.strerror or error}.", err=True)
+            _tell(f"{what}: {error.strerror or error}.")
             raise typer.Exit(UNWRITTEN) from None
 
 

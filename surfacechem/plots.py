@@ -173,7 +173,8 @@ def opened(data: xarray.Dataset | str | Path, *needed: str) -> xarray.Dataset:
     ``needed`` are variables without which there is nothing to draw.
     """
     if isinstance(data, xarray.Dataset):
-        dataset, place = data, None
+        source = data.encoding.get("source")
+        dataset, place = data, Place(str(source)) if source else None
     else:
         dataset, place = _read(Path(data)), Place(str(data))
     for name in needed:

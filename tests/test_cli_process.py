@@ -157,3 +157,12 @@ def test_a_full_standard_output_is_one_message(tmp_path, arguments):
     assert done.returncode == 5
     assert done.stderr.splitlines()[-1] == "surfacechem: standard output: cannot be written: No space left on device."
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize(("arguments", "code"), [(("laws",), 5), (("run", "nowhere"), 2)])
+def test_where_nothing_can_be_said_the_exit_code_stays(tmp_path, arguments, code):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=full, check=False)
+    assert done.returncode == code

@@ -8,7 +8,7 @@ import xarray
 
 from surfacechem.errors import InputError
 from surfacechem.panels import merged
-from surfacechem.plots import figure, logarithmic, save, symbol
+from surfacechem.plots import figure, logarithmic, opened, save, symbol
 
 pytestmark = pytest.mark.around
 
@@ -198,3 +198,10 @@ def test_curves_that_coincide_share_a_label():
 
 def test_symbols():
     assert symbol("theta_bond_s") == r"$\theta_{\mathrm{bond\ s}}$"
+
+
+def test_a_dataset_that_misses_a_variable_is_named(tmp_path):
+    path = tmp_path / "foreign.nc"
+    xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(path)
+    with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
+        figure(opened(path))

@@ -32,20 +32,26 @@ def read_mechanism(tree: Tree | None, base: str, content: str | None, evaluate: 
     file = _with_suffix(text(named, "the mechanism"))
     if content is None:
         path = _find(file, Path(base), named)
-        return _load(path, phase, bonds, tree, evaluate, neighbours)
+        return _load(path, str(path), phase, bonds, tree, evaluate, neighbours)
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
         path.write_text(content, encoding="utf-8")
-        return _load(path, phase, bonds, tree, evaluate, neighbours)
+        return _load(path, file, phase, bonds, tree, evaluate, neighbours)
 
 
 def _load(
-    path: Path, phase: str | None, bonds: Sequence[str] | None, tree: Tree, evaluate: bool, beside: dict[str, Tree]
+    path: Path,
+    name: str,
+    phase: str | None,
+    bonds: Sequence[str] | None,
+    tree: Tree,
+    evaluate: bool,
+    beside: dict[str, Tree],
 ) -> Mechanism:
     from surfacechem.mechanism import load_mechanism
 
     neighbours = {name: _neighbour(child) for name, child in beside.items()}
-    return load_mechanism(path, phase, bonds, tree.place, evaluate, neighbours)
+    return load_mechanism(path, phase, bonds, tree.place, evaluate, neighbours, name)
 
 
 def _neighbour(tree: Tree) -> Neighbour:

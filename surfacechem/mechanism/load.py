@@ -74,16 +74,17 @@ def load_mechanism(
     place: Place | None = None,
     evaluate: bool = False,
     neighbours: Mapping[str, Neighbour] = NONE,
+    name: str = "",
 ) -> Mechanism:
     """Read one surface phase of a Cantera mechanism.
 
     ``phase`` may be left out where the file has one; ``bonds`` names the species that count as bonds. ``place`` is
     where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what is
     not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which the
-    phases beside the surface are held.
+    phases beside the surface are held. ``name`` is what errors call the file if not by its path.
     """
     path = _find(Path(path), place)
-    source = Source(str(path), document.read(path, limits=LIMITS))
+    source = Source(name or str(path), document.read(path, name, LIMITS))
     entry = source.phase(phase, place)
     check(source, entry, evaluate)
     surface, said = _cantera(source, entry)
