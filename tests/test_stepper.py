@@ -376,3 +376,16 @@ def test_batch_with_times_of_their_own_and_events() -> None:
     np.testing.assert_allclose([events.t[0] for events in batch.events], np.log(2.0) / rates, rtol=1e-10)
     with pytest.raises(ValueError, match="segments and times too"):
         solve_many(program, np.ones((3, 1)), rates[:, None, None], [[0.0, 1.0]], 1e-8, 1e-8, times=[[1.0]])
+
+
+def test_a_return_code_without_words_ends_the_step():
+    """The wrapper of SUNDIALS looks its message up and raises KeyError where it has none."""
+    from surfacechem.solvers.stepping import StepError
+    from surfacechem.solvers.sundials import _Stretch
+
+    class Library:
+        def init_step(self, *_start):
+            raise KeyError(-60)
+
+    with pytest.raises(StepError, match="return code -60"):
+        _Stretch(Library(), 0.0, 1.0, np.zeros(1))

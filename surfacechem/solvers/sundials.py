@@ -26,6 +26,8 @@ class _Stretch(Method):
             answer = action()
         except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError, SystemError) as error:
             raise StepError(str(error)) from error
+        except KeyError as error:  # the library's wrapper has no words for this return code
+            raise StepError(f"SUNDIALS gave up with its return code {error}") from error
         if not answer.success:
             raise StepError(str(answer.message))
         return answer
