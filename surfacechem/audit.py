@@ -317,8 +317,8 @@ def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any,
     """What is destroyed and what is turned over along the last axis: by the ledger, or at the ends of the steps if that
     is more.
 
-    >>> lost(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)
-    (0.375, 1.25)
+    >>> [float(x) for x in lost(np.array([1.0, -0.25]), np.array([0.75, -0.5]), 0.125)]
+    [0.375, 1.25]
     """
     amounts = [np.maximum(-produced - rounded, 0.0).sum(axis=-1) for produced in (booked, seen)]
     wholes = [np.abs(produced).sum(axis=-1) for produced in (booked, seen)]

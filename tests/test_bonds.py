@@ -305,4 +305,6 @@ def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness, rest):
     trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0), rtol=rtol))
     half = k_on / speed * math.sqrt(math.pi * BOLTZMANN * T / (2 * stiffness))
     exact = [0.0, -math.expm1(-half), -math.expm1(-2 * half)]
-    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=max(1e-9, 2 * rtol))
+    # The tolerance of phi is a part of its scale, one; half of the peak is far more than that.
+    assert exact[1] > 3 * rtol
+    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=max(1e-9, 2 * rtol), abs=2 * rtol)

@@ -36,7 +36,7 @@ def condition(problem: Problem, names: Collection[str]) -> float:
 
     >>> from surfacechem.stability.regimes import regimes
     >>> [f"{condition(regimes()['cold'].problem(part), ['T']):.0e}" for part in (1e-3, 1e-6)]
-    ['2e+06', '2e+12']
+    ['3e+06', '3e+12']
     """
     expected = problem.expected
     if isinstance(expected, Exact) and expected.again is not None:
