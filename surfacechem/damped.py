@@ -122,4 +122,7 @@ def _equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: 
         at[free] += step
         if size <= DIGITS:
             break
-    return at if last <= NEAR * RTOL else None
+    # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
+    borne = np.abs(change) @ scale[free] * max(last, DIGITS)
+    rests = last <= NEAR * RTOL and np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne)
+    return at if rests else None
