@@ -286,8 +286,8 @@ class Hybrid:
 
     @cached_property
     def _of_modes(self) -> list[bool]:
-        """Which limits read what has no past: it is found anew as modes change."""
-        found = {x for state in self.system.states for x in ((state.symbol,) if state.algebraic else ()) + (state.dot,)}
+        """Which limits read states that have no past: they are found anew as modes change."""
+        found = {state.symbol for state in self.system.states if state.algebraic}
         return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
 
     def _ended(self, now: Array, due: bool) -> bool:
