@@ -105,8 +105,9 @@ def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> 
     errors, note = apart(trajectory, second)
     if not errors:
         return unknown("the run ended before its second output")
-    source = second_run(second.run)
-    found = Accuracy(stated(errors), f"{source}, which had {note}" if note else source, errors)
+    if note:  # one of the two went another way
+        return unknown(f"a second run at rtol {other:.0e}, which had {note}")
+    found = Accuracy(stated(errors), second_run(second.run), errors)
     return with_cells(found, cells) if cells else found
 
 
