@@ -333,3 +333,11 @@ def test_what_two_directions_do_not_know_is_refused():
         assemble(at_an_angle([ZONE], (Coulomb(mu=MU),), STIFF))
     with pytest.raises(InputError, match="elastic gap g_t of its potential has one"):
         assemble(at_an_angle([Penalty(E_n=E_N), TangentialStiffness(E_t=1e12)], (Coulomb(mu=MU),), HEAVY))
+
+
+def test_two_adhesions_of_the_same_bonds_are_one_of_their_sums():
+    """What the bonds leave is left once, however many energies the bonds have."""
+    parts = [AdhesionIntensity(C_N=x * C, C_T=x * C, w=x * W, E_n=x * E_N) for x in (0.25, 0.75)]
+    one, two = solve(scene([ADHESION])), solve(scene(parts))
+    for name in ("phi", "t_t", "D_coulomb", "T"):
+        np.testing.assert_allclose(series(two, name), series(one, name), rtol=1e-9, atol=1e-12)

@@ -199,14 +199,17 @@ def _energies(
     """
     series = in_series(build)
     found = {law: _per_reference_area(build, b, b.statement, gaps[law]) for law, b in bounds.items()}
+    parts: set[Expression] = set()  # several adhesions of the same bonds leave the same part unbonded
     for law in in_parallel(build):
         if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
-            build.motion.rubs *= build.variables.call(bounds[law], unbonded)
+            parts.add(build.variables.call(bounds[law], unbonded))
             build.warnings += [
                 f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
                 for friction in build.interface.frictions
                 if friction.breaks_bonds
             ]
+    for part in parts:
+        build.motion.rubs *= part
     if build.motion.rubs != 1:
         g_t = symengine.Symbol("g_t")
         for law in series:
