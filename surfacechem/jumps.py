@@ -403,7 +403,8 @@ class Jumper:
             done = True
             for j, column in free:
                 T = rows[:, column]
-                change = (target[:, j] - U[:, j]) / C[:, j]
+                with np.errstate(over="ignore", invalid="ignore"):  # far away a search may see no number
+                    change = (target[:, j] - U[:, j]) / C[:, j]
                 moved = T + change
                 done = done and not np.any(np.abs(change) > 4e-16 * np.abs(T))
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
