@@ -70,14 +70,14 @@ def shortened(text: str) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``" Did you mean 'x'? Known: x, y."`` for a name that is not among the known ones."""
-    names = sorted(known)
+    names = sorted(map(str, known))
     shown = ", ".join(names[:MANY]) + (f" and {len(names) - MANY} more" if len(names) > MANY else "")
     return f"{nearest(name, names)} Known: {shown or 'none'}."
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it."""
-    names = sorted(known)
+    names = sorted(map(str, known))
     close = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.6)
     guess = next((n for n in names if close and n.lower() == close[0]), None)
     return f" Did you mean '{guess}'?" if guess else ""

@@ -228,7 +228,7 @@ def refusal(case, folder):
 @pytest.mark.parametrize("examples", [150, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_documents(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
-    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))
     def run(name, data):
         plain = PLAIN[name]
         for _ in range(data.draw(st.integers(1, 3))):
@@ -241,7 +241,7 @@ def test_mutated_documents(examples, file):
 @pytest.mark.parametrize("examples", [150, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_texts(examples, file):
     @given(name=st.sampled_from(list(TEXTS)), data=st.data())
-    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, derandomize=True, suppress_health_check=list(HealthCheck))
     def run(name, data):
         is_read_or_refused(garbled(TEXTS[name], data), file, data.draw(SOLVERS))
 

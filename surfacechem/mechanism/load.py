@@ -279,18 +279,21 @@ def _lowered(reaction: Any, source: Source, entry: Any, number: str, species: tu
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     _check_reaction(reaction, forward, place)
     taking_part = tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders})
-    return law(
-        number=number,
-        equation=reaction.equation,
-        orders=forward,
-        products={variables[name]: nu for name, nu in reaction.products.items()},
-        change=_change(reaction, variables),
-        species=taking_part,
-        reversible=bool(reaction.reversible),
-        place=place,
-        **law.parameters_of(reaction, variables, sum(forward.values())),
-        **rate_fields(law, source, entry),
-    )
+    try:
+        return law(
+            number=number,
+            equation=reaction.equation,
+            orders=forward,
+            products={variables[name]: nu for name, nu in reaction.products.items()},
+            change=_change(reaction, variables),
+            species=taking_part,
+            reversible=bool(reaction.reversible),
+            place=place,
+            **law.parameters_of(reaction, variables, sum(forward.values())),
+            **rate_fields(law, source, entry),
+        )
+    except InputError as error:  # a number of Cantera's that is out of range
+        raise InputError(f"reaction {reaction.equation}: {error.message}", error.place or place) from None
 
 
 def _check_reaction(reaction: Any, orders: Mapping[str, float], place: Place) -> None:
