@@ -5,8 +5,8 @@ VENV ?= .venv
 BIN := $(abspath $(VENV))/bin
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
-# The tests of a file share what they assemble and compile, so that a file stays with one worker.
-PYTEST := $(BIN)/pytest -n 2 --dist loadfile
+# Tests that share what they assemble, compile and run stay with one worker (tests/conftest.py).
+PYTEST := $(BIN)/pytest -n 2 --dist loadgroup
 
 .PHONY: run test lint unit core slow docs cases wheel coverage mutation bench clean
 
@@ -50,7 +50,7 @@ wheel: $(TOOLS)  ## the wheel, by itself, in an empty environment and another fo
 coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	$(BIN)/coverage run -m pytest -n 2 --dist loadfile
+	$(BIN)/coverage run -m pytest -n 2 --dist loadgroup
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 

@@ -4,11 +4,11 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 import thermodynamics as laws
+from case_runs import load, solved
 
 import surfacechem
 from surfacechem import spatial
@@ -17,7 +17,6 @@ from surfacechem.achieved import against_exact, against_tighter, floor
 from surfacechem.assembly import assemble
 from surfacechem.case import names
 from surfacechem.errors import InputError
-from surfacechem.solution import Solution
 
 STOPPED = {
     "cooling-to-zero": "the temperature T reached zero",
@@ -33,15 +32,6 @@ CELLS = {"sudden-contact": 1e-4, "epoxy-cure-thick": 6e-5}
 """Cases whose bodies are divided into cells, and the accuracy that these have; the second asks for 1e-4 itself."""
 
 every_case = pytest.mark.parametrize("name", names())
-
-
-load = cache(surfacechem.load)
-"""Every case is compiled once."""
-
-
-@cache
-def solved(name: str) -> Solution:
-    return load(name).run()
 
 
 @every_case

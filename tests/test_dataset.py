@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray
+from case_runs import solved
 
 import surfacechem
 from surfacechem.case import names
@@ -22,7 +23,7 @@ SKIPPED = ["check_spatiotemporal_dims_have_coordinate_vars"]
 
 @pytest.fixture(scope="module")
 def solution():
-    return surfacechem.run("exothermic")
+    return solved("exothermic")
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +33,7 @@ def written(tmp_path_factory):
 
     @cache
     def run(name):
-        solution = surfacechem.run(name)
+        solution = solved(name)
         return solution.dataset, solution.write(folder / f"{name}.nc")
 
     return run
