@@ -2,15 +2,17 @@
 
 The folder's name holds a digest of the kernel's sources, the versions of Numba and Python and the processor, so that
 code is never reused where it does not fit. What is kept is machine code: it is loaded only where its SHA-256 is the one
-noted when it was made, and where no other user could have written it. A cache that cannot be written, read or trusted
-costs compile time, never a result.
+noted when it was made, and where no other user could have written it. Each file is written aside, takes its name when
+it is whole, and is never removed: processes that compile at once do so each for itself and the last one's file stays,
+as sound as the others'; none waits for another or sees what is half done. A cache that cannot be written, read or
+trusted costs compile time, never a result.
 """
 
 import gc
 import hashlib
 import os
+import pickle
 import platform
-import shutil
 import stat
 import sys
 import tempfile
@@ -24,8 +26,8 @@ from typing import Any
 OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permission of others to write."""
 
-SUMS = "SHA256SUMS"
-"""File of the digests of the files beside it."""
+FILE = "kernel.numba"
+"""File of what Numba loads; others of the folder that begin with `kernel.` hold the same code in other forms."""
 
 
 def cache_root() -> Path:
@@ -61,15 +63,16 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
 
 def is_filled(folder: Path) -> bool:
     """Whether the folder holds machine code that would be loaded."""
-    return untrusted(folder) is None and any(_is_sound(part) for part in _parts(folder))
+    return untrusted(folder) is None and _content(folder) is not None
 
 
-def _parts(folder: Path) -> list[Path]:
-    """The folders in which Numba keeps code, one for each place that the sources are at."""
+def _content(folder: Path) -> bytes | None:
+    """What Numba loads; None where it, or what has been made together with it, is damaged: all is then made anew."""
     try:
-        return [part for part in folder.iterdir() if part.is_dir() and any(part.glob("*.nb[ci]"))]
+        contents = {path.name: unsealed(path.read_bytes()) for path in folder.glob("kernel.*")}
     except OSError:
-        return []
+        return None
+    return None if None in contents.values() else contents.get(FILE)
 
 
 def sealed(content: bytes) -> bytes:
@@ -81,29 +84,6 @@ def unsealed(data: bytes) -> bytes | None:
     """The content of sealed data; None where it is damaged."""
     content = data[2 * hashlib.sha256().digest_size + 1 :]
     return content if sealed(content) == data else None
-
-
-def _sums(part: Path) -> bytes:
-    """SHA-256 of each file of a folder, as `sha256sum` prints them."""
-    files = sorted(path for path in part.iterdir() if path.name != SUMS)
-    return b"".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n".encode() for path in files)
-
-
-def _is_sound(part: Path) -> bool:
-    try:
-        return (part / SUMS).read_bytes() == _sums(part)
-    except OSError:
-        return False
-
-
-def _seal(part: Path) -> None:
-    """Note the digests of what has just been written, once it is on the disk; nobody else may write there."""
-    for path in part.iterdir():
-        with path.open("rb") as file:
-            os.fsync(file.fileno())
-    keep_file(part / SUMS, _sums(part))
-    for path in (part.parent, part, *part.iterdir()):
-        path.chmod(path.stat().st_mode & ~OTHERS)
 
 
 def keep_file(path: Path, data: bytes) -> None:
@@ -141,22 +121,52 @@ def untrusted(folder: Path) -> str | None:
     return None
 
 
-def discard(folder: Path) -> None:
-    """Remove what is kept in a folder, so that it is made anew."""
-    shutil.rmtree(folder, ignore_errors=True)
+class _Kept:
+    """Where a function of Numba's looks for its machine code and puts it: one file, wherever the sources are."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.cache_path = str(folder)
+
+    def load_overload(self, _signature: Any, context: Any) -> Any:
+        """What has been compiled for a processor like this one; None where there is nothing sound."""
+        from numba.core.compiler import CompileResult
+
+        content = _content(self.folder)
+        if content is None:
+            return None
+        context.refresh()
+        processor, reduced = pickle.loads(content)
+        result: Any = CompileResult
+        return result._rebuild(context, *reduced) if processor == context.codegen().magic_tuple() else None
+
+    def save_overload(self, _signature: Any, compiled: Any) -> None:
+        """Keep what has just been compiled."""
+        from numba.core import serialize
+
+        numbas: Any = serialize
+        if compiled.library.has_dynamic_globals:
+            _warn(self.folder, "it holds addresses of this process")
+            return
+        data = sealed(numbas.dumps((compiled.codegen.magic_tuple(), compiled._reduce())))
+        try:
+            for path in (cache_root(), self.folder):
+                path.mkdir(mode=0o755, parents=True, exist_ok=True)  # writable to oneself alone from the start
+            keep_file(self.folder / FILE, data)
+        except OSError as error:
+            _warn(self.folder, str(error))
 
 
-def _writable(folder: Path) -> None:
-    for path in (cache_root(), folder):
-        if not path.is_dir():
-            path.mkdir(parents=True, exist_ok=True)
-            path.chmod(path.stat().st_mode & ~OTHERS)
-    with tempfile.TemporaryFile(dir=folder):
-        pass
+def _warn(folder: Path, problem: str) -> None:
+    warnings.warn(
+        f"The compiled stepper cannot be kept in {folder} ({problem}); it is compiled for this process alone. "
+        "SURFACECHEM_CACHE names another folder.",
+        stacklevel=3,
+    )
 
 
 @contextmanager
-def _settings(folder: Path | None) -> Iterator[None]:
+def _settings() -> Iterator[None]:
     """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
 
     Loops here run over a handful of states: vectorising them slows them down. What Numba makes on the way lives until
@@ -165,18 +175,16 @@ def _settings(folder: Path | None) -> Iterator[None]:
     import numba
 
     collecting = gc.isenabled()
-    chosen = {"CACHE_DIR": str(folder or ""), "LOOP_VECTORIZE": 0}
-    usual = {name: getattr(numba.config, name) for name in chosen}
+    config: Any = numba.config
+    usual = config.LOOP_VECTORIZE
     try:
-        for name, value in chosen.items():
-            setattr(numba.config, name, value)
+        config.LOOP_VECTORIZE = 0
         gc.disable()
         yield
     finally:
         if collecting:
             gc.enable()
-        for name, value in usual.items():
-            setattr(numba.config, name, value)
+        config.LOOP_VECTORIZE = usual
 
 
 @contextmanager
@@ -266,35 +274,20 @@ def _compared_at_once() -> Iterator[None]:
         flags.__hash__, flags.__eq__ = usual
 
 
-def _compile(function: Callable[..., None], signature: Any, folder: Path | None, parts: Collection[str]) -> Any:
+def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
+    """The compiled function, from the cache if it is sound and ours, else compiled anew, and kept where that can be;
+    parts are the names of the compiled functions that it alone calls.
+    """
     import numba
     from numba.core.compiler_lock import global_compiler_lock
 
-    if folder is not None:
-        _writable(folder)
-    with global_compiler_lock, _settings(folder), _unfinished(parts), _loops_kept(), _compared_at_once():
-        return numba.njit(signature, cache=folder is not None, nogil=True, error_model="numpy")(function)
-
-
-def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
-    """The compiled function, from the cache if it is sound and ours, else compiled anew, else compiled without a cache;
-    parts are the names of the compiled functions that it alone calls.
-    """
-    kernel, problem = None, untrusted(folder)
+    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    problem = untrusted(folder)
     if problem is None:
-        for part in _parts(folder):
-            if not _is_sound(part):
-                discard(part)
-        try:
-            kernel = _compile(function, signature, folder, parts)
-            if not kernel.stats.cache_hits:
-                _seal(Path(kernel.stats.cache_path))
-            return kernel
-        except OSError as error:
-            problem = str(error)
-    warnings.warn(
-        f"The compiled stepper cannot be kept in {folder} ({problem}); compiling it for this process. "
-        "SURFACECHEM_CACHE names another folder.",
-        stacklevel=2,
-    )
-    return _compile(function, signature, None, parts) if kernel is None else kernel
+        kernel._cache = _Kept(folder)
+    else:
+        _warn(folder, problem)
+    with global_compiler_lock, _settings(), _unfinished(parts), _loops_kept(), _compared_at_once():
+        kernel.compile(signature)
+    kernel.disable_compile()
+    return kernel

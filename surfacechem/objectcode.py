@@ -11,6 +11,7 @@ import ctypes
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -19,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.kernelcache import discard, keep_file, sealed, unsealed, untrusted
+from surfacechem.kernelcache import keep_file, sealed, unsealed, untrusted
 
 FILE = "kernel.object"
 
@@ -57,26 +58,27 @@ def keep(kernel: Any, folder: Path) -> None:
         _, _, (code, _) = made.library.serialize_using_object_code()
     except RuntimeError:
         return  # the kernel came from the cache, and its code with it
+    data = sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code)
     with suppress(OSError, subprocess.SubprocessError):
-        trial = folder / f"{FILE}.{os.getpid()}"
-        trial.mkdir(mode=0o755)
-        keep_file(trial / FILE, sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code))
+        if _is_loaded_elsewhere(data, folder):
+            keep_file(folder / FILE, data)
+        else:
+            (folder / FILE).unlink(missing_ok=True)  # a damaged one
+
+
+def _is_loaded_elsewhere(data: bytes, folder: Path) -> bool:
+    """Whether another process can load the code: LLVM ends the process in which it cannot."""
+    with tempfile.TemporaryDirectory(dir=folder) as trial:
+        keep_file(Path(trial) / FILE, data)
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         done = subprocess.run(
-            [sys.executable, "-c", PROOF, str(trial)], env=environment, capture_output=True, timeout=60
+            [sys.executable, "-c", PROOF, trial], env=environment, capture_output=True, timeout=LONGEST
         )
-        if done.returncode == 0:
-            (trial / FILE).replace(folder / FILE)
-        else:
-            (trial / FILE).unlink()
-        trial.rmdir()
+    return done.returncode == 0
 
 
 def load(folder: Path) -> Callable[..., None] | None:
-    """The kernel whose code is kept in a folder; None where there is none that can be trusted.
-
-    Code that is damaged goes with all that is kept beside it: it is made when the whole is compiled.
-    """
+    """The kernel whose code is kept in a folder; None where there is none that can be trusted."""
     if untrusted(folder) is not None:
         return None
     try:
@@ -84,7 +86,6 @@ def load(folder: Path) -> Callable[..., None] | None:
     except OSError:
         return None
     if content is None:
-        discard(folder)
         return None
     name, _, code = content.partition(b"\n")
     return Kernel(name.decode(), code)

@@ -5,9 +5,10 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from random import Random
-from types import SimpleNamespace
 
 import pytest
 
@@ -50,14 +51,45 @@ print("hits", sum(compiled.stats.cache_hits.values()), "filled", is_filled(folde
 def start(tmp_path: Path):
     (tmp_path / "tiny_kernel.py").write_text(KERNEL)
 
-    def run(cache: Path, first: str = "") -> subprocess.Popen[str]:
+    def run(cache: Path, first: str = "", here: Path = tmp_path) -> subprocess.Popen[str]:
         environment = {**os.environ, "SURFACECHEM_CACHE": str(cache)}
-        code = first + USE.format(here=str(tmp_path))
+        code = first + USE.format(here=str(here))
+        pipe = subprocess.PIPE
         return subprocess.Popen(
-            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [sys.executable, "-c", code], env=environment, stdin=pipe, stdout=pipe, stderr=pipe, text=True
         )
 
     return run
+
+
+STEPS = ["tempfile.mkstemp", "os.fsync", "os.replace"]
+BY_STEPS = f"""
+import os, tempfile
+from numba.core import dispatcher
+def pausing(usual):
+    def step(*arguments, **options):
+        print("paused", flush=True)
+        input()
+        return usual(*arguments, **options)
+    return step
+def compile(*arguments):
+    for step in {STEPS}:
+        exec(f"{{step}} = pausing({{step}})")
+    return usual(*arguments)
+usual = dispatcher._FunctionCompiler.compile
+dispatcher._FunctionCompiler.compile = pausing(compile)
+"""
+"""A process that has found nothing waits before it compiles, then before each step of keeping what it has compiled."""
+
+
+def pauses(process: subprocess.Popen[str]) -> Iterator[int]:
+    """Count the steps of a process, which goes on with the next as the loop does."""
+    for step in count():
+        if process.stdout.readline() != "paused\n":
+            return
+        yield step
+        process.stdin.write("go on\n")
+        process.stdin.flush()
 
 
 def finish(process: subprocess.Popen[str]) -> tuple[str, str]:
@@ -77,6 +109,33 @@ def test_two_processes_at_once(start, tmp_path: Path) -> None:
     assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
 
 
+def test_a_filled_cache_stays_filled_while_another_process_writes_to_it(start, tmp_path: Path, monkeypatch) -> None:
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(cache))
+    late = start(cache, BY_STEPS)
+    for step in pauses(late):
+        if step == 0:
+            assert finish(start(cache))[0] == "hits 0 filled True"
+            (folder,) = cache.iterdir()
+        assert is_filled(folder)
+    assert step >= len(STEPS)
+    finish(late)
+    assert is_filled(folder)
+
+
+@pytest.mark.parametrize("last", range(len(STEPS) + 1))
+def test_what_a_killed_process_leaves_is_in_nobodys_way(start, tmp_path: Path, last: int) -> None:
+    killed = start(tmp_path / "cache", BY_STEPS)
+    for step in pauses(killed):
+        if step == last:
+            killed.kill()
+            break
+    killed.communicate()
+    assert killed.returncode < 0
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
 def test_folder_that_cannot_be_written(start, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     out, err = finish(start(tmp_path / "file" / "cache"))
@@ -92,11 +151,27 @@ def test_disk_that_is_full(start, tmp_path: Path) -> None:
     assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
 
 
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-def test_damaged_files_are_replaced(start, tmp_path: Path, suffix: str) -> None:
+def test_a_damaged_file_is_replaced(start, tmp_path: Path) -> None:
     finish(start(tmp_path / "cache"))
-    for file in (tmp_path / "cache").glob(f"**/*.{suffix}"):
-        file.write_bytes(b"damaged")
+    (file,) = (tmp_path / "cache").glob("*/*")
+    file.write_bytes(b"damaged")
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_code_is_found_wherever_its_sources_are(start, tmp_path: Path) -> None:
+    """The same sources at two places are one kernel; what is kept does not depend on who compiled it first."""
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "tiny_kernel.py").rename(tmp_path / "elsewhere" / "tiny_kernel.py")
+    assert finish(start(tmp_path / "cache", here=tmp_path / "elsewhere"))[0] == "hits 1 filled True"
+    assert len(list((tmp_path / "cache").glob("*/*"))) == 1
+
+
+def test_code_for_another_processor_is_not_loaded(start, tmp_path: Path) -> None:
+    assert finish(start(tmp_path / "cache", "import os; os.environ['NUMBA_CPU_NAME'] = 'generic'"))[0].startswith(
+        "hits 0"
+    )
     assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
     assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
 
@@ -113,7 +188,9 @@ def kept(tmp_path_factory):
 def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
     random = Random(1)
-    for file in (objectcode.FILE, *(str(path.relative_to(kept)) for path in kept.glob("*/*"))):
+    files = [path.name for path in kept.glob("kernel.*")]
+    assert kernelcache.FILE in files
+    for file in files:
         content = (kept / file).read_bytes()
         for bit in (0, 8 * len(content) - 1, *(random.randrange(8 * len(content)) for _ in range(20))):
             folder = tmp_path / kept.name
@@ -121,12 +198,9 @@ def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch: 
             damaged = bytearray(content)
             damaged[bit // 8] ^= 1 << bit % 8
             (folder / file).write_bytes(damaged)
-            if file == objectcode.FILE:
-                assert objectcode.load(folder) is None
-                assert not folder.exists()  # so that the next process makes it anew
-            else:
-                assert not is_filled(folder)
-                shutil.rmtree(folder)
+            assert file != objectcode.FILE or objectcode.load(folder) is None
+            assert not is_filled(folder)  # so that the next process makes all of it anew
+            shutil.rmtree(folder)
 
 
 @pytest.mark.parametrize("content", [b"", b"damaged", b"kernel\ncode"])
@@ -167,7 +241,7 @@ def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path
         folder.rename(tmp_path / "elsewhere")
         folder.symlink_to(tmp_path / "elsewhere")
     else:
-        path = {"root": cache, "folder": folder, "file": next(folder.glob("*/*.nbc"))}[which]
+        path = {"root": cache, "folder": folder, "file": folder / kernelcache.FILE}[which]
         path.chmod(path.stat().st_mode | 0o020)
     out, err = finish(start(cache))
     assert out == "hits 0 filled False"
@@ -191,22 +265,6 @@ def test_a_folder_that_another_process_removes_is_no_error(tmp_path: Path, monke
 
     monkeypatch.setattr(os, "scandir", gone)
     assert kernelcache.untrusted(tmp_path / "kernel") is None
-
-
-def test_what_is_compiled_but_cannot_be_sealed_is_not_compiled_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = []
-
-    def compiled(*_):
-        made.append(SimpleNamespace(stats=SimpleNamespace(cache_hits={}, cache_path=str(tmp_path / "gone"))))
-        return made[-1]
-
-    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
-    monkeypatch.setattr(kernelcache, "_compile", compiled)
-    with pytest.warns(UserWarning, match="cannot be kept"):
-        assert kernelcache.compile_kernel(lambda: None, None, tmp_path / "kernel") is made[0]
-    assert len(made) == 1
 
 
 def test_importing_solvers_is_light() -> None:
