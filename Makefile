@@ -6,7 +6,7 @@ BIN := $(abspath $(VENV))/bin
 RUNTIME := $(VENV)/.installed
 TOOLS := $(VENV)/.installed-tools
 # Tests that share what they assemble, compile and run stay with one worker (tests/conftest.py).
-PYTEST := $(BIN)/pytest -n 2 --dist loadgroup
+PYTEST := $(BIN)/pytest -n 2 --dist loadfile
 
 .PHONY: run test lint unit core slow docs cases wheel coverage mutation bench clean
 
@@ -50,7 +50,7 @@ wheel: $(TOOLS)  ## the wheel, by itself, in an empty environment and another fo
 coverage: $(TOOLS)  ## the lines that the tests reach; fails under 95 %
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	$(BIN)/coverage run -m pytest -n 2 --dist loadgroup
+	$(BIN)/coverage run -m pytest -n 2 --dist loadfile
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report
 

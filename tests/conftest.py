@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
 
@@ -6,14 +8,17 @@ settings.register_profile("surfacechem", deadline=None)
 settings.load_profile("surfacechem")
 
 EVERY_CASE = ("test_cases", "test_dataset", "test_golden")
-"""Files of tests that ask for a run of every shipped case."""
+"""Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
 
 
-def pytest_collection_modifyitems(config, items):
-    """With `--dist loadgroup` tests that share what they assemble, compile and run stay with one worker: those of a
-    file, and those of every case.
-    """
-    if config.pluginmanager.hasplugin("xdist"):
-        for item in items:
-            group = "every case" if item.path.stem in EVERY_CASE else str(item.path)
-            item.add_marker(pytest.mark.xdist_group(group))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With ``--dist loadfile``, files that run every case go to the same worker."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class LoadSharedRuns(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "every case" if Path(file).stem in EVERY_CASE else file
+
+    return LoadSharedRuns(config, log) if config.getvalue("dist") == "loadfile" else None
