@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.marching import REACH
 from surfacechem.preparing import PREPARING
 
 Array = NDArray[np.float64]
@@ -83,6 +84,8 @@ def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> 
         rest = _at_rest(driving, scale, onward, motion.y, least)
         if rest is not None or motion.status != "running":
             return rest
+        if np.any(np.abs(motion.y) > REACH * scale):  # nothing bears it
+            return None
     return None
 
 
@@ -122,7 +125,8 @@ def _equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: 
         at[free] += step
         if size <= DIGITS:
             break
+    if last > NEAR * RTOL:
+        return None
     # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
     borne = np.abs(change) @ scale[free] * max(last, DIGITS)
-    rests = last <= NEAR * RTOL and np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne)
-    return at if rests else None
+    return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None

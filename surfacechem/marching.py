@@ -19,6 +19,9 @@ CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "dis
 FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
+REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
+"""How far a search goes, relative to the gap."""
+
 SMALLEST_GAP = 1e-12
 """Gap [m] below which the search starts as if from this one."""
 

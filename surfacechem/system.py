@@ -354,7 +354,7 @@ class System:
 
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run; when time alone leads to a peak is known before."""
-        evolved = {x for state in self.states for x in (state.symbol, state.dot)}
+        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {mode.symbol for mode in self.modes}
         moving = {True: evolved, False: evolved | {self.t}}
         return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving[m.peak])
 

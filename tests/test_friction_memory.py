@@ -12,6 +12,7 @@ from surfacechem.errors import InputError
 from surfacechem.integrate import Model, Run
 from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
 from surfacechem.laws.contact import BondStiffness
+from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.softening import CompliantDebonding
@@ -106,6 +107,20 @@ def test_growth_rates_are_those_of_linear_stability(ratio):
     expected = np.roots([0.01 * p / V + c_b, k - critical, k * V / L])
     np.testing.assert_allclose(sorted(rates(start), key=np.imag), sorted(expected, key=np.imag), rtol=1e-8)
     assert np.all((rates(start).real > 1e-12) == (ratio < 1))
+
+
+def test_sticking_needs_no_pressure():
+    """What nothing presses yet rests until its load begins, though it could not slide in balance."""
+    frictions = [RateAndStateAging(**PARAMETERS), Coulomb(mu=0.2, mu_s=0.8)]
+    interface = Interface(Hold(level=300.0), frictions=frictions)
+    pull = Table(times=[0.0, 2.0, 4.0], values=[0.0, 0.0, 1e-6])
+    loading = {"p": Hold(level=0.0), "w_t": pull}
+    mounting = Mounting(k=1e10)
+    scene = Scene(ISOTHERMAL, interface, loading=loading, T_0=300.0, initial={"theta": 10.0}, tangential=mounting)
+    trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1.0, 3.0]))
+    assert trajectory.status == "stopped", trajectory.reason
+    assert trajectory.reason.startswith("no steady sliding velocity: nothing resists it")
+    assert trajectory.result.t == pytest.approx(2.0, rel=1e-9)
 
 
 def test_an_extreme_direct_effect_does_not_overflow():

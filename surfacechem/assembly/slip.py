@@ -294,7 +294,8 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
         # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
         whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
         balance = whole.subs({v: 0}) / slope - v
-    build.rows[str(v)] = slides * balance + (1 - slides) * v
+    # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
+    build.rows[str(v)] = where(slides > 0, balance, v) if kind.sticks else balance
     if build.motion.creeping is not None and len(build.interface.frictions) == 1 and _is_damped(kind):
         return  # both friction and damper resist the more, the faster it slides
     if slope == 0:
