@@ -17,10 +17,11 @@ run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 
 test: lint unit docs cases wheel  ## everything
 
-lint: $(TOOLS)  ## style and types
+lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 unit: $(TOOLS)  ## the tests, without the slow ones
 	$(PYTEST)
@@ -71,7 +72,7 @@ $(VENV)/bin/python:
 
 $(RUNTIME): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --editable .
-	$(BIN)/python -m surfacechem.solvers
+	$(BIN)/python -m surfacechem.solve
 	touch $@
 
 $(TOOLS): $(RUNTIME)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from sksundae.ida import IDA
 
-from surfacechem.case import load_text
-from surfacechem.simulation import Simulation
+from surfacechem.format import load_text
+from surfacechem.runs.simulation import Simulation
 
 CELLS = (25, 50, 100, 200, 400)
 RTOL, END, REPEATS = 1e-8, 20.0, 5

@@ -24,9 +24,9 @@ from solver_problems import (
     slider_events,
 )
 
-from surfacechem.solvers import solver
-from surfacechem.solvers.contract import Margin
-from surfacechem.solvers.radau import solve_many
+from surfacechem.solve import solver
+from surfacechem.solve.contract import Margin
+from surfacechem.solve.radau.solver import solve_many
 
 EVENTS = 24
 FAR = 1000.0

@@ -47,9 +47,9 @@ from events import (
 from matplotlib import pyplot as plt
 from solver_problems import PARAMETERS, exothermic, exothermic_exact, exothermic_problem, problem, robertson_sums
 
-from surfacechem.solvers import names, solver
-from surfacechem.solvers.contract import Problem, Result
-from surfacechem.solvers.radau import solve_many
+from surfacechem.solve import names, solver
+from surfacechem.solve.contract import Problem, Result
+from surfacechem.solve.radau.solver import solve_many
 
 REPEATS = 3
 CASES = ("P1", "P2", "P3", "P4")

@@ -15,7 +15,9 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from mkdocs.structure.files import File, Files
 
 import surfacechem
-from surfacechem import case, plots, sweep_plots
+from surfacechem import format as case
+from surfacechem.plots import run as plots
+from surfacechem.plots import sweep as sweep_plots
 
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 

@@ -15,14 +15,17 @@ from typing import Any
 from mkdocs.structure.files import File, Files
 
 import surfacechem
-from surfacechem import case as cases
-from surfacechem import data, listing, plots, references
+from surfacechem import format as cases
+from surfacechem import references
+from surfacechem.contracts.terms import Law, Potential, Spec, reads
+from surfacechem.documents import shipped as data
 from surfacechem.laws import FAMILIES, laws
+from surfacechem.plots import run as plots
 from surfacechem.quantities import VARIABLES
-from surfacechem.stability import page as matrix
-from surfacechem.stability import stability
-from surfacechem.stability.regimes import regimes
-from surfacechem.terms import Law, Potential, Spec, reads
+from surfacechem.runs import listing
+from surfacechem.studies.stability import page as matrix
+from surfacechem.studies.stability import stability
+from surfacechem.studies.stability.regimes import regimes
 
 PLACES = {
     "capacity": "bodies.NAME.capacity, with its parameters beside it",
@@ -284,7 +287,7 @@ def made_variables(name: str) -> str:
 
 def made_variable_table() -> str:
     """What laws may read and cases may prescribe."""
-    from surfacechem.assembly import LOADABLE
+    from surfacechem.model.assemble import LOADABLE
 
     can = {*LOADABLE, "T_1", "T_2", "T_c"}
     rows = [(f"`{name}`", _unit(q.unit), q.long_name, "yes" if name in can else "") for name, q in VARIABLES.items()]
@@ -296,7 +299,7 @@ def made_cli() -> str:
     from typer.main import get_command
     from typer.testing import CliRunner
 
-    from surfacechem.cli import app
+    from surfacechem.cli.main import app
 
     names = [None, *get_command(app).commands]  # type: ignore[attr-defined]
     parts = []
@@ -310,7 +313,7 @@ def made_cli() -> str:
 
 def made_solvers() -> str:
     """Names of the solvers."""
-    from surfacechem import solvers
+    from surfacechem import solve as solvers
 
     return ", ".join(f"`{name}`" for name in solvers.names)
 

@@ -5,8 +5,9 @@
 >>> solution.status
 'finished'
 
-``load`` reads a case and returns a :class:`~surfacechem.simulation.Simulation`, which compiles once and runs with any
-values of its parameters; ``run`` does both, ``sweep`` runs many at once, ``precision`` measures error against run time.
+``load`` reads a case and returns a :class:`~surfacechem.runs.simulation.Simulation`, which compiles once and runs with
+any values of its parameters; ``run`` does both, ``sweep`` runs many at once, ``precision`` measures error against run
+time.
 Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
 """
 
@@ -15,19 +16,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from surfacechem.comparing import precision
-    from surfacechem.simulation import Simulation, load, run, sweep
+    from surfacechem.runs.simulation import Simulation, load, run, sweep
+    from surfacechem.studies.precision.comparing import precision
 
 __all__ = ["Simulation", "load", "precision", "run", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
     if name == "precision":
-        from surfacechem import comparing
+        from surfacechem.studies.precision import comparing
 
         return comparing.precision
     if name in __all__:
-        from surfacechem import simulation
+        from surfacechem.runs import simulation
 
         return getattr(simulation, name)
     raise AttributeError(f"module 'surfacechem' has no attribute {name!r}")

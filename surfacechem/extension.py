@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 
 import cantera
 
+from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.affinity import AffinityReaction
@@ -27,7 +28,6 @@ from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rates import KILO, CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import sides
 from surfacechem.quantities import VARIABLES
-from surfacechem.terms import Spec
 
 __all__ = ["LoadedInterface"]
 

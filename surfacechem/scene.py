@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from surfacechem import grids
-from surfacechem.errors import InputError, Place
-from surfacechem.substances import Fluid, Property
-from surfacechem.terms import (
+from surfacechem.contracts import grids
+from surfacechem.contracts.substances import Fluid, Property
+from surfacechem.contracts.terms import (
     BodyEnergy,
     Friction,
     HeatTransfer,
@@ -21,6 +20,7 @@ from surfacechem.terms import (
     option,
     parameter,
 )
+from surfacechem.errors import InputError, Place
 
 MOST_CELLS = 4096
 """Cells across a body at most that a case may give."""

@@ -12,13 +12,13 @@ from tables_mechanics import columns, expected, parameters, rows
 from test_tables import errors
 
 import surfacechem
-from surfacechem import choice
-from surfacechem.accuracy import first_tolerance
-from surfacechem.assembly import assemble
-from surfacechem.case import names
-from surfacechem.integrate import Model, Run, Trajectory
+from surfacechem.format import names
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.simulation import Simulation
+from surfacechem.model.assemble import assemble
+from surfacechem.results import choice
+from surfacechem.results.accuracy import first_tolerance
+from surfacechem.runs.simulation import Simulation
+from surfacechem.solve.run import Model, Run, Trajectory
 
 ACCURACIES = tuple(10.0**-k for k in range(3, 12))
 
@@ -199,7 +199,7 @@ def of_motion(name: str, accuracy: float) -> Achieved:
 
 EXACT: dict[str, Callable[[float], Achieved]] = {
     **{name: partial(of_table, name) for name in TABLES},
-    **{f"case {name}": partial(of_case, name) for name in names() if surfacechem.case.load(name).reference},
+    **{f"case {name}": partial(of_case, name) for name in names() if surfacechem.format.load(name).reference},
     **{name: partial(of_motion, name) for name in MOTION},
 }
 """Every exact solution by name: what an accuracy that is asked for gives."""

@@ -3,7 +3,7 @@
 from functools import cache
 
 import surfacechem
-from surfacechem.solution import Solution
+from surfacechem.results.solution import Solution
 
 load = cache(surfacechem.load)
 """A case, compiled once."""

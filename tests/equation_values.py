@@ -17,8 +17,8 @@ import scenes
 import scenes_mechanics
 import thermodynamics as laws
 
-from surfacechem.assembly import assemble
-from surfacechem.system import System
+from surfacechem.model.assemble import assemble
+from surfacechem.model.system import System
 
 TABLE = Path(__file__).with_suffix(".json")
 SCENES = {scene.__name__: (scene, {}) for scene in scenes.ALL} | {

@@ -27,10 +27,10 @@ import numpy as np
 import thermodynamics as laws
 from case_runs import load
 
-from surfacechem import spatial
-from surfacechem.assembly import assemble
-from surfacechem.case import names
-from surfacechem.solution import Solution
+from surfacechem.format import names
+from surfacechem.model.assemble import assemble
+from surfacechem.results import spatial
+from surfacechem.results.solution import Solution
 
 FOLDER = Path(__file__).parent / "golden"
 

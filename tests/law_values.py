@@ -14,9 +14,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from surfacechem.contracts.terms import Law, Load, RateFactor
 from surfacechem.laws import FAMILIES, forces, laws
 from surfacechem.quantities import VARIABLES
-from surfacechem.terms import Law, Load, RateFactor
 
 TABLE = Path(__file__).with_suffix(".json")
 POINTS = 8

@@ -9,13 +9,13 @@ import symengine
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from surfacechem.data import mechanisms
+from surfacechem.contracts.terms import reads
+from surfacechem.documents.shipped import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
 from surfacechem.mechanism.bonds import LoadedReaction
 from surfacechem.mechanism.kinds import kind_of
 from surfacechem.mechanism.mixture import AVOGADRO
-from surfacechem.terms import reads
 
 KMOL = 1000 * AVOGADRO
 SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))

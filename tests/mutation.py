@@ -24,8 +24,9 @@ from importlib.util import spec_from_file_location
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
+FILES = {path.stem.removeprefix("test_"): path for path in (ROOT / "tests").rglob("test_*.py")}
 EXPLAINED = Path(__file__).with_name("mutation_survivors.toml")
-MODULES = ("surfacechem/balances.py", "surfacechem/assembly/*.py", "surfacechem/laws/*.py")
+MODULES = ("surfacechem/model/balances.py", "surfacechem/model/*/*.py", "surfacechem/laws/*.py")
 SIGNS = ("ReplaceBinaryOperator_Add_Sub", "ReplaceBinaryOperator_Sub_Add", "ReplaceUnaryOperator_Delete_USub")
 FACTORS = ("ReplaceBinaryOperator_Mul_Div", "ReplaceBinaryOperator_Div_Mul")
 LONGEST = 600
@@ -98,7 +99,7 @@ def mutants(path: str, operators: tuple[str, ...]) -> Iterator[Mutant]:
 def groups(path: str) -> list[list[str]]:
     """Tests of a module, by how much they notice for what they cost."""
     chosen = OF_LAWS if path.startswith("surfacechem/laws") else OF_BALANCES
-    files = [[f"tests/test_{name}.py" for name in group] for group in chosen]
+    files = [[str(FILES[name]) for name in group] for group in chosen]
     return [[path, *files[0]], *files[1:]]
 
 
@@ -112,11 +113,11 @@ def prepare() -> None:
     import scipy.optimize
     import xarray
 
-    from surfacechem.solvers import stepper
+    from surfacechem.solve.radau import stepper
 
     del hypothesis, mpmath, numba, pytest, scipy, xarray
     stepper.run_batch()
-    assert "surfacechem.balances" not in sys.modules
+    assert "surfacechem.model.balances" not in sys.modules
     assert "surfacechem.laws" not in sys.modules
 
 

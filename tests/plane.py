@@ -5,12 +5,12 @@ import math
 import numpy as np
 from tables_mechanics import Solved, solve
 
-from surfacechem.assembly import assemble
-from surfacechem.integrate import Model
+from surfacechem.contracts.terms import Load
 from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.loading import Hold
+from surfacechem.model.assemble import assemble
 from surfacechem.scene import Body, Interface, Mounting, Scene
-from surfacechem.terms import Load
+from surfacechem.solve.run import Model
 
 BODIES = Body("lower", "T", Quadratic(C=50.0)), Body("upper", "T", Quadratic(C=50.0))
 FREE, SPRING = Mounting(m=5.0), Mounting(k=1e8, m=10.0)

@@ -2,10 +2,10 @@
 
 import random
 
+from surfacechem.contracts.terms import Factor, Law, Load, Varying, reads
 from surfacechem.laws import laws
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import Factor, Law, Load, Varying, reads
 
 T_0 = 300.0
 FORCE = 1e-11

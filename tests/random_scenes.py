@@ -5,7 +5,19 @@ from functools import cache
 
 from random_laws import T_0, Dice
 
-from surfacechem.data import mechanisms
+from surfacechem.contracts.substances import Property
+from surfacechem.contracts.terms import (
+    BodyEnergy,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Potential,
+    RateLaw,
+    Varying,
+    reads,
+)
+from surfacechem.documents.shipped import mechanisms
 from surfacechem.laws import laws
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
@@ -14,8 +26,6 @@ from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.mechanism import load_mechanism
 from surfacechem.media.coolprop import CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites, Stage
-from surfacechem.substances import Property
-from surfacechem.terms import BodyEnergy, Friction, HeatTransfer, Law, Limit, Potential, RateLaw, Varying, reads
 
 MEDIUM = ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m", "p_m", "d_m", "f_m")
 OWN = {"T_from", "T_to", "mu", "dmu_dphi", "ln_theta", "bonded", "softening", "direction", "direction_2", "sticking"}

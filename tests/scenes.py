@@ -1,5 +1,6 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
+from surfacechem.contracts.terms import Varying, parameter  # noqa: F401 - scenes may define laws
 from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.anisotropic import AnisotropicCoulomb
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
@@ -29,7 +30,6 @@ from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffi
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat, VanDerWaalsSpherePlane
 from surfacechem.scene import Body, Interface, Scene, Sites
-from surfacechem.terms import Varying, parameter  # noqa: F401 - scenes may define laws
 
 SITES = Sites(1e18, 1e18)
 

@@ -6,8 +6,8 @@ import numpy as np
 import symengine as se
 from scipy.optimize import brentq
 
-from surfacechem.compile import Program, compile_program
-from surfacechem.solvers.contract import Margin, Problem
+from surfacechem.compile.program import Program, compile_program
+from surfacechem.solve.contract import Margin, Problem
 
 CONDUCTANCE = (1e3, 1e12, 1e20)
 PARAMETERS = np.array([2.0, 300.0, 300.0, 1.0, 0.5])

@@ -7,10 +7,6 @@ from pathlib import Path
 import numpy as np
 from scenes import SITES, path, perfect_contact, varying
 
-from surfacechem.assembly import assemble
-from surfacechem.audit import audit
-from surfacechem.integrate import Model, Run, Trajectory
-from surfacechem.jumps import Jump
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
@@ -21,7 +17,11 @@ from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
 from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesDerjaguin, LennardJonesFlatFlat, LennardJonesSpherePlane
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
+from surfacechem.solve.jumps import Jump
+from surfacechem.solve.run import Model, Run, Trajectory
 
 FOLDER = Path(__file__).parent / "references"
 COLD_BODIES = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 import surfacechem
-from surfacechem.assembly import assemble
-from surfacechem.case import names
-from surfacechem.document import parse
-from surfacechem.solvers import stepper
+from surfacechem.documents.document import parse
+from surfacechem.format import names
+from surfacechem.model.assemble import assemble
+from surfacechem.solve.radau import stepper
 
 pytestmark = pytest.mark.around
 
@@ -156,7 +156,7 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
 
 def test_the_page_on_events_names_every_transition():
     """Those that the assembly spells out, those of the shipped cases, and those at the bounds of the bonding state."""
-    calls = (node for path in (ROOT / "surfacechem" / "assembly").glob("*.py") for node in ast.walk(parsed(path)))
+    calls = (node for path in (ROOT / "surfacechem" / "model").rglob("*.py") for node in ast.walk(parsed(path)))
     spelt = {
         call.args[0].value
         for call in calls

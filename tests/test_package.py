@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from surfacechem.data import cases, mechanisms
+from surfacechem.documents.shipped import cases, mechanisms
 
 pytestmark = pytest.mark.around
 

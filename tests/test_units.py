@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from surfacechem import units
+from surfacechem.contracts.terms import BodyEnergy, Factor, Friction, HeatTransfer, Load, Potential, RateLaw
 from surfacechem.errors import InputError, Place
 from surfacechem.quantities import VARIABLES
-from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Load, Potential, RateLaw
 
 
 @pytest.mark.parametrize(

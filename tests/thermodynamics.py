@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import mpmath
 import symengine
 
-from surfacechem.system import System
+from surfacechem.model.system import System
 
 BITS = 200
 DIGITS = 40

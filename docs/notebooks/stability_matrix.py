@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray
 
-from surfacechem.stability import stability
+from surfacechem.studies.stability import stability
 
 folder = Path(tempfile.mkdtemp())
 study = stability("capacity", "endothermic", "rupture", solvers=["radau", "lsoda", "cvode"], rtol=1e-8, rounds=0)

@@ -6,9 +6,19 @@ import importlib
 import inspect
 from collections.abc import Iterator
 
+from surfacechem.contracts.substances import Property
+from surfacechem.contracts.terms import (
+    BodyEnergy,
+    Factor,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Load,
+    Potential,
+    RateLaw,
+)
 from surfacechem.errors import InputError, suggestion
-from surfacechem.substances import Property
-from surfacechem.terms import BodyEnergy, Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),

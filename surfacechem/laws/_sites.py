@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression
-from surfacechem.terms import Potential, parameter
 
 
 class InteractingSites(Potential):

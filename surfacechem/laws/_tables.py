@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
+from surfacechem.contracts.terms import HeatTransfer, option
 from surfacechem.expressions import Expression
 from surfacechem.laws.tabulated import Curve
-from surfacechem.terms import HeatTransfer, option
 
 
 class ConductanceTable(HeatTransfer):

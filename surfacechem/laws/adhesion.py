@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import RateLaw, TangentialPotential, parameter
 from surfacechem.expressions import Expression, positive, where
-from surfacechem.terms import RateLaw, TangentialPotential, parameter
 
 
 class AdhesionIntensity(TangentialPotential):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import Friction, UnderPressure, parameter
 from surfacechem.expressions import Expression
-from surfacechem.terms import Friction, UnderPressure, parameter
 
 
 class AnisotropicCoulomb(UnderPressure, Friction):

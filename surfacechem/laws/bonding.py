@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression, log, mixing
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import Potential, parameter
 
 
 class BondEnergy(Potential):

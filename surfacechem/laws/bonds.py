@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import RateLaw, parameter
 from surfacechem.expressions import Expression, log_fraction, scaled_exp, scaled_expm1
 from surfacechem.laws.forces import (
     BellFactor,
@@ -15,7 +16,6 @@ from surfacechem.laws.forces import (
     TwoPathwayFactor,
 )
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import RateLaw, parameter
 
 
 class Bell(StatedBothWays):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import BodyEnergy, parameter
 from surfacechem.expressions import Expression, log
-from surfacechem.terms import BodyEnergy, parameter
 
 
 class Quadratic(BodyEnergy):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from surfacechem.contracts.terms import TangentialPotential, parameter
 from surfacechem.expressions import EXPONENT_CAP, Expression, decay, sqrt, where
-from surfacechem.terms import TangentialPotential, parameter
 
 CLOSED = 1e-16
 """Mixed gap over g_0 of a closed zone, whose direction is undefined: its square is far below the rounding of one."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from surfacechem.contracts.terms import Potential, TangentialPotential, option, parameter
 from surfacechem.expressions import Expression, log, positive, where
-from surfacechem.terms import Potential, TangentialPotential, option, parameter
 
 
 class NormalStiffness(Potential):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from surfacechem.contracts.terms import HeatTransfer, UnderPressure, Varying, option, parameter
 from surfacechem.expressions import Expression, power
 from surfacechem.laws._tables import ConductanceTable
-from surfacechem.terms import HeatTransfer, UnderPressure, Varying, option, parameter
 
 
 def _value(number: float | Varying) -> float:

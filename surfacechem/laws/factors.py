@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import Factor, parameter
 from surfacechem.expressions import Expression, exp
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.terms import Factor, parameter
 
 
 class Linear(Factor):

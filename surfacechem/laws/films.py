@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import Friction, HeatTransfer, Potential, parameter
 from surfacechem.expressions import Expression, positive, sqrt
-from surfacechem.terms import Friction, HeatTransfer, Potential, parameter
 
 
 class Film(HeatTransfer):

@@ -10,9 +10,9 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from surfacechem.contracts.terms import RateFactor, RateLaw, Varying, parameter
 from surfacechem.expressions import FRACTION_FLOOR, Expression, is_symbolic, log, log_fraction, log_sum, power, where
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import RateFactor, RateLaw, Varying, parameter
 
 
 class BellFactor(RateFactor):

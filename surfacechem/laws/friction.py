@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import Friction, UnderPressure, parameter
 from surfacechem.expressions import Expression, absolute, decay, positive, power
-from surfacechem.terms import Friction, UnderPressure, parameter
 
 
 class Coulomb(UnderPressure, Friction):

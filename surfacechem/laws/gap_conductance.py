@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from surfacechem.contracts.terms import HeatTransfer, option, parameter
 from surfacechem.expressions import Expression, exp, positive
 from surfacechem.laws._tables import ConductanceTable
 from surfacechem.quantities import STEFAN_BOLTZMANN
-from surfacechem.terms import HeatTransfer, option, parameter
 
 
 class GapConductance(HeatTransfer):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import HeatTransfer, parameter
 from surfacechem.expressions import Expression
 from surfacechem.quantities import STEFAN_BOLTZMANN
-from surfacechem.terms import HeatTransfer, parameter
 
 
 class Conductance(HeatTransfer):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import RateLaw, parameter
 from surfacechem.expressions import Expression, power, product, scaled_exp, scaled_expm1
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.terms import RateLaw, parameter
 
 
 class LinearAffinity(RateLaw):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import Limit, parameter
 from surfacechem.expressions import Expression
-from surfacechem.terms import Limit, parameter
 
 
 class TensileStrength(Limit):

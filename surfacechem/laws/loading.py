@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import ClassVar
 
+from surfacechem.contracts.terms import Load, option, parameter
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, sin
-from surfacechem.terms import Load, option, parameter
 
 
 class Hold(Load):

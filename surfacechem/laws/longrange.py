@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression, is_symbolic, log, where
 from surfacechem.laws._sites import InteractingSites
-from surfacechem.terms import Potential, parameter
 
 WALL = 0.01
 """Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""

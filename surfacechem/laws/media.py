@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from surfacechem.contracts.substances import Property
+from surfacechem.contracts.terms import parameter
 from surfacechem.expressions import Expression, exp, log, power
-from surfacechem.substances import Property
-from surfacechem.terms import parameter
 
 
 class Vogel(Property):

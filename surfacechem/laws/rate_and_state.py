@@ -6,8 +6,8 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
+from surfacechem.contracts.terms import Friction, UnderPressure, parameter
 from surfacechem.expressions import Expression, absolute, asinh_exp, exp, log, sinh_exp, where
-from surfacechem.terms import Friction, UnderPressure, parameter
 
 SLOWEST = 1e-300
 """Sliding velocity [m/s] that counts as none in a logarithm."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import RateLaw, parameter
 from surfacechem.expressions import Expression, where
-from surfacechem.terms import RateLaw, parameter
 
 
 class CompliantDebonding(RateLaw):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import RateFactor, reads
 from surfacechem.expressions import Expression
 from surfacechem.laws.forces import (
     BellFactor,
@@ -17,7 +18,6 @@ from surfacechem.laws.forces import (
     TwoPathwayFactor,
 )
 from surfacechem.mechanism.rates import InterfaceArrhenius
-from surfacechem.terms import RateFactor, reads
 
 
 class LoadedReaction(InterfaceArrhenius, RateFactor):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, log, log_fraction, log_sum, power, scaled_exp, where
 from surfacechem.mechanism.rates import GONE, InterfaceArrhenius, floored
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.terms import parameter
 
 
 class InterfaceKamalSourour(InterfaceArrhenius):

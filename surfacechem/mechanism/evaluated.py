@@ -10,11 +10,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from surfacechem.contracts.terms import option, parameter
 from surfacechem.expressions import Expression
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.mechanism.neighbours import Held
 from surfacechem.mechanism.rates import KILO, MechanismReaction
-from surfacechem.terms import option, parameter
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""

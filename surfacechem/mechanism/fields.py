@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any
 
+from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
 from surfacechem.mechanism.mixture import AVOGADRO, Spring
 from surfacechem.mechanism.rates import KILO, SurfaceReaction
 from surfacechem.mechanism.source import Source
-from surfacechem.terms import Spec
 
 SPRING = {
     "stiffness": Spec("N/m", "stiffness of the bond", at_least=0),

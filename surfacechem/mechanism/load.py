@@ -11,7 +11,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from surfacechem import data, document
+from surfacechem.contracts.terms import Potential, RateLaw
+from surfacechem.documents import document
+from surfacechem.documents import shipped as data
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.dependence import interactions
 from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
@@ -25,7 +27,6 @@ from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import LIMITS, Source, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.scene import BondingVariable, Engine, Sites
-from surfacechem.terms import Potential, RateLaw
 
 NONE: Mapping[str, Neighbour] = {}
 

@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from surfacechem.contracts.terms import Potential, option
 from surfacechem.expressions import Expression, mixing
 from surfacechem.mechanism.interaction import SAME, Interaction
 from surfacechem.mechanism.thermo import StandardGibbs
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.terms import Potential, option
 
 AVOGADRO = 6.02214076e23
 """Avogadro constant [1/mol] (exact, SI 2019)."""

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from surfacechem.contracts.terms import RateLaw, Spec, option, parameter
 from surfacechem.expressions import Expression, log, log_fraction, power, scaled_exp, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.terms import RateLaw, Spec, option, parameter
 
 KILO = 1000.0
 """Moles in a kmol, in which Cantera counts."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from surfacechem import document
-from surfacechem.document import Limits, Tree
+from surfacechem.documents import document
+from surfacechem.documents.document import Limits, Tree
 from surfacechem.errors import InputError, Place, suggestion
 
 LIMITS = Limits(largest=10_000_000, most=200_000)

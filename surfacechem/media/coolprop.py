@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem import fits
+from surfacechem.contracts import fits
+from surfacechem.contracts.substances import Fluid, FluidRange
 from surfacechem.errors import InputError
-from surfacechem.substances import Fluid, FluidRange
 
 Array = NDArray[np.float64]
 

@@ -15,11 +15,11 @@ from typing import Any
 import cantera
 import symengine
 
+from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.laws.loading import Hold
+from surfacechem.model.system import Parameter, System
 from surfacechem.scene import Body, Scene
-from surfacechem.system import Parameter, System
-from surfacechem.terms import Load, Spec
 
 STAND_IN = """
 phases:

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.assembly import assemble
-from surfacechem.case import Case
-from surfacechem.ends import STALLED
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import TINY, depends
-from surfacechem.integrate import Model, Run
+from surfacechem.format import Case
+from surfacechem.model.assemble import assemble
+from surfacechem.model.system import System
 from surfacechem.reactor import coupling
 from surfacechem.reactor.moments import Moments
-from surfacechem.solvers.contract import Array
-from surfacechem.solvers.evaluation import Evaluation
-from surfacechem.system import System
+from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.contract import Array
+from surfacechem.solve.diagnose import STALLED
+from surfacechem.solve.run import Model, Run
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.integrate import DEFAULT_RTOL, Run, Trajectory
 from surfacechem.reactor.embedded import EmbeddedScene
-from surfacechem.solution import Solution
-from surfacechem.solvers.contract import Array, Counters, Events, Problem, Result, Status
+from surfacechem.results.solution import Solution
+from surfacechem.solve.contract import Array, Counters, Events, Problem, Result, Status
+from surfacechem.solve.run import DEFAULT_RTOL, Run, Trajectory
 
 
 class History:

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Self
 import cantera
 import numpy as np
 
-from surfacechem import case as cases
-from surfacechem.case import Case
+from surfacechem import format as cases
+from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
+from surfacechem.format import Case
 from surfacechem.reactor.coupling import Port, node_of, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
 from surfacechem.reactor.history import History
-from surfacechem.simulation import Simulation
-from surfacechem.solvers.cantera_network import BackOffError, HeldReactor, contents
-from surfacechem.solvers.contract import Array
-from surfacechem.terms import Spec
+from surfacechem.runs.simulation import Simulation
+from surfacechem.solve.adapters.cantera_network import BackOffError, HeldReactor, contents
+from surfacechem.solve.contract import Array
 from surfacechem.units import parse
 
 if TYPE_CHECKING:

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from surfacechem.equilibria import Point
-from surfacechem.events import AT_ONCE, REACHED, Hybrid
-from surfacechem.integrate import Model
-from surfacechem.solvers import ASKING, solver
-from surfacechem.solvers.contract import Array, Problem
-from surfacechem.solvers.evaluation import Evaluation
-from surfacechem.stretches import changed
+from surfacechem.solve import ASKING, solver
+from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.arcs import changed
+from surfacechem.solve.contract import Array, Problem
+from surfacechem.solve.equilibria import Point
+from surfacechem.solve.hybrid import AT_ONCE, REACHED, Hybrid
+from surfacechem.solve.run import Model
 
 GLOBAL = 100
 """By how much the error of a state may exceed the tolerance of a step."""

@@ -13,7 +13,7 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.reactor.watch import Event, Watch
-from surfacechem.solvers.contract import Counters
+from surfacechem.solve.contract import Counters
 
 GROWTH = 1e4
 """How much longer than the last a step of CVODE may be: after the first step this, later 10."""

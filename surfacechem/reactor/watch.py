@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.solvers.contract import Array
-from surfacechem.solvers.crossings import crossings
+from surfacechem.solve.adapters.crossings import crossings
+from surfacechem.solve.contract import Array
 
 FIRST = 1e-9
 """First look ahead after a start, as part of what is integrated: the integrator starts with shorter steps still."""

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.contracts.terms import Load, Varying
 from surfacechem.errors import InputError
-from surfacechem.integrate import Trajectory
 from surfacechem.references.base import Array, Reference
 from surfacechem.scene import Body, Scene
-from surfacechem.terms import Load, Varying
+from surfacechem.solve.run import Trajectory
 
 
 def across(reference: Reference, exact: Mapping[str, Array], scene: Scene, run: Trajectory) -> dict[str, Array]:

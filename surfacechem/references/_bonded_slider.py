@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Reference
-from surfacechem.terms import parameter
 
 
 class BondedSlider(Reference):

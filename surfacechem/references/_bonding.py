@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._energy import EnergyModel
 from surfacechem.references._perfect_contact import PerfectContact
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class RelaxingBonds(PerfectContact):

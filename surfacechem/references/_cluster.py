@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._bell import BellBond
-from surfacechem.terms import parameter
 
 
 class Cluster(BellBond):

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._separable import Separable
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class Cure(Reference):

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import ClassVar
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._energy import EnergyModel
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class PerfectContact(Reference):

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.integrate import Trajectory
 from surfacechem.references._energy import ConstantCapacity, QuadraticEnergy
 from surfacechem.references._slabs import HELD
 from surfacechem.scene import Scene
+from surfacechem.solve.run import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._quadrature import short_integral
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 EULER_GAMMA = 0.57721566490153286061
 SERIES_LIMIT = 40.0

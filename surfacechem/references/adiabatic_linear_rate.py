@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class AdiabaticLinearRate(Reference):

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._energy import QuadraticEnergy
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 NEWTON = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, TypeAlias, dataclass_transform
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.terms import parameter
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._bell import BellBond
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class BellConstantForce(BellBond):

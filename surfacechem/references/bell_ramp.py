@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._bell import BellBond
 from surfacechem.references._exponential_integrals import scaled_expint
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class BellRamp(BellBond):

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._energy import QuadraticEnergy
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class BouncingBody(Reference):

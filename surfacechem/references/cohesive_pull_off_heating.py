@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._energy import QuadraticEnergy
 from surfacechem.references.base import Array
 from surfacechem.references.cohesive_pull_off import CohesivePullOff
-from surfacechem.terms import parameter
 
 
 class CohesivePullOffHeating(CohesivePullOff):

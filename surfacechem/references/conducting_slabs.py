@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._slabs import Slab, flux, inverted, temperature
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class ConductingSlabs(Reference):

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(80)
 

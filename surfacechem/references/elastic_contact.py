@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class ElasticContact(Reference):

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._perfect_contact import PerfectContact
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class EndothermicBonding(PerfectContact):

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._perfect_contact import PerfectContact
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class ExothermicBonding(PerfectContact):

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._exponential_integrals import scaled_expint
 from surfacechem.references._quadrature import short_integral
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class FrictionIgnitedBonding(Reference):

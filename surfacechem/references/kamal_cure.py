@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._cure import Cure
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class KamalCure(Cure):

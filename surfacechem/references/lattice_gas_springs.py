@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.references._lambert import lambert_of_exp
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class LatticeGasSprings(Reference):

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 Y_FOLD = 2.0 ** (1.0 / 3.0)
 

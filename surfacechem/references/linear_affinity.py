@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class LinearAffinity(Reference):

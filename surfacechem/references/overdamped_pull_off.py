@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._cohesive import SpringAndZone
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 GRID = 200
 """Gaps whose times give the first guess of the gap at a time."""

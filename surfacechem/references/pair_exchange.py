@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class PairExchange(Reference):

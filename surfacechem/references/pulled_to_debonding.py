@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.base import Array
 from surfacechem.references.sudden_debonding import SuddenDebonding
-from surfacechem.terms import parameter
 
 
 class PulledToDebonding(SuddenDebonding):

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._cluster import Cluster
 from surfacechem.references._exponentials import remainder
@@ -17,7 +18,6 @@ from surfacechem.references._lambert import lambert_of_exp
 from surfacechem.references._roots import increasing_root
 from surfacechem.references._separable import Separable
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 FAR = 0.1
 """Growth of F/phi beyond its critical value from which the two terms of the rate no longer cancel."""

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._exponentials import second_difference
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class ReservoirExchange(Reference):

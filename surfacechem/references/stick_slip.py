@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._spring_slider import Slip
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 
 class StickSlip(Reference):

@@ -10,12 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._bonded_slider import BondedSlider
 from surfacechem.references._roots import increasing_root
 from surfacechem.references._spring_slider import Slip
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 CYCLES = 1_000_000
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references.base import Array, Reference
-from surfacechem.terms import parameter
 
 REACH = 11.0
 """Thickness in units of the square root of diffusivity and time up to which the far side feels less than 1e-13."""

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._exponentials import first_difference, second_difference
 from surfacechem.references._heated_body import FrictionallyHeated
 from surfacechem.references._roots import increasing_root
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class ThinningFilm(FrictionallyHeated):

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from surfacechem.contracts.terms import parameter
 from surfacechem.references._exponentials import first_difference, second_difference
 from surfacechem.references._media import HeatedMedium
 from surfacechem.references.base import Array
-from surfacechem.terms import parameter
 
 
 class ThreeTemperatures(HeatedMedium):

@@ -1,0 +1,174 @@
+"""What the commands share: options, exit codes, errors that are one message, runs that can be interrupted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+
+import typer
+from typer.core import TyperGroup
+
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
+from surfacechem.results.waiting import wait_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from surfacechem.runs.simulation import Simulation
+    from surfacechem.solve.run import Run
+
+S = TypeVar("S")
+
+STATUS = {"finished": 0, "stopped": 3, "failed": 4}
+"""Exit code of each way in which a run ends."""
+
+BAD_INPUT, DIFFERENT, UNWRITTEN, SIGNALLED = 2, 1, 5, 128
+
+EXIT_CODES = """\b
+Exit codes:
+  0    finished
+  1    rerun: the new values are not bit for bit those of the file
+  2    bad input; nothing was computed
+  3    the run was stopped by physics, of a sweep every run; what it reached is written, with the reason
+  4    the run failed numerically; what it reached is written
+  5    what was computed could not be written where it should be
+  130  interrupted, or 128 and the number of another signal; nothing was written
+"""
+
+
+class SignalledError(BaseException):
+    """A signal asks the process to end."""
+
+
+def _end(number: int, _frame: object) -> None:
+    raise SignalledError(number)
+
+
+@contextmanager
+def _signals_raised() -> Iterator[None]:
+    """Signals that end the process are exceptions meanwhile, so that files that are not finished are removed.
+
+    What the process was told to ignore, as by nohup, it ignores.
+    """
+    wanted = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        wanted = []
+    usual = {number: signal.getsignal(number) for number in wanted}
+    for number, handler in usual.items():
+        if handler != signal.SIG_IGN:
+            signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number, handler in usual.items():
+            signal.signal(number, handler)
+
+
+def _leave(code: int, message: str) -> NoReturn:
+    """End at once: compiled code may still be running in another thread, which would be waited for."""
+    _tell(message)
+    os._exit(code)
+
+
+def _tell(message: object) -> None:
+    """A line on stderr; the exit code says it where nothing can be written there."""
+    with suppress(OSError):
+        typer.echo(f"surfacechem: {message}", err=True)
+
+
+class Commands(TyperGroup):
+    """Commands whose errors are one message on stderr and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            with _signals_raised():
+                return super().invoke(ctx)
+        except OutputError as error:
+            _tell(error)
+            raise typer.Exit(UNWRITTEN) from None
+        except SurfacechemError as error:
+            _tell(error)
+            raise typer.Exit(BAD_INPUT) from None
+        except SignalledError as error:
+            (number,) = error.args
+            name = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+            _leave(SIGNALLED + number, f"{name}; nothing was written.")
+        except BrokenPipeError:
+            raise  # the reader has enough
+        except OSError as error:
+            # Every file is written by what says so itself: this is the standard output, which Python would try again.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            what = f"{error.filename}: cannot be used" if error.filename else "standard output: cannot be written"
+            _tell(f"{what}: {error.strerror or error}.")
+            raise typer.Exit(UNWRITTEN) from None
+
+
+CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
+]
+SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
+Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
+Wanted = Annotated[float | None, typer.Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
+
+
+def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
+    """The case's settings with those of the command line; a tolerance leaves no choice of one."""
+    from surfacechem.results.accuracy import first_tolerance
+    from surfacechem.solve import AUTO, names
+    from surfacechem.solve.run import OWN
+
+    if solver is not None and solver not in (AUTO, *names):
+        raise InputError(f"no solver '{solver}'.{suggestion(solver, (AUTO, *names))}", Place(path="--solver"))
+    for option, value, most in (("--rtol", rtol, 0.1), ("--accuracy", accuracy, 1.0)):
+        if value is not None and not 0 < value <= most:
+            raise InputError(f"{value:g} is outside its range: > 0 and <= {most:g}.", Place(path=option))
+    if rtol is not None and (accuracy is not None or solver == AUTO):
+        raise InputError("the tolerance has two roles: give an accuracy or a tolerance.", Place(path="--rtol"))
+    run = simulation.case.run
+    if accuracy is not None:
+        return replace(run, solver=solver or AUTO, rtol=first_tolerance(accuracy), accuracy=accuracy)
+    if rtol is not None:
+        return replace(run, solver=solver or (OWN if run.solver == AUTO else run.solver), rtol=rtol, accuracy=None)
+    return replace(run, solver=solver or run.solver)
+
+
+def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
+    """The solution, its dataset's columns and audit included, so that what follows only writes; ``brief`` where the
+    stepper is called a few times only.
+    """
+    from surfacechem.solve.radau import stepper
+
+    if brief:
+        stepper.load_briefly()
+
+    if not (quiet or stepper.is_compiled()):
+        typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
+
+    return wait_for(run)
+
+
+def studied(run: Callable[[], S], quiet: bool) -> S:
+    """The same for a study, which takes minutes: it says on a terminal what it is at."""
+    if sys.stderr.isatty() and not quiet:
+        import logging
+
+        logging.basicConfig(format="%(message)s ...")
+        logging.getLogger("surfacechem").setLevel(logging.INFO)
+    return solved(run, quiet)
+
+
+def picture_kind(target: Path) -> str:
+    """The kind of picture that a file name asks for."""
+    kind = target.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    return kind

@@ -1,0 +1,352 @@
+"""The command line. Every command imports what it needs when it is called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from surfacechem.cli import precision as cli_precision
+from surfacechem.cli import stability as cli_stability
+from surfacechem.cli.commands import (
+    DIFFERENT,
+    EXIT_CODES,
+    STATUS,
+    CaseName,
+    Changes,
+    Commands,
+    Quiet,
+    SolverName,
+    Tolerance,
+    Wanted,
+    chosen,
+    picture_kind,
+    solved,
+)
+from surfacechem.cli.guard import refuse_unwritable
+from surfacechem.errors import InputError, Place, suggestion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from xarray import Dataset
+
+    from surfacechem.results.solution import Solution
+
+app = typer.Typer(
+    cls=Commands,
+    help="Contact interfaces that bond, slide, break and heat.",
+    epilog=EXIT_CODES,
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+app.command(epilog=cli_precision.CODES)(cli_precision.precision)
+app.command(epilog=cli_stability.CODES)(cli_stability.stability)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"surfacechem {version('surfacechem')}")
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Contact interfaces that bond, slide, break and heat."""
+
+
+@app.command(epilog=EXIT_CODES)
+def run(
+    case: CaseName,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>.nc if not given.")
+    ] = None,
+    changes: Changes = None,
+    solver: SolverName = None,
+    rtol: Tolerance = None,
+    accuracy: Wanted = None,
+    error: Annotated[
+        str,
+        typer.Option(
+            "--error",
+            help="Where the error is from: auto (the exact solution, else a second run), estimate (a second run at a "
+            "tighter tolerance), balances (no second run).",
+        ),
+    ] = "auto",
+    quiet: Quiet = False,
+) -> None:
+    """Run a case, write its dataset and print a summary."""
+    from surfacechem.results.netcdf import dataset_path
+    from surfacechem.runs.simulation import load
+
+    simulation = load(case, changes or ())
+    settings = chosen(simulation, solver, rtol, accuracy)
+    target = output or Path(f"{simulation.case.name}.nc")
+    if target.exists() and Path(simulation.case.file).exists() and target.samefile(simulation.case.file):
+        raise InputError("is the case itself; give another file to write to.", Place(str(target)))
+    refuse_unwritable(dataset_path(target))
+    solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
+    solution.write(target)
+    _conclude(solution, target, quiet)
+
+
+def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
+    from surfacechem.runs.report import run_summary
+
+    code = STATUS[solution.status]
+    if not quiet:
+        typer.echo(run_summary(solution, written))
+    elif code:
+        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+    for warning in solution.warnings if quiet else ():
+        typer.echo(f"surfacechem: warning: {warning}", err=True)
+    if code:
+        raise typer.Exit(code)
+
+
+@app.command(epilog=EXIT_CODES)
+def sweep(
+    case: CaseName,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>-sweep.nc if not given.")
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."
+        ),
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
+    ] = None,
+    changes: Changes = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a case over values of its parameters and write one dataset."""
+    from surfacechem.documents.overrides import assignments
+    from surfacechem.results.netcdf import dataset_path
+    from surfacechem.runs.report import sweep_summary
+    from surfacechem.runs.simulation import load
+
+    simulation = load(case, changes or ())
+    target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
+    refuse_unwritable(target)
+    values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
+    solution = solved(lambda: simulation.sweep(values, end), quiet)
+    solution.write(target)
+    if not quiet:
+        typer.echo(sweep_summary(solution, target))
+    if STATUS[solution.status]:
+        raise typer.Exit(STATUS[solution.status])
+
+
+@app.command(epilog=EXIT_CODES)
+def check(
+    case: CaseName,
+    changes: Changes = None,
+    solver: SolverName = None,
+    rtol: Tolerance = None,
+    accuracy: Wanted = None,
+) -> None:
+    """Say a case back in words, without running it."""
+    from surfacechem.results.choice import reasons
+    from surfacechem.runs.check import cautions, groups, lumping_warnings, warnings
+    from surfacechem.runs.report import check_summary
+    from surfacechem.runs.simulation import load
+    from surfacechem.solve import AUTO
+
+    simulation = load(case, changes or ())
+    settings = chosen(simulation, solver, rtol, accuracy)
+    system, scene, model = simulation.system, simulation.case.scene, simulation.model
+    values = model.values()
+    try:
+        problem = model.problem(settings, values)
+    except InputError as error:
+        raise simulation.case.located(error) from None
+    numbers = groups(model, scene, values, settings.times[-1])
+    lumped = lumping_warnings(model, values, settings.times[-1])
+    found = [*warnings(system), *cautions(model, problem), *lumped]
+    why = reasons(model, settings) if settings.solver == AUTO else ()
+    settings = model.chosen(settings)
+    typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
+
+
+@app.command()
+def equations(
+    case: CaseName,
+    form: Annotated[str, typer.Option("--format", help="python (runs) or latex.")] = "python",
+    changes: Changes = None,
+) -> None:
+    """Print the equations of a case, as Python that runs or as LaTeX."""
+    if form not in ("python", "latex"):
+        raise InputError(f"no format '{form}'.{suggestion(form, ('python', 'latex'))}", Place(path="--format"))
+    from surfacechem import format as cases
+    from surfacechem.compile import printing
+    from surfacechem.results import spatial
+
+    read = cases.load(case, changes or ())
+    title = read.title
+    if spatial.divided(read.scene):
+        read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
+    typer.echo(getattr(printing, form)(read.system(), title), nl=False)
+
+
+@app.command()
+def laws(name: Annotated[str | None, typer.Argument(help="Show all about this law.")] = None) -> None:
+    """List the laws, or show one."""
+    from surfacechem.runs.listing import law_page, law_table
+
+    typer.echo(law_page(name) if name else law_table())
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files."""
+    import json
+
+    from surfacechem.format.schema import schema as document
+
+    typer.echo(json.dumps(document(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+def cases() -> None:
+    """List the cases that come with the package."""
+    from surfacechem.runs.listing import case_table
+
+    typer.echo(case_table())
+
+
+@app.command(epilog=EXIT_CODES)
+def mechanism(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
+    phase: Annotated[str | None, typer.Option("--phase", help="The phase, where the file has several.")] = None,
+    temperature: Annotated[str, typer.Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
+    force: Annotated[str, typer.Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
+) -> None:
+    """Print species, reactions, rates over temperature and force, and what is consistent."""
+    from surfacechem.studies.mechanisms.sheet import sheet, span
+
+    temperatures = span(temperature, "K", "--temperature", above=0.0)
+    forces = span(force, "N", "--force")
+    kind = picture_kind(output) if output else ""
+    if output:
+        refuse_unwritable(output)
+    from surfacechem.mechanism import load_mechanism
+    from surfacechem.studies.mechanisms.rate_tables import Curves
+
+    curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase))
+    typer.echo(sheet(curves, temperatures, forces))
+    if output:
+        from surfacechem.plots import run as plots
+        from surfacechem.results.netcdf import replacing
+        from surfacechem.studies.mechanisms import figure as rateplots
+
+        with replacing(output) as temporary:
+            plots.save(rateplots.figure(curves, temperatures, forces), temporary, kind)
+        typer.echo(f"\nwritten to {output}")
+
+
+@app.command(epilog=EXIT_CODES)
+def plot(
+    source: Annotated[str, typer.Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help=".png, .svg or .pdf; <name>.png if not given.")
+    ] = None,
+    variables: Annotated[
+        str | None, typer.Option("--variables", help="Variables to plot, with commas between.")
+    ] = None,
+    against: Annotated[
+        str | None, typer.Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
+    ] = None,
+    changes: Changes = None,
+) -> None:
+    """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
+    from surfacechem.plots import run as plots
+    from surfacechem.results.netcdf import SUFFIXES, replacing
+
+    is_file = source.endswith(SUFFIXES)
+    target = output or Path(f"{Path(source).stem}.png")
+    kind = picture_kind(target)
+    if is_file and changes:
+        raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
+    refuse_unwritable(target)
+    solution = None if is_file else _solved_case(source, changes)
+    names = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
+    dataset = solution.dataset if solution else plots.opened(Path(source))
+    figure = _figure(dataset, names, against)
+    with replacing(target) as temporary:
+        plots.save(figure, temporary, kind)
+    typer.echo(str(target))
+    if solution and STATUS[solution.status]:
+        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+        raise typer.Exit(STATUS[solution.status])
+
+
+def _figure(dataset: Dataset, variables: list[str] | None, against: str | None) -> Figure:
+    """The figure that suits a dataset: of a run, of a sweep, or of a study."""
+    if "study" in dataset.attrs:
+        if variables or against:
+            raise InputError("the figure of a study has no choice of variables.")
+        return _study_figure(dataset)
+    from surfacechem.plots import run as plots
+    from surfacechem.plots import sweep as sweep_plots
+
+    swept = "sweep" in dataset.attrs
+    if swept and against:
+        raise InputError("a sweep is plotted over what it sweeps; runs have other axes.", Place(path="--against"))
+    return sweep_plots.figure(dataset, variables) if swept else plots.figure(dataset, variables, against)
+
+
+def _study_figure(dataset: Dataset) -> Figure:
+    if dataset.attrs["study"] == "stability":
+        from surfacechem.studies.stability.figure import figure as heat_map
+
+        return heat_map(dataset)
+    from surfacechem.studies.precision.figure import figure
+
+    return figure(dataset)
+
+
+def _solved_case(name: str, changes: list[str] | None) -> Solution:
+    from surfacechem.runs.simulation import load
+
+    simulation = load(name, changes or ())
+    return solved(simulation.run, quiet=False, brief=True)
+
+
+@app.command(epilog=EXIT_CODES)
+def rerun(
+    file: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the new dataset here.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run a dataset from itself and compare bit for bit."""
+    from surfacechem.results.netcdf import dataset_path
+    from surfacechem.runs import rerun as again
+
+    record = again.read(file)
+    if output:
+        refuse_unwritable(dataset_path(output))
+    solution = solved(lambda: again.run_again(record), quiet, brief=True)
+    if output:
+        solution.write(output)
+    different = again.differences(record, solution)
+    if different:
+        typer.echo(f"surfacechem: {file}: {len(different)} variables differ: {', '.join(different)}", err=True)
+        raise typer.Exit(DIFFERENT)
+    if not quiet:
+        typer.echo(f"{file}: all {len(record.variables)} variables are bit for bit the same")
+        if output:
+            typer.echo(f"written to {output}")

@@ -1,0 +1,150 @@
+"""The compiled stepper without its compiler: machine code that Numba has made, loaded and called by itself.
+
+Importing Numba takes half of the time of a brief process. The code needs nothing of it but memory, which is given here:
+it is loaded by LLVM alone, in a tenth of that time. A call costs some ten microseconds more than Numba's own, which is
+why only processes that make few of them use it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surfacechem.compile.cache import keep_file, sealed, unsealed, untrusted
+
+FILE = "kernel.object"
+
+HEAD = 64
+"""Bytes before the data of an allocation: count of references, destructor and its data, address, size, allocator."""
+
+UNUSED = (
+    "NRT_Free",
+    "NRT_adapt_ndarray_from_python",
+    "numba_do_raise",
+    "numba_gil_ensure",
+    "numba_gil_release",
+    "numba_runtime_build_excinfo_struct",
+    "numba_unpickle",
+)
+"""What only the entry from Python calls, which is not used here."""
+
+LONGEST = 60.0
+"""Time [s] after which a process that loads the code has failed."""
+
+PROOF = """
+import sys
+from pathlib import Path
+from surfacechem.compile.objectcode import load
+assert load(Path(sys.argv[1])) is not None
+"""
+
+
+def keep(kernel: Any, folder: Path) -> None:
+    """Keep the machine code of a kernel that Numba has just compiled; only if a process of its own can load it."""
+    if untrusted(folder) is not None:
+        return
+    (made,) = kernel.overloads.values()
+    try:
+        _, _, (code, _) = made.library.serialize_using_object_code()
+    except RuntimeError:
+        return  # the kernel came from the cache, and its code with it
+    data = sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code)
+    with suppress(OSError, subprocess.SubprocessError):
+        if _is_loaded_elsewhere(data, folder):
+            keep_file(folder / FILE, data)
+        else:
+            (folder / FILE).unlink(missing_ok=True)  # a damaged one
+
+
+def _is_loaded_elsewhere(data: bytes, folder: Path) -> bool:
+    """Whether another process can load the code: LLVM ends the process in which it cannot."""
+    with tempfile.TemporaryDirectory(dir=folder) as trial:
+        keep_file(Path(trial) / FILE, data)
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        done = subprocess.run(
+            [sys.executable, "-c", PROOF, trial], env=environment, capture_output=True, timeout=LONGEST
+        )
+    return done.returncode == 0
+
+
+def load(folder: Path) -> Callable[..., None] | None:
+    """The kernel whose code is kept in a folder; None where there is none that can be trusted."""
+    if untrusted(folder) is not None:
+        return None
+    try:
+        content = unsealed((folder / FILE).read_bytes())
+    except OSError:
+        return None
+    if content is None:
+        return None
+    name, _, code = content.partition(b"\n")
+    return Kernel(name.decode(), code)
+
+
+class Kernel:
+    """Machine code of a function of integers, numbers and contiguous arrays that returns nothing."""
+
+    def __init__(self, name: str, code: bytes) -> None:
+        import llvmlite.binding as llvm
+
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        for symbol, function in _symbols().items():
+            llvm.add_symbol(symbol, ctypes.cast(function, ctypes.c_void_p).value)
+        machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+        self._address = self._engine.get_function_address(name)
+        self._call: Any = None
+        self._nothing, self._error = ctypes.c_void_p(), ctypes.c_void_p()
+
+    def __call__(self, *arguments: Any) -> None:
+        """Call the kernel; the interpreter goes on in other threads meanwhile."""
+        words = [word for argument in arguments for word in _words(argument)]
+        self._call = self._call or self._typed(words)
+        status = self._call(ctypes.addressof(self._nothing), ctypes.addressof(self._error), *words)
+        if status != 0:
+            raise RuntimeError(f"the compiled stepper ended with status {status}")
+
+    def _typed(self, words: Sequence[Any]) -> Any:
+        """The code as a function of words like these."""
+        kinds = [ctypes.c_double if isinstance(word, float) else ctypes.c_int64 for word in words]
+        return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *kinds)(self._address)
+
+
+def _words(argument: Any) -> Sequence[Any]:
+    """An argument as Numba passes it: of an array its owners, number and size of entries, address, shape, strides."""
+    if isinstance(argument, np.ndarray):
+        return (0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides)
+    return (argument,)
+
+
+@cache
+def _symbols() -> dict[str, Any]:
+    """What the code calls: memory; for the rest something that ends the process."""
+    library: Any = ctypes.CDLL(None)
+    library.malloc.restype, library.malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
+    library.free.argtypes = [ctypes.c_void_p]
+
+    def allocate(size: int, alignment: int) -> int:
+        start: int = library.malloc(size + HEAD + alignment)
+        data = -(-(start + HEAD) // alignment) * alignment
+        (ctypes.c_size_t * 6).from_address(start)[:] = [1, 0, 0, data, size, 0]
+        return start
+
+    return {
+        "NRT_MemInfo_alloc_aligned": ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint32)(allocate),
+        "NRT_MemInfo_call_dtor": ctypes.CFUNCTYPE(None, ctypes.c_void_p)(library.free),
+        **dict.fromkeys(UNUSED, library.abort),
+    }

@@ -1,0 +1,331 @@
+r"""The equations of an assembled scene as readable Python that runs, and as LaTeX.
+
+The Python form is a module of four functions with the signature of the compiled ones: ``residual``, ``outputs``,
+``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code returns NaN, this
+one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed with its time, and
+the functions use those of the piece in which t lies unless they are given others.
+"""
+
+from __future__ import annotations
+
+import linecache
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
+
+import symengine
+import sympy  # type: ignore[import-untyped]
+from sympy.core.parameters import distribute  # type: ignore[import-untyped]
+from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
+from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
+
+from surfacechem.expressions import Expression
+from surfacechem.model.system import Named, Parameter, System
+from surfacechem.quantities import VARIABLES, Quantity
+
+WIDTH = 100
+"""Printed lines are broken beyond this, where an expression lets them."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a printed function: a local name, its expression and what it is."""
+
+    name: str
+    expression: Expression
+    text: str
+
+
+@lru_cache(maxsize=1000)
+def _sympy(expression: Expression) -> Any:
+    """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
+
+    Several functions print the same quantities, and SymPy looks long at the conditions of a piecewise one.
+    """
+    with distribute(False):
+        return symengine.sympify(expression)._sympy_()
+
+
+class _Python(PythonCodePrinter):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__({"fully_qualified_modules": True})
+        self.reserved_words: set[str] = {*PythonCodePrinter.reserved_words, "math", "ydot", "parameters"}
+
+    def _print_Float(self, expression: Any) -> str:
+        return repr(float(expression))
+
+    def text(self, expression: Expression) -> str:
+        return str(self.doprint(_sympy(expression)))
+
+    def name(self, name: str) -> str:
+        return str(self.doprint(sympy.Symbol(name)))
+
+
+def python(system: System, title: str = "") -> str:
+    """The equations as the source of a Python module."""
+    printer = _Python()
+    functions = [_function(system, printer, name, text, rows) for name, (text, rows) in _functions(system).items()]
+    return "\n\n".join([_head(system, title), _parameters(system), *_pieces(system), *functions])
+
+
+def executable(system: System) -> ModuleType:
+    """The printed module, ready to call; its source shows in tracebacks and debuggers."""
+    source = python(system)
+    module = ModuleType("surfacechem_equations")
+    module.__file__ = f"<equations {id(system):#x}>"
+    linecache.cache[module.__file__] = (len(source), None, source.splitlines(keepends=True), module.__file__)
+    exec(compile(source, module.__file__, "exec"), vars(module))
+    return module
+
+
+def _functions(system: System) -> dict[str, tuple[str, list[Row]]]:
+    """Every printed function: what it returns, in words and by row."""
+    balances = [Row(f"balance_{name}", row, f"balance of {name}") for name, row in system.rows.items()]
+    outputs = [Row(item.name, symengine.Symbol(item.name), "") for item in system.outputs]
+    ledger = [
+        Row(f"rate_of_{a.quantity.name}", a.rate, f"rate of: {_described(a.quantity)}; {a.kind}") for a in system.ledger
+    ]
+    watched = [(m.expression, f"{m.name}, else {m.reason}") for m in system.moving_margins()]
+    watched += [(item.margin, f"else {item.name}: {item.reason}") for item in system.transitions]
+    margins = [Row(f"margin_{i}", expression, text) for i, (expression, text) in enumerate(watched)]
+    functions = {
+        "residual": ("The balances, zero where they hold.", balances),
+        "outputs": ("The named quantities of the dataset.", outputs),
+        "ledger": ("Rates of the quantities that are integrated beside the state.", ledger),
+        "margins": ("What must stay positive.", margins),
+    }
+    return {name: (text, rows) for name, (text, rows) in functions.items() if rows}
+
+
+def _head(system: System, title: str) -> str:
+    states = "\n".join(
+        f"    {state.name} [{state.quantity.unit}] {state.quantity.long_name}"
+        f" ({'algebraic' if state.algebraic else 'evolved'})"
+        for state in system.states
+    )
+    heading = f"{title}: {system.regime}" if title else system.regime
+    text = f"{_safe(heading)}.\n\nt is time [s]. y holds\n\n{states}\n\nand ydot their time derivatives."
+    return f'"""{text}\n"""\n\nimport math\n'
+
+
+def _parameters(system: System) -> str:
+    lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
+    return "\n".join(["PARAMETERS = (", *lines, ")\n"])
+
+
+def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:
+    """Times [s] from which numbers of histories hold, and these numbers, in the order of :func:`changing`.
+
+    At its time a piece does not hold yet; the first one holds from the start.
+    """
+    loads = [system.parameters[j] for j in changing(system)]
+    found: list[tuple[float, tuple[float, ...]]] = []
+    for start in [0.0, *(t for t in system.breakpoints if t > 0)] if loads else []:
+        numbers = tuple(float(p.at(start)) for p in loads)
+        if not found or found[-1][1] != numbers:
+            found.append((start, numbers))
+    return found if len(found) > 1 else []
+
+
+def changing(system: System) -> list[int]:
+    """Places of the parameters that change from piece to piece of a history."""
+    return [j for j, p in enumerate(system.parameters) if p.load is not None]
+
+
+def _pieces(system: System) -> list[str]:
+    """The pieces of histories, and the function that finds the parameters of a time."""
+    found = pieces(system)
+    if not found:
+        return []
+    names = ", ".join(str(system.parameters[j].symbol) for j in changing(system))
+    rows = [f"    ({start!r}, {list(numbers)!r})," for start, numbers in found]
+    head = ["# From which time on [s], that time not included, histories have which numbers:", f"# {names}."]
+    table = "\n".join([*head, f"CHANGING = {changing(system)!r}", "PIECES = (", *rows, ")\n"])
+    return [table, PARAMETERS_AT]
+
+
+PARAMETERS_AT = '''\
+def parameters_at(t):
+    """The parameters of the piece in which a time lies, or which it ends."""
+    values = list(PARAMETERS)
+    numbers = next((numbers for start, numbers in reversed(PIECES) if start < t), PIECES[0][1])
+    for place, number in zip(CHANGING, numbers):
+        values[place] = number
+    return values
+'''
+
+
+def _parameter_text(parameter: Parameter) -> str:
+    return _safe(f"[{parameter.spec.unit}] {parameter.spec.text} ({parameter.path})")
+
+
+def _function(system: System, printer: _Python, name: str, text: str, rows: Sequence[Row]) -> str:
+    states = [state.name for state in system.states]
+    rates = [str(state.dot) for state in system.states]
+    pieced = bool(pieces(system))
+    usual = "None" if pieced else "PARAMETERS"
+    lines = [f"def {name}(t, y, ydot, parameters={usual}):", f'    """{text}"""']
+    lines += ["    parameters = parameters_at(t) if parameters is None else parameters"] if pieced else []
+    for names, source in (
+        (states, "y"),
+        (rates, "ydot"),
+        ([str(p.symbol) for p in system.parameters], "parameters"),
+    ):
+        if names:
+            lines += _unpacked([printer.name(n) for n in names], source)
+    for item in needed(system.named, [row.expression for row in rows]):
+        lines += _assignment(printer, item.name, item.expression, _described(item.quantity))
+    for row in rows:
+        if str(row.expression) != row.name:
+            lines += _assignment(printer, row.name, row.expression, row.text)
+    return "\n".join([*lines, *_returned([printer.name(row.name) for row in rows]), ""])
+
+
+def needed(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
+    """Those named quantities that the expressions read, directly or through others, in their order."""
+    wanted = _symbols(expressions)
+    kept: list[Named] = []
+    for item in reversed(named):
+        if item.name in wanted:
+            kept.append(item)
+            wanted |= _symbols([item.expression])
+    return kept[::-1]
+
+
+def _symbols(expressions: Iterable[Expression]) -> set[str]:
+    return {str(symbol) for e in expressions for symbol in symengine.sympify(e).free_symbols}
+
+
+def _described(quantity: Quantity) -> str:
+    return _safe(f"{quantity.long_name} [{quantity.unit}]" + (f", {quantity.tag}" if quantity.tag else ""))
+
+
+def _safe(text: str) -> str:
+    """Text that ends neither a comment nor a docstring."""
+    return " ".join(text.split()).replace("\\", "/").replace('"""', "'''")
+
+
+def _unpacked(names: Sequence[str], source: str) -> list[str]:
+    left = f"{names[0]}," if len(names) == 1 else ", ".join(names)
+    return (
+        _broken("    (", left, f") = {source}") if len(left) > WIDTH or len(names) == 1 else [f"    {left} = {source}"]
+    )
+
+
+def _returned(names: Sequence[str]) -> list[str]:
+    return _broken("    return [", ", ".join(names), "]")
+
+
+def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:
+    value = printer.text(expression)
+    left = f"    {printer.name(name)} = "
+    lines = [left + value] if len(left + value) <= WIDTH else _broken(left + "(", value, ")")
+    return [f"    # {text}", *lines]
+
+
+def _broken(before: str, text: str, after: str) -> list[str]:
+    """The text between brackets, broken before operators and after commas where it is too long for one line."""
+    if len(before + text + after) <= WIDTH:
+        return [before + text + after]
+    lines: list[str] = []
+    for piece in re.split(r" (?=[+-] |if |else )|(?<=,) ", text):
+        if lines and len(lines[-1]) + len(piece) + 9 <= WIDTH:
+            lines[-1] += f" {piece}"
+        else:
+            lines.append(piece)
+    return [before, *(f"        {line}" for line in lines), f"    {after}"]
+
+
+# -- LaTeX ------------------------------------------------------------------------------------------------------------
+
+GREEK = {
+    *("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi"),
+    *("pi", "rho", "sigma", "tau", "phi", "psi", "chi", "omega"),
+}
+
+
+SPACE = r"\,"
+
+
+class _Latex(LatexPrinter):  # type: ignore[misc]
+    def _print_Float(self, expression: Any) -> str:
+        mantissa, _, power = f"{float(expression)!r}".partition("e")
+        number = mantissa.removesuffix(".0")
+        if not power:
+            return number
+        return (f"{number} \\cdot " if number != "1" else "") + f"10^{{{int(power)}}}"
+
+    def _print_Symbol(self, expression: Any, style: str = "plain") -> str:
+        return symbol(str(expression))
+
+    def text(self, expression: Expression) -> str:
+        return str(self.doprint(_sympy(expression)))
+
+
+def symbol(name: str) -> str:
+    r"""LaTeX of a name.
+
+    >>> symbol("phi_max"), symbol("dT_dt"), symbol("q_1"), symbol("R_linear_affinity")
+    ('\\phi_{\\mathrm{max}}', '\\dot{T}', 'q_{1}', 'R_{\\mathrm{linear\\,affinity}}')
+    """
+    rate = re.fullmatch(r"d(\w+)_dt", name)
+    if rate:
+        return rf"\dot{{{symbol(rate[1])}}}"
+    if name in VARIABLES and VARIABLES[name].latex:
+        return VARIABLES[name].latex
+    head, _, subscript = name.partition("_")
+    base = _letters(head)
+    return f"{base}_{{{_subscript(subscript)}}}" if subscript else base
+
+
+def _letters(text: str) -> str:
+    if text in GREEK:
+        return f"\\{text}"
+    return text if len(text) <= 1 else rf"\mathrm{{{text}}}"
+
+
+def _subscript(text: str) -> str:
+    parts = text.split("_")
+    if all(len(part) == 1 or part in GREEK or re.fullmatch(r"\w?\d\w?", part) for part in parts):
+        return " ".join(part if re.search(r"\d", part) else _letters(part) for part in parts)
+    if set(parts) & GREEK:
+        return SPACE.join(map(_letters, parts))
+    return rf"\mathrm{{{SPACE.join(parts)}}}"
+
+
+def unit(text: str) -> str:
+    r"""LaTeX of a unit.
+
+    >>> unit("W/(m^2 K)")
+    '\\mathrm{W/(m^{2}\\,K)}'
+    """
+    return r"\mathrm{" + re.sub(r"\^(-?\d+)", r"^{\1}", text).replace(" ", SPACE) + "}"
+
+
+def latex(system: System, title: str = "") -> str:
+    """The equations as a LaTeX align environment, the values of the parameters as comments."""
+    printer = _Latex({"mul_symbol": r"\,", "fold_short_frac": False})
+    heading = f"{title}: {system.regime}" if title else system.regime
+    values = [f"%   {p.symbol} = {float(p.at(0.0))!r} {_parameter_text(p)}" for p in system.parameters]
+    names = [str(system.parameters[j].symbol) for j in changing(system)]
+    for start, numbers in pieces(system)[1:]:
+        then = ", ".join(f"{name} = {number!r}" for name, number in zip(names, numbers, strict=True))
+        values.append(f"%   from {start!r} s on: {then}")
+    wanted = needed(system.named, system.rows.values())
+    others = [item for item in system.outputs if item not in wanted]
+    lines = [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in wanted]
+    lines += [_latex_row(printer, "0", row, f"balance of {name}", "") for name, row in system.rows.items()]
+    lines += [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in others]
+    body = " \\\\\n".join(lines)
+    return "\n".join([f"% {_safe(heading)}", *values, r"\begin{align*}", body, r"\end{align*}", ""])
+
+
+SPECIAL: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
+
+
+def _latex_row(printer: _Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
+    note = text.translate(SPECIAL) + (f" $[{unit(in_unit)}]$" if in_unit else "")
+    return rf"  {left} &= {printer.text(right)} && \text{{{note}}}"

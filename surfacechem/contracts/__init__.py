@@ -1,0 +1,1 @@
+"""What laws state, what they may read, and the bodies, cells and media that they speak of."""

@@ -1,0 +1,119 @@
+"""Values set from outside, ``bodies.lower.C=2 kJ/m^2/K``, put into a document before it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from surfacechem.documents.document import ORIGIN, Tree, from_plain, labels, parse, with_paths
+from surfacechem.errors import InputError, Place, suggestion
+
+WRITTEN_OUT = ("level", "value", "rises-to")
+"""Keys of a value that may also stand by itself."""
+
+
+def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
+    """The tree with the given values; texts are "path=value" with the value in YAML.
+
+    A number for a parameter that varies replaces its value and keeps its factors. No value, or null, removes the key
+    or the law.
+
+    >>> apply(parse("run: {until: 5 s, rtol: 1e-6}"), ["run.until=7 s", "run.rtol="]).plain()
+    {'run': {'until': '7 s'}}
+    """
+    for path, value in _pairs(overrides):
+        place = Place(ORIGIN, 0, path)
+        tree = _set(tree, path.split("."), value, place)
+    return with_paths(tree)
+
+
+def assignments(texts: Sequence[str]) -> dict[str, object]:
+    """Texts "path=value" as plain values.
+
+    >>> assignments(["f=3 pN", "g=[1, 2]"])
+    {'f': '3 pN', 'g': [1, 2]}
+    """
+    return {path: tree.plain() for path, tree in _pairs(texts)}
+
+
+def parameter_path(path: str, known: Container[str]) -> str:
+    """The known path of a parameter whose value may stand in the case by itself or be written out.
+
+    >>> parameter_path("loading.v", {"loading.v.level"}), parameter_path("friction.mu.value", {"friction.mu"})
+    ('loading.v.level', 'friction.mu')
+    """
+    above, _, last = path.rpartition(".")
+    others = [path, f"{path}.level", *([above] if last in WRITTEN_OUT else [])]
+    return next((other for other in others if other in known), path)
+
+
+def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
+    pairs = overrides.items() if isinstance(overrides, Mapping) else (_split(text) for text in overrides)
+    for path, value in pairs:
+        place = Place(ORIGIN, 0, path)
+        try:
+            plain = parse(value).plain() if isinstance(value, str) and value.strip() else value
+        except InputError as error:
+            raise InputError(error.message, place) from None
+        yield path, from_plain(plain, place)
+
+
+def _split(text: str) -> tuple[str, str]:
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip():
+        raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(ORIGIN))
+    return path.strip(), value
+
+
+def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
+    if not keys:
+        return _replaced(tree, new)
+    if isinstance(tree.value, list):
+        return _set_item(tree, keys, new, place)
+    if len(keys) == 1 and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not _removes(new):
+        return new  # a bare value is, for example, the level of a constant history
+    if tree.value is not None and not isinstance(tree.value, dict):
+        raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
+    known = tree.value or {}
+    if len(keys) == 1 and _removes(new):
+        return replace(tree, value=_without(known, keys[0], place))
+    child = known.get(keys[0], Tree(None, place))
+    return replace(tree, value={**known, keys[0]: _set(child, keys[1:], new, place)})
+
+
+def _removes(new: Tree) -> bool:
+    return new.value is None or new.value == ""
+
+
+def _without(known: Mapping[str, Tree], key: str, place: Place) -> dict[str, Tree]:
+    if key not in known:
+        raise InputError(f"there is no '{key}' to remove.{suggestion(key, known)}", place)
+    return {name: child for name, child in known.items() if name != key}
+
+
+def _replaced(old: Tree, new: Tree) -> Tree:
+    varies = isinstance(old.value, dict) and {"value", "times"} >= set(old.value) >= {"value"}
+    if varies and not isinstance(new.value, dict | list):
+        return replace(old, value={**old.value, "value": new})
+    return new
+
+
+def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
+    """A value below an item of a list, which is found by its label."""
+    known = labels(tree.value)
+    wanted = keys[0].removesuffix("[1]")
+    if wanted not in known:
+        names = [label for label in known if label]
+        raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
+    index = known.index(wanted)
+    gone = len(keys) == 1 and _removes(new)
+    changed = [] if gone else [_set_law(tree.value[index], keys[1:], new, place)]
+    return replace(tree, value=[*tree.value[:index], *changed, *tree.value[index + 1 :]])
+
+
+def _set_law(item: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
+    """A value below an item ``name: {...}`` or a bare name."""
+    if not keys:
+        return new
+    ((name, inner),) = item.value.items() if isinstance(item.value, dict) else ((item.value, Tree(None, item.place)),)
+    return replace(item, value={name: _set(inner, keys, new, place)})

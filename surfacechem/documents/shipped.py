@@ -1,0 +1,27 @@
+"""Where the cases and mechanisms that come with surfacechem are: in the installed package, else in the checkout."""
+
+from pathlib import Path
+
+
+def cases() -> Path:
+    """The folder of the case files.
+
+    >>> cases().name
+    'cases'
+    """
+    return _folder("cases")
+
+
+def mechanisms() -> Path:
+    """The folder of the Cantera surface mechanisms.
+
+    >>> mechanisms().name
+    'mechanisms'
+    """
+    return _folder("mechanisms")
+
+
+def _folder(name: str) -> Path:
+    package = Path(__file__).parents[1]
+    packaged = package / "_data" / name
+    return packaged if packaged.is_dir() else package.parent / name

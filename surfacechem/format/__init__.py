@@ -1,0 +1,195 @@
+"""Case files: a YAML document becomes a scene, a run and, optionally, an exact solution to compare with.
+
+>>> case = load("endothermic", ["run.until=2 s"])
+>>> case.run.t_end, [body.name for body in case.scene.bodies]
+(2.0, ['lower', 'upper'])
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from surfacechem import solve as solvers
+from surfacechem.documents import document, overrides
+from surfacechem.documents import shipped as data
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place, nearest
+from surfacechem.format import csvtable
+from surfacechem.format.fields import mapping, text
+from surfacechem.format.run import Reference, Run, read_reference, read_run
+from surfacechem.format.scene import SceneReader, Source
+from surfacechem.format.sweep import Section, read_sweep
+from surfacechem.model.assemble import assemble
+from surfacechem.model.system import System
+from surfacechem.scene import Scene
+
+__all__ = ["TOP_KEYS", "Case", "Reference", "Run", "load", "load_text", "names"]
+
+TOP_KEYS = (
+    *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
+    *("mechanics", "loading", "programme", "initial", "run", "reference", "sweep"),
+)
+
+SECTIONS = (
+    (r"(initial|loading|heat|interface): ", r"\1"),
+    (r"initial (\w+) =", r"initial.\1"),
+    (r"nothing evolves or prescribes \w+: give ([\w-]+) a heat capacity", r"bodies.\1"),
+    (r".*interface's potential", "interface"),
+    (r"the body ([\w-]+) reads", r"bodies.\1"),
+    (r"the interface|the bonding state|the force per bond|the limit|.*rigid interface", "interface"),
+    (r"the medium reads|the film reads|the fit of", "interface.medium"),
+    (r"the mechanics|the far field", "mechanics"),
+    (r"the stage", "programme"),
+    (r"(\w+) has two roles: .*\b(initial|loading)\b", r"\2.\1"),
+    (r"(a sweep|sweep:|.* never reaches|.* is no ramp|runs until)", "sweep"),
+)
+"""What messages of the assembly speak of, as a path in the case."""
+
+Overrides = Sequence[str] | Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case as read; ``text`` (with ``mechanism_text``) is all that is needed to read it again."""
+
+    name: str
+    title: str
+    source: str
+    description: str
+    scene: Scene
+    run: Run
+    reference: Reference | None
+    sweep: Section | None
+    text: str
+    mechanism_text: str | None
+    places: Mapping[str, Place]
+    file: str
+    unused: str = ""
+    """Why the exact solution that the case names does not count after a change; empty where it does."""
+
+    def system(self) -> System:
+        """The assembled scene; errors have their place in the case file."""
+        try:
+            return assemble(self.scene)
+        except InputError as error:
+            raise self.located(error) from None
+
+    def located(self, error: InputError) -> InputError:
+        """The error at the place that it speaks of, at least with the file."""
+        if error.place is not None and error.place.file:
+            return error
+        for path in [error.place.path] if error.place else _spoken_of(error.message):
+            place = self._nearest(path)
+            if place is not None:
+                return InputError(error.message.removeprefix(f"{place.path}: "), place)
+        return InputError(error.message, self.places[""])
+
+    def _nearest(self, path: str) -> Place | None:
+        """The place of a path, or of the innermost section around it that the case has."""
+        while path and path not in self.places:
+            path = path.rpartition(".")[0]
+        return self.places[path] if path else None
+
+
+def _spoken_of(message: str) -> list[str]:
+    """Paths that a message of the assembly may speak of."""
+    found = ((re.match(pattern, message), path) for pattern, path in SECTIONS)
+    return [match.expand(path) for match, path in found if match]
+
+
+def load(name: str | Path, overrides: Overrides = ()) -> Case:
+    """Read a case from a file, or one of the shipped ones by its name.
+
+    ``overrides`` are texts "path=value" or a mapping from path to value, put into the document before it is read.
+    """
+    path, shown = _find(str(name))
+    return load_text(document.read(path, shown), path.stem, path.parent, overrides=overrides, file=shown)
+
+
+def load_text(
+    text: str,
+    name: str = "case",
+    base: str | Path = ".",
+    mechanism_text: str | None = None,
+    overrides: Overrides = (),
+    file: str = "",
+) -> Case:
+    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given."""
+    tree = document.parse(text, file or f"{name}.yaml")
+    unused = ""
+    if overrides:
+        before, tree = tree, _overridden(tree, overrides)
+        tree, unused = _without_stale_reference(before, tree)
+        text = document.dump(tree)
+    whole = csvtable.embedded(tree, str(base))
+    if whole != tree:
+        tree, text = whole, document.dump(whole)
+    return replace(_read(tree, text, name, Source({}, str(base), mechanism_text)), unused=unused)
+
+
+def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
+    """The document without an exact solution whose parameters were given for another scene, and why."""
+    old, new = ({key: child.plain() for key, child in (tree.value or {}).items()} for tree in (before, after))
+    scene = {*old, *new} - {"title", "source", "description", "run", "sweep", "reference"}
+    if all(old.get(key) == new.get(key) for key in scene) or old.get("reference") != new.get("reference"):
+        return after, ""
+    found = read_reference(after.value["reference"]) if "reference" in new else None
+    if found is None or not found.fixed:
+        return after, ""
+    return replace(after, value={key: child for key, child in after.value.items() if key != "reference"}), found.fixed
+
+
+def names() -> list[str]:
+    """Names of the cases that come with surfacechem."""
+    return sorted(path.stem for path in data.cases().glob("*.yaml"))
+
+
+def _find(name: str) -> tuple[Path, str]:
+    """The file of a case, and how messages call it."""
+    path = Path(name)
+    if document.is_file(path):
+        return path, name
+    if name in names():
+        return data.cases() / f"{name}.yaml", f"cases/{name}.yaml"
+    beside: list[str] = []
+    with suppress(OSError, ValueError):  # no name is too odd to be looked for
+        if path.exists():
+            return path, name
+        if path.is_symlink():
+            raise InputError(f"is a link to {path.readlink()}, where no file is.", Place(name))
+        beside = [file.name for file in path.parent.glob("*.yaml")]
+    guess = nearest(path.name, beside) or nearest(path.stem, [*names(), *beside])
+    raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
+
+
+def _overridden(tree: Tree, values: Overrides) -> Tree:
+    return overrides.apply(tree, values)
+
+
+def _read(tree: Tree, content: str, name: str, source: Source) -> Case:
+    top = mapping(tree, TOP_KEYS)
+    for key, example in (("bodies", "bodies: {lower: {...}, upper: {...}}"), ("run", "run: {until: 5 s}")):
+        if key not in top:
+            raise tree.error(f"the case needs `{key}`, for example `{example}`.")
+    places = dict(tree.places())
+    run = read_run(top["run"])
+    reader = SceneReader(Source(top, source.base, source.mechanism_text, run.solver in (solvers.AUTO, *solvers.ASKING)))
+    titles = {key: text(top[key], key).strip() for key in ("title", "source", "description") if key in top}
+    return Case(
+        name=name,
+        title=titles.get("title", name),
+        source=titles.get("source", ""),
+        description=titles.get("description", ""),
+        scene=reader.scene(),
+        run=run,
+        reference=read_reference(top["reference"]) if "reference" in top else None,
+        sweep=read_sweep(top["sweep"]) if "sweep" in top else None,
+        text=content,
+        mechanism_text=reader.mechanism.text if reader.mechanism else None,
+        places=places,
+        file=tree.place.file,
+    )

@@ -1,0 +1,1 @@
+"""A scene becomes equations: components, constraints and balances, assembled into one system of symbolic rows."""

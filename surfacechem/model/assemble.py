@@ -1,0 +1,173 @@
+"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
+
+Each stage is a module, in the order of STAGES.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from surfacechem.contracts.terms import Spec
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.model.build import Build
+from surfacechem.model.components.chemistry import reactions
+from surfacechem.model.components.conduction import conductors, profiles, slabs
+from surfacechem.model.components.energy import equations
+from surfacechem.model.components.exchange import friction, heat_paths
+from surfacechem.model.components.force import force, rupture
+from surfacechem.model.components.gap import normal_gap, normal_motion
+from surfacechem.model.components.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
+from surfacechem.model.components.logarithms import logarithmic_state
+from surfacechem.model.components.mean_influx import mean_influx
+from surfacechem.model.components.medium import medium
+from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
+from surfacechem.model.components.temperatures import temperatures
+from surfacechem.model.constraints.bounds import released
+from surfacechem.model.constraints.folds import folds
+from surfacechem.model.constraints.impact import impacts, missed
+from surfacechem.model.constraints.limits import bonded_mode, limits
+from surfacechem.model.constraints.load_steps import load_steps
+from surfacechem.model.constraints.relaxing import relaxing
+from surfacechem.model.constraints.softening import apart_from_envelope, softening_mode
+from surfacechem.model.holding import Holding
+from surfacechem.model.ledger import regime, sinks, totals
+from surfacechem.model.sliding.creep import stands_for_velocity
+from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
+from surfacechem.model.system import START, Outside, Role, System
+from surfacechem.model.touch import touch
+from surfacechem.scene import Scene
+
+__all__ = ["LOADABLE", "TRACTIONS", "assemble"]
+
+STAGES = (
+    temperatures,
+    slabs,
+    prescribed_variables,
+    programme,
+    bonding_variables,
+    normal_gap,
+    tangential_gap,
+    bonded_mode,
+    softening_mode,
+    medium,
+    free_energy,
+    force,
+    limits,
+    reactions,
+    rupture,
+    friction,
+    normal_motion,
+    tangential_motion,
+    impacts,
+    relaxing,
+    heat_paths,
+    mean_influx,
+    missed,
+    equations,
+    folds,
+    load_steps,
+    apart_from_envelope,
+    released,
+    stage_ends,
+    totals,
+    touch,
+    logarithmic_state,
+    profiles,
+)
+
+
+def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
+    """The system of a scene; InputError where a variable that is read has no role, or two.
+
+    ``sides`` are the bounds at which the bonding state is held, -1 for zero and 1 for the upper one; without them those
+    that the values of the scene need.
+    """
+    build = Build(scene, sides)
+    for stage in STAGES:
+        stage(build)
+    build.varying_margins()
+    _refuse_idle_initial_values(build)
+    taking = sinks(build)
+    if build.transitions or any(state.finest for state in build.states) or stands_for_velocity(build):
+        build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
+    own = {str(item.symbol) for item in build.parameters.items if not item.internal}
+    shared = own & {item.name for item in build.named}
+    assert not shared, f"parameters and quantities share the names {shared}"
+    unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
+    return System(
+        t=build.t,
+        states=tuple(build.states),
+        parameters=tuple(build.parameters.items),
+        constants=dict(build.parameters.constants),
+        named=tuple(build.named),
+        rows={state.name: build.rows[state.name] for state in build.states},
+        ledger=tuple(build.ledger),
+        margins=tuple(build.margins),
+        roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
+        ranges=tuple(build.ranges),
+        capped=tuple(build.capped),
+        pairs=tuple(build.pairs),
+        paces=tuple(build.paces),
+        cautions=tuple(build.cautions),
+        profiles=tuple(build.profiles),
+        conductors=tuple(conductors(build)),
+        regime=regime(build),
+        breakpoints=tuple(sorted(build.breakpoints)),
+        cycles=tuple(build.cycles),
+        modes=tuple(build.modes),
+        transitions=tuple(build.transitions),
+        equilibria=tuple(build.equilibria),
+        sinks=taking,
+        follows={str(x): value for x, value in build.motion.follows.items()},
+        given=dict(build.motion.given),
+        pulls=dict(build.motion.pulls),
+        fit=build.fit() if build.fit else None,
+        warnings=(
+            *build.interface.remarks,
+            *build.warnings,
+            *(f"loading: {name} is prescribed but nothing reads it." for name in unread),
+        ),
+        outside=_outside(build),
+        holding=_holding(build),
+        origin=partial(assemble, scene, sides),
+    )
+
+
+def _holding(build: Build) -> Holding | None:
+    decision = build.decision
+    if decision is None:
+        return None
+    sides = decision.usual if build.sides is None else build.sides
+    return Holding(sides, decision.paths, decision.needed, partial(assemble, build.scene))
+
+
+def _is_there(build: Build, role: Role) -> bool:
+    """Whether a derived variable was derived: one that nobody reads is not there."""
+    name = role.variable
+    return role.role != "derived" or build.variables.was_read(name) or any(item.name == name for item in build.named)
+
+
+def _outside(build: Build) -> Outside | None:
+    engine = build.interface.engine
+    if engine is None:
+        return None
+    reads = tuple(build.variables.get(name, "the engine of the mechanism") for name in engine.reads)
+    algebraic = [state for state in build.states if state.algebraic]
+    if algebraic:
+        raise InputError(
+            f"{algebraic[0].name} has no heat capacity, so it would have to be found together with rates that are "
+            "evaluated outside. Give the interface a capacity, or let it share the temperature of a body.",
+            Place(path="interface.mechanism"),
+        )
+    return Outside(engine, reads)
+
+
+def _refuse_idle_initial_values(build: Build) -> None:
+    """An initial value belongs to something that evolves."""
+    states = {state.start or state.at_start[0].name for state in build.states}
+    for name in build.scene.initial:
+        if name in states:
+            continue
+        if name in build.scene.loading or build.variables.has(name):
+            raise InputError(f"initial: {name} has two roles: an initial value, and prescribed or constant elsewhere.")
+        raise InputError(f"initial: nothing that evolves is called '{name}'.{suggestion(name, states)}")

@@ -1,0 +1,1 @@
+"""What a scene is made of: temperatures, bonds, gaps, heat paths, loads."""

@@ -1,0 +1,203 @@
+"""Conduction across the bodies: temperatures in a row from the contact to the far side, each with its part of a body.
+
+The points are the corners of the cells, so that the first one is the temperature at the contact, with half a cell's
+capacity: the body's own node, which heat paths, laws and perfect contact know. A body is a chain of balances behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import symengine
+
+from surfacechem.contracts import grids
+from surfacechem.contracts.terms import Varying, reads
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression
+from surfacechem.model import balances
+from surfacechem.model.balances import Node
+from surfacechem.model.build import BOTH, Build
+from surfacechem.model.conductors import Conductor, Profile
+from surfacechem.model.system import State
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Body, Conduction
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A body with its temperatures in a row, the contact first; a far side that is held is the last one."""
+
+    number: int
+    body: Body
+    law: Conduction
+    points: tuple[float, ...]
+    nodes: tuple[Node, ...]
+
+    @property
+    def inner(self) -> tuple[Node, ...]:
+        """The nodes of its own that evolve."""
+        return tuple(node for node in self.nodes[1:] if not node.prescribed)
+
+    @property
+    def profile(self) -> str:
+        """Name of its temperatures together."""
+        return f"profile_{self.number}"
+
+
+def slabs(build: Build) -> None:
+    """Divide the bodies that conduct, and let heat flow along them."""
+    for number, body in enumerate(build.scene.bodies, start=1):
+        if body.conduction is None:
+            continue
+        bound = _bound(build, number, body, body.conduction)
+        build.resistances[body.name] = bound.thickness / bound.conductivity
+        if body.conduction.cells:
+            slab = build.slabs[body.name] = _divided(build, number, body, body.conduction)
+            _conduct(build, slab, bound)
+
+
+def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction:
+    """The law with symbols for its parameters, its conductivity at the reference state."""
+    if body.energy is None:
+        raise InputError(f"{body.name} conducts heat but stores none: give it a heat capacity C.", law.place)
+    for path in build.scene.heat:
+        if set(path.between) == {body.name, "surroundings"} and law.cells:
+            text = f"a path from {body.name} to the surroundings would end at its contact. Say `far` in `conduction`."
+            raise InputError(text, path.place)
+    if law.far is not None and not law.cells:
+        raise InputError(f"{body.name} is one lump, so it has no far side. Give it cells, or a heat path.", law.place)
+    return build.variables.bind(
+        replace(law, conductivity=_reference(law)), f"bodies.{body.name}.conduction", f"_{number}"
+    )
+
+
+def conductors(build: Build) -> Iterator[Conductor]:
+    """What it takes to judge whether a body may be one lump."""
+    for number, body in enumerate(build.scene.bodies, start=1):
+        law = body.conduction
+        if law is None:
+            continue
+        node, ends = build.node_of[body.name], build.conductances
+        F = node.energies[body.name] / build.volume(body.name)[0][1]
+        paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
+        alone = sum(other is node for other in build.node_of.values()) == 1
+        yield Conductor(
+            number,
+            body.name,
+            not law.cells,
+            build.resistances[body.name],
+            -node.T * balances.second(F, node.T),
+            symengine.Add(*paths) if alone else None,
+        )
+
+
+def _divided(build: Build, number: int, body: Body, law: Conduction) -> Slab:
+    """The body's energy shared among its nodes."""
+    surface = build.node_of[body.name]
+    at = law.points
+    nodes = [surface]
+    for i in range(1, law.cells + (0 if law.held else 1)):
+        name = f"T_{number}_x{i}"
+        if name in build.nodes:
+            raise InputError(f"{name} is a temperature inside {body.name}; give the other one another name.", law.place)
+        nodes.append(Node(name, symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")))
+    if law.held:
+        nodes.append(_far_node(build, number, body, law))
+    whole = surface.energies[body.name]
+    for node, share in zip(nodes, grids.shares(at), strict=True):
+        node.energies[body.name] = share * whole.subs({surface.T: node.T})
+    return Slab(number, body, law, at, tuple(nodes))
+
+
+def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
+    """The temperature that is given at or beyond the far side."""
+    name = f"T_far_{number}"
+    where = "at" if law.held else "beyond"
+    assert law.far is not None
+    build.prescribe(Quantity(name, "K", f"temperature {where} the far side of {body.name}"), law.far)
+    node = build.nodes[name] = Node(name, symengine.Symbol(name), build.slope_of(name), prescribed=True)
+    return node
+
+
+def _conduct(build: Build, slab: Slab, bound: Conduction) -> None:
+    """Fluxes from node to node, and through the far side."""
+    name = slab.body.name
+    conductivity = _conductivity(build, slab, bound.conductivity)
+    links = list(zip(slab.nodes, slab.nodes[1:], strict=False))
+    widths = [b - a for a, b in zip(slab.points, slab.points[1:], strict=False)]
+    conductances = [
+        conductivity((a.T + b.T) / 2) / (bound.thickness * width) for (a, b), width in zip(links, widths, strict=True)
+    ]
+    if slab.law.h_far is not None:
+        links.append((slab.nodes[-1], _far_node(build, slab.number, slab.body, slab.law)))
+        conductances.append(bound.h_far)
+    produced = []
+    for (a, b), conductance in zip(links, conductances, strict=True):
+        flux = conductance * (a.T - b.T)
+        a.inflow.append(-flux)
+        b.inflow.append(flux)
+        produced.append(flux * (a.T - b.T) / (a.T * b.T))
+    build.into_body[name].append(slab.nodes[0].inflow[-1])
+    build.production(f"conduction_{slab.number}", f"heat conduction in {name}", symengine.Add(*produced))
+
+
+def _reference(law: Conduction) -> float:
+    return law.conductivity.value if isinstance(law.conductivity, Varying) else law.conductivity
+
+
+def _conductivity(build: Build, slab: Slab, reference: Expression) -> Callable[[Expression], Expression]:
+    """Conductivity as a function of the temperature where it is asked for."""
+    given = slab.law.conductivity
+    if not isinstance(given, Varying):
+        return lambda T: reference
+    own = {f"T_{slab.number}", slab.nodes[0].name}
+    bound = []
+    for factor in given.factors:
+        others = {argument for argument in reads(factor.factor) if argument not in ("x", "T_0", factor.of)}
+        if factor.of not in own or others:
+            message = f"the conductivity of {slab.body.name} varies with its own temperature only: of: {min(own)}."
+            raise InputError(message, factor.place)
+        bound.append(build.variables.bind(factor, f"bodies.{slab.body.name}.conduction.{factor.name()}", unit="K"))
+
+    def conductivity(T: Expression) -> Expression:
+        value = reference
+        for factor in bound:
+            known = {name: build.variables.get(name, factor) for name in reads(factor.factor) if name == "T_0"}
+            value *= factor.factor(**{name: known.get(name, T) for name in reads(factor.factor)})
+        return value
+
+    return conductivity
+
+
+def profiles(build: Build) -> None:
+    """The balances and states of the nodes inside the bodies, behind all others."""
+    for slab in build.slabs.values():
+        surface, initial = slab.nodes[0], build.scene.initial.get(slab.profile)
+        start = slab.profile if initial is not None else surface.name
+        if initial is None and surface.prescribed:
+            text = f"initial: the temperature inside {slab.body.name} is not given. Add `{slab.profile}:`."
+            raise InputError(text, slab.law.place)
+        value = initial if initial is not None else build.initial(surface.name)
+        if not value > 0:
+            raise InputError(f"initial {start} = {value:g} K is not an absolute temperature above zero.")
+        for i, node in enumerate(slab.inner, start=1):
+            build.rows[node.name] = balances.node_row(node, {}, {})
+            text = f"temperature of {slab.body.name}, point {i} from the contact"
+            quantity = Quantity(node.name, "K", text)
+            build.states.append(State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start))
+        build.profiles.append(_profile(slab))
+
+
+def _profile(slab: Slab) -> Profile:
+    last = slab.nodes[-1]
+    return Profile(
+        number=slab.number,
+        body=slab.body.name,
+        points=slab.points,
+        thickness=f"{slab.law.path}.thickness" if slab.law.place else f"bodies.{slab.body.name}.conduction.thickness",
+        surface=slab.nodes[0].name,
+        anchored=not slab.nodes[0].prescribed,
+        states=tuple(node.name for node in slab.inner),
+        far=last.name if last.prescribed else "",
+    )

@@ -1,0 +1,312 @@
+"""Friction, heat paths and external heat: what flows, and what it dissipates."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+
+import symengine
+
+from surfacechem.contracts.terms import Friction, HeatTransfer
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.expressions import Expression, derivative, where
+from surfacechem.model.balances import Node
+from surfacechem.model.build import BOTH, NOTHING, Build
+from surfacechem.model.components.memory import memory
+from surfacechem.model.components.mounting import ACROSS, ALONG, Direction
+from surfacechem.model.sliding.formulations import displacement, in_parallel
+from surfacechem.model.sliding.resistance import resist, resistance, stick_limit
+from surfacechem.model.system import Margin
+from surfacechem.quantities import Quantity
+
+
+def friction(build: Build) -> None:
+    """Sliding tractions and what they dissipate; their power comes from outside."""
+    rubs, total = build.motion.rubs, symengine.Integer(0)
+    for law in build.interface.frictions:
+        label = build.label(law)
+        bound = build.bound(law)
+        memory(build, law, bound)
+        met = pressed(build, law)
+        resisted = resistance(build, law, bound, met)
+        build.law_margins(bound, {}, met=met)
+        power = symengine.Integer(0)
+        for d, traction in resisted.items():
+            across = " across v" if d is ACROSS else ""
+            quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
+            nominal = build.stretch * build.name(quantity, traction)
+            power += rubs * nominal * build.variables.get(d.velocity, law)
+            total += rubs * nominal
+            resist(build, d, nominal)
+        build.frictions.add(label)
+        build.dissipation[label] = power
+        if not build.motion.slips:
+            build.motion.works[law] = f"W_{label}"
+            build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
+            _reversal(build, resisted)
+        else:
+            stick_limit(build, law, bound, met)
+    if not build.motion.slips and in_parallel(build):
+        t_a = derivative(build.psi, displacement(build))
+        build.areal(Quantity(ALONG.total, "Pa", f"{ALONG.text} on body 1", ALONG.total), t_a + total)
+
+
+def pressed(build: Build, law: Friction) -> dict[str, Expression]:
+    """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
+
+    At zero it is one that grows or falls, not one that stays: so a contact begins and ends.
+    """
+    if "p" not in law.nonnegative or "p" in build.scene.loading:
+        return {}
+    p, least = build.variables.get("p", law), build.bound(law).least.get("p")
+    return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
+
+
+def _reversal(build: Build, directions: Collection[Direction]) -> None:
+    for v in (d.velocity for d in directions):
+        if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
+            reason = "sliding reverses" if len(directions) == 1 else f"{v} changes its sign"
+            build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
+
+
+def heat_paths(build: Build) -> None:
+    """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
+    for paths in _by_ends(build):
+        _between(build, paths)
+    for law in (law for law in build.scene.heat if _made_across(law)):
+        _through_film(build, law)
+    for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
+        if build.variables.has(Q):
+            _external_heat(build, member, Q)
+    if build.interface.temperature is None:
+        _shares_margin(build)
+        for label, power in build.dissipation.items():
+            _share(build, power, "friction" if label in build.frictions else "reaction")
+
+
+def _shares_margin(build: Build) -> None:
+    if build.interface.loss:
+        rest = build.shares()[build.scene.bodies[1].name]
+        reason = "the fractions of the interface's heat add up to more than 1"
+        build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
+
+
+def takers(build: Build) -> list[tuple[Node, Expression]]:
+    """Who takes the heat that the interface makes in no time, and which part of it.
+
+    The interface itself, the ends of its heat without a medium, or, where it stores none, the ends of its paths: its
+    temperature rises until these carry off all of it, in proportion to their conductances.
+    """
+    centre = build.node_of.get("interface")
+    if centre is None:
+        return [(build.node_of[end], share) for end, share in build.shares().items()]
+    if centre.takes_heat:
+        return [(centre, symengine.Integer(1))]
+    ways = [
+        (build.node_of[end], _area(build, pair) * h)
+        for pair, channels in build.conductances.items()
+        if "interface" in pair
+        for end in (build.into_body if pair == BOTH else set(pair) - {"interface"})
+        for h in channels
+    ]
+    whole = symengine.Add(*(h for _, h in ways))
+    conducts = where(whole > 0, whole, 1)
+    return [(node, where(whole > 0, h / conducts, symengine.Rational(1, len(ways)))) for node, h in ways]
+
+
+def _area(build: Build, ends: Collection[str]) -> Expression:
+    """Area of a path over the reference area: heat leaves to the surroundings through the latter."""
+    return symengine.Integer(1) if "surroundings" in ends else build.stretch
+
+
+def _share(build: Build, heat: Expression, channel: str) -> None:
+    for end, share in build.shares().items():
+        if share * heat != 0:
+            build.node_of[end].inflow.append(share * heat)
+            receive(build, end, share * heat, channel)
+
+
+def receive(build: Build, end: str, heat: Expression, channel: str) -> None:
+    """Remember the heat that a body gets from the interface or the other body, by what carries it."""
+    if end in build.from_interface:
+        received = build.from_interface[end]
+        received[channel] = received.get(channel, symengine.Integer(0)) + heat
+    elif end == "interface":
+        build.into_interface.append(heat)
+
+
+def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
+    """Conductances of a law [W/(m^2 K)], by what carries the heat."""
+    from_node, to_node = (end_node(build, end, law.place) for end in law.between)
+    bound = build.variables.bind(law, f"heat.{law.name()}")
+    own = {"T_from": from_node.T, "T_to": to_node.T}
+    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
+    build.law_ranges(law)
+    build.law_margins(law, {})
+    return channels
+
+
+def check_closure(build: Build, law: HeatTransfer) -> None:
+    """Closures other than the direct one need two bodies."""
+    if not set(law.between) <= {body.name for body in build.scene.bodies}:
+        raise InputError(f"`closure: {law.closure}` belongs to a path between the two bodies.", law.place)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """A conductance between two ends [W/(m^2 K)], by what carries the heat."""
+
+    ends: tuple[str, str]
+    channels: Mapping[str, Expression]
+
+
+def _by_ends(build: Build) -> list[list[_Path]]:
+    """The heat paths, those between the same two ends together."""
+    groups: dict[frozenset[str], list[_Path]] = {}
+    for law in build.scene.heat:
+        if law.closure == "mean" or _made_across(law):
+            continue
+        for path in _paths(build, law):
+            groups.setdefault(frozenset(path.ends), []).append(path)
+    return list(groups.values())
+
+
+def _two_temperatures(build: Build, law: HeatTransfer) -> None:
+    """A path between two bodies that share one temperature carries nothing."""
+    first, second = (end_node(build, end, law.place) for end in law.between)
+    if first is second:
+        a, b = law.between
+        raise InputError(f"the heat path between {a} and {b} has one temperature, {first.name}; remove it.", law.place)
+
+
+def _made_across(law: HeatTransfer) -> bool:
+    """Whether a law carries heat through a film in which it is also made, all across."""
+    return law.closure == "medium" and hasattr(law, "resistances")
+
+
+def _through_film(build: Build, law: HeatTransfer) -> None:
+    r"""Heat that a film at the mean temperature T_c gives its walls.
+
+    Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
+    walls, beyond which the temperatures are :math:`T_k`,
+
+    .. math:: q_1 = \frac{6 (r + 2 r_2) (T_c - T_1) - 2 r (T_2 - T_1)}{r^2 + 4 r (r_1 + r_2) + 12 r_1 r_2}
+
+    and :math:`q_2` likewise. Without a film, r = 0, each wall would have its own path; without resistance of the walls
+    the first coefficient is 6/r, and the second takes back what the two paths in series conduct beyond 1/r.
+    """
+    check_closure(build, law)
+    _two_temperatures(build, law)
+    centre, ends = end_node(build, "interface", law.place), [end_node(build, end, law.place) for end in law.between]
+    bound = build.variables.bind(law, f"heat.{law.name()}")
+    r_1, r, r_2 = build.variables.call(bound, bound.resistances)
+    build.law_ranges(law)
+    build.law_margins(law, {})
+    scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
+    beside = -2 * r / scale * (ends[1].T - ends[0].T)
+    production = symengine.Integer(0)
+    for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
+        h = 6 * (r + 2 * wall) / scale
+        build.conductances["interface", end] = [*build.conductances.get(("interface", end), []), h]
+        text = f"heat flux from the film into {end}"
+        flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
+        q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
+        node.inflow.append(q)
+        centre.inflow.append(-q)
+        receive(build, end, q, law.channel)
+        receive(build, "interface", -q, law.channel)
+        production += q * (centre.T - node.T) / (centre.T * node.T)
+    # Booked as one: heat that a wall takes from a film colder than itself has come through it from the other wall.
+    build.production(build.unique("film"), "heat flow through the film", production)
+
+
+def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
+    """The path of a law, or through the medium two paths of twice the conductance."""
+    a, b = law.between
+    _two_temperatures(build, law)
+    channels = conductances(build, law)
+    if law.closure == "direct":
+        yield _Path((a, b), channels)
+        return
+    check_closure(build, law)
+    double = {name: 2 * h for name, h in channels.items()}
+    for ends in ((a, "interface"), ("interface", b)):
+        if end_node(build, ends[0], law.place) is not end_node(build, ends[1], law.place):
+            yield _Path(ends, double)
+
+
+def _between(build: Build, paths: list[_Path]) -> None:
+    """All paths between two ends: a flux of each channel where there are several, and their sum."""
+    a, b = paths[0].ends
+    from_node, to_node = end_node(build, a), end_node(build, b)
+    area = _area(build, (a, b))
+    channels: dict[str, Expression] = {}
+    for path in paths:
+        for channel, h in path.channels.items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
+    build.conductances[a, b] = list(channels.values())
+    difference = from_node.T - to_node.T
+    flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
+    total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
+    from_node.inflow.append(-total)
+    to_node.inflow.append(total)
+    production = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
+    build.production(flux.name, f"heat flow from {a} to {b}", production)
+    _received(build, (a, b), parts)
+
+
+def named_flux(
+    build: Build, flux: Quantity, parts: Mapping[str, Expression]
+) -> tuple[Expression, dict[str, Expression]]:
+    """A flux by its name, and its channels by theirs where there are several."""
+    if len(parts) > 1:
+        texts = {channel: f"{flux.long_name} by {channel}" for channel in parts}
+        names = {channel: Quantity(f"{flux.name}_{channel}", "W/m^2", text) for channel, text in texts.items()}
+        parts = {channel: build.name(names[channel], part) for channel, part in parts.items()}
+    total = build.name(flux, symengine.Add(*parts.values()))
+    return total, dict(parts) if len(parts) > 1 else {next(iter(parts)): total}
+
+
+def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expression]) -> None:
+    """Book fluxes from the first end to the second; with the surroundings, a body's heat is not the interface's."""
+    for channel, flux in parts.items():
+        for end, heat in zip(ends, (-flux, flux), strict=True):
+            if "surroundings" in ends and end in build.into_body:
+                build.into_body[end].append(heat)
+            else:
+                receive(build, end, heat, channel)
+
+
+def _path_name(build: Build, a: str, b: str) -> str:
+    """Name of the flux from one end to another: q_12, q_c1, q_1a."""
+    short = {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
+    short |= {"interface": "c", "surroundings": "a"}
+    return build.unique(f"q_{short[a]}{short[b]}")
+
+
+def end_node(build: Build, end: str, place: Place | None = None) -> Node:
+    """The temperature node of an end of a heat path; InputError where it has none."""
+    if end in build.node_of:
+        return build.node_of[end]
+    if end == "interface":
+        message = "a heat path ends at the interface, which has no temperature. Give `interface.temperature`."
+        raise InputError(message, place)
+    if end == "surroundings":
+        raise InputError("a heat path ends at the surroundings. Give `surroundings: {temperature: ...}`.", place)
+    known = [*build.node_of, "interface", "surroundings"]
+    raise InputError(f"heat path: no end '{end}'.{suggestion(end, known)}", place)
+
+
+def _external_heat(build: Build, member: str, name: str) -> None:
+    Q = build.variables.get(name, "the energy balance")
+    text = f"external heat into {member}"
+    if member in build.node_of:
+        build.node_of[member].inflow.append(Q)
+        build.supply(f"H_{name[2:]}", text, Q, build.node_of[member].T)
+    else:
+        build.supply(f"H_{name[2:]}", text, Q, build.variables.get("T_c", "the external heat"))
+        _share(build, Q, "external")
+    if member in build.into_body:
+        build.into_body[member].append(Q)
+    else:
+        build.into_interface.append(Q)

@@ -1,0 +1,99 @@
+r"""The load on the bonds: normal traction and force per bond, wherever a law reads them.
+
+The force on a bond is how much its chemical potential grows with the gap,
+
+.. math:: f_k = \partial\mu_k / \partial g_n = \partial^2\Psi / \partial\theta_k \partial g_n / N_k
+
+which for a spring is :math:`w_b'(g_n)`: species share the load by their stiffness. Where the potential gives bonds no
+elasticity of their own they share the tensile part of the traction evenly, :math:`f = \langle t_n\rangle / (n_c\phi)`:
+in compression the surfaces carry the load, not the bonds.
+
+Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575; shared load as in Erdmann & Schwarz (2004),
+Phys. Rev. Lett. 92, 108102, doi 10.1103/PhysRevLett.92.108102.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import symengine
+
+from surfacechem.expressions import Expression, depends, derivative, positive, where
+from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.system import Margin
+from surfacechem.quantities import VARIABLES, Quantity
+
+FEWEST = 1e-12
+"""Bonded fraction below which a shared load does not grow any more."""
+
+RESOLUTION = 1e-12
+"""Bonds that would be gone within this part of the time that has passed have ruptured."""
+
+INSTANT = 1e-100
+"""Time that counts as none [s]."""
+
+SHARED = "load shared by all bonds"
+ELASTIC = "bond elasticity"
+OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from zero."
+
+
+def force(build: Build) -> None:
+    """Give the normal traction and the force per bond their roles."""
+    g_n = symengine.Symbol("g_n")
+    loaded = depends(build.psi, g_n)
+    if loaded:
+        build.variables.define("t_n", lambda: symengine.Symbol("t_n"), "derived", "the interface's potential")
+    for name, bond in build.bonding.items():
+        if depends(derivative(build.psi, bond.symbol), g_n):
+            variable = "f" if name == "phi" else f"f_{name}"
+            build.variables.define(variable, partial(_elastic, build, variable, name), "derived", ELASTIC)
+    if build.variables.has("t_n") and not _elastic_phi(build):
+        build.variables.define("f", partial(_shared, build), "derived", SHARED)
+
+
+def _elastic_phi(build: Build) -> bool:
+    return any(role.variable == "f" and role.by == ELASTIC for role in build.variables.roles)
+
+
+def _elastic(build: Build, variable: str, name: str) -> Expression:
+    bond = build.bonding[name]
+    quantity = VARIABLES["f"] if variable == "f" else Quantity(variable, "N", f"force per bond of {name}")
+    stretching = derivative(derivative(build.psi, bond.symbol), symengine.Symbol("g_n"))
+    return build.name(quantity, stretching / bond.density)
+
+
+def _shared(build: Build) -> Expression:
+    """Tension over the bonds that carry it, whose number ends a run where they cannot."""
+    t_n = build.variables.get("t_n", "the force per bond")
+    n_c = build.variables.get("n_c", "the force per bond")
+    phi = build.variables.get("phi", "the force per bond")
+    build.margins.append(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
+    carrying = where(phi > FEWEST, phi, FEWEST)
+    return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
+
+
+def rupture(build: Build) -> None:
+    """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
+    carriers = list(_carriers(build))
+    for name, bonds in carriers:
+        losses = (
+            derivative(bonds, b.symbol) * build.rows[other].subs({b.dot: 0}) for other, b in build.bonding.items()
+        )
+        loss = symengine.Add(*losses)
+        if loss != 0:
+            left = bonds - RESOLUTION * (build.t + INSTANT) * loss + NOTHING
+            # What is left of hardly any bonds cannot be told from rounding.
+            left = where(bonds > FEWEST, left, NOTHING)
+            which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
+            build.margins.append(Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD))
+
+
+def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
+    """Bonds whose load grows on the rest as they break: those that share one, or hold a gap that gives way."""
+    for role in build.variables.roles:
+        if role.by == SHARED and build.variables.was_read(role.variable):
+            yield "phi", build.variables.get("phi", "the force per bond")
+        if role.by == ELASTIC and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
+            name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
+            yield name, build.bonding[name].symbol

@@ -1,0 +1,325 @@
+"""The state of the interface: prescribed variables, bonding states with their bounds, and the free energy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import symengine
+
+from surfacechem.contracts.terms import Law, Load, Potential, Spec, UnderPressure
+from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import Expression, depends, derivative, positive, where
+from surfacechem.model.automaton import Transition
+from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.components.logarithms import initial_bonding
+from surfacechem.model.components.mounting import held, law_reads
+from surfacechem.model.draft import Bond
+from surfacechem.model.sliding.formulations import arrangement, displacement, in_parallel, in_series
+from surfacechem.model.system import Margin, State
+from surfacechem.quantities import VARIABLES, Quantity
+
+LOADABLE = (
+    "phi",
+    "g_n",
+    "g_t",
+    "v",
+    "v_2",
+    "p",
+    "t_n",
+    "f",
+    "J_c",
+    "Q_1",
+    "Q_2",
+    "Q_c",
+    "w_n",
+    "w_t",
+    "w_t2",
+    "F_n",
+    "F_t",
+    "F_t2",
+    "u_t",
+)
+"""Variables that a case may prescribe, beside the temperatures."""
+
+TRACTIONS = (
+    ("g_n", "t_n", "normal traction on body 1"),
+    ("g_t", "t_e", "elastic tangential traction on body 1"),
+    ("u_t", "t_a", "tangential traction on body 1 of what stands beside friction"),
+    ("u_t2", "t_a2", "transverse traction on body 1 of what stands beside friction"),
+)
+"""Gap, traction that is its derivative of the free energy, and its long name."""
+
+
+def prescribed_variables(build: Build) -> None:
+    """Histories under ``loading``; each comes to life when something reads it."""
+    for name, load in build.scene.loading.items():
+        if name in build.nodes:
+            continue
+        if name not in LOADABLE:
+            known = [*LOADABLE, *build.nodes]
+            raise InputError(f"loading: nothing is called '{name}'.{suggestion(name, known)}")
+        build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
+
+
+def _prescribed(build: Build, name: str, load: Load) -> Expression:
+    symbol = build.prescribe(VARIABLES[name], load)
+    if name == "J_c":
+        build.margins.append(Margin("J_c > 0", symbol - NOTHING, "the area stretch J_c reached zero"))
+    if name == "phi":
+        _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
+    return symbol
+
+
+def bonding_variables(build: Build) -> None:
+    """Bonding states, site densities and their bounds."""
+    sites = build.interface.sites
+    if sites is not None:
+        spec = Spec("1/m^2", "nominal density of reference bonding sites", above=0)
+        nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
+        build.variables.define("N_c", nominal, "constant", "interface.sites")
+        build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
+        for k, side in enumerate((sites.density_1, sites.density_2), start=1):
+            build.variables.define(f"n_{k}", partial(_side_density, build, k, side), "derived", "interface.sites")
+    breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
+    if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
+        limit = sites.phi_max if sites else 1.0
+        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding state"), limit)
+    for variable in build.interface.variables:
+        spec = Spec("1/m^2", "site density", above=0)
+        amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
+        _bonding_state(build, Quantity(variable.name, "1", variable.long_name), amount, 1.0)
+        _amounts(build, variable.name, amount)
+    if build.interface.bonds:
+        build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
+
+
+def _current_density(build: Build) -> Expression:
+    nominal = build.variables.get("N_c", "the interface")
+    if not build.variables.has("J_c"):
+        return nominal
+    return build.name(VARIABLES["n_c"], nominal / build.stretch)
+
+
+def _side_density(build: Build, k: int, density: float) -> Expression:
+    """Sites of one body; those of the reference are the reference density itself."""
+    sites = build.interface.sites
+    if sites is not None and density == sites.density:
+        return build.variables.get("n_c", "the interface")
+    spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
+    path = f"interface.sites.{build.scene.bodies[k - 1].name}"
+    return build.constant(f"N_{k}", path, spec, density) / build.stretch
+
+
+def _amounts(build: Build, name: str, density: Expression) -> None:
+    """What a bonding variable amounts to where it is one: N_x per reference area, n_x per current area."""
+    build.variables.define(f"N_{name}", lambda: density, "constant", f"interface.{name}")
+    build.variables.define(f"n_{name}", lambda: density / build.stretch, "derived", f"interface.{name}")
+
+
+def _derived_phi(build: Build) -> Expression:
+    N_c = build.variables.get("N_c", "the bonding state")
+    bonds = sum(build.bonding[name].symbol * build.bonding[name].density for name in build.interface.bonds)
+    return bonds / N_c
+
+
+def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> None:
+    name = quantity.name
+    symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
+    initial = initial_bonding(build, name)
+    if not 0 <= initial <= limit:
+        raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.")
+    build.variables.define(name, lambda: symbol, "evolved", "bonding")
+    build.bonding[name] = Bond(symbol, dot, density)
+    start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
+    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
+    build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
+    _bounds(build, name, symbol, limit)
+
+
+def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
+    if not build.variables.has("slack"):
+        spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
+        number = partial(build.constant, "slack", "run.slack", spec, 1e-6, internal=True)
+        build.variables.define("slack", number, "internal", "run")
+    slack = build.variables.get("slack", "the bounds")
+    spec = Spec("1", f"upper bound of {name}")
+    top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)
+    build.margins.append(Margin(f"{name} >= 0", symbol + slack, f"{name} fell below its bound 0"))
+    build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, f"{name} rose above its bound {limit:g}"))
+
+
+def free_energy(build: Build) -> None:
+    """The sum of the interface's potentials, and the tractions that follow."""
+    bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
+    gaps = _gaps(build, bounds)
+    energies = _energies(build, bounds, gaps)
+    for law, F in energies.items():
+        build.refuse_foreign(F, _known(build), law)
+        build.psi += F
+        build.law_ranges(law)
+        build.law_margins(bounds[law], gaps[law])
+    _sides_of_touch(build)
+    if build.interface.temperature is not None:
+        node = build.node_of["interface"]
+        node.energies["interface"] = build.psi
+    elif any(depends(build.psi, symengine.Symbol(name)) for name in (*build.nodes, "T_c")):
+        raise InputError(
+            "the interface's potential depends on temperature, but the interface has none. "
+            "Give `interface.temperature` a name."
+        )
+    _tractions(build)
+    if depends(build.psi, symengine.Symbol("g_n")):
+        borne = [
+            _per_reference_area(build, b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()
+        ]
+        contact = partial(_contact_pressure, build, [_in_modes(build, F) for F in borne])
+        build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
+        _warn_of_net_pressure(build)
+    elif build.variables.has("p"):
+        build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
+
+
+def _gaps(build: Build, laws: Iterable[Potential]) -> dict[Potential, dict[str, Expression]]:
+    """The tangential gap of each potential where that is not the elastic one: the displacement, or none."""
+    parallel = in_parallel(build)
+    gaps: dict[Potential, Expression] = dict.fromkeys(parallel, displacement(build)) if parallel else {}
+    gaps |= {law: symengine.Integer(0) for law in laws if arrangement(law) == "none"}
+    return {law: {"g_t": gaps[law]} if law in gaps else {} for law in laws}
+
+
+def _energies(
+    build: Build, bounds: Mapping[Potential, Potential], gaps: Mapping[Potential, Mapping[str, Expression]]
+) -> dict[Potential, Expression]:
+    """The energy of each potential, with the tangential gap that it has beside friction or behind it.
+
+    Where a potential in parallel says that friction acts on a part of the interface only, so does the elastic gap that
+    friction slides on.
+    """
+    series = in_series(build)
+    found = {law: _per_reference_area(build, b, b.statement, gaps[law]) for law, b in bounds.items()}
+    parts: set[Expression] = set()  # several adhesions of the same bonds leave the same part unbonded
+    for law in in_parallel(build):
+        if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
+            parts.add(build.variables.call(bounds[law], unbonded))
+            build.warnings += [
+                f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
+                for friction in build.interface.frictions
+                if friction.breaks_bonds
+            ]
+    for part in parts:
+        build.motion.rubs *= part
+    if build.motion.rubs != 1:
+        g_t = symengine.Symbol("g_t")
+        for law in series:
+            sheared = found[law] - symengine.sympify(found[law]).subs({g_t: 0})
+            build.motion.rubbed += sheared
+            found[law] += (build.motion.rubs - 1) * sheared
+    return found
+
+
+def _attracts(law: Potential) -> bool:
+    """Whether a potential may pull bodies that touch, so that it says what part of it the contact bears."""
+    return hasattr(law, "repulsion")
+
+
+def _contact_pressure(build: Build, borne: Sequence[Expression]) -> Expression:
+    """Sum of what each potential presses [Pa], per current area."""
+    pressed = (positive(-derivative(F, symengine.Symbol("g_n"))) for F in borne)
+    return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
+
+
+def _warn_of_net_pressure(build: Build) -> None:
+    """Warn of laws that take the attraction of a potential for relief of the contact.
+
+    A law with an adhesive strength of its own has it back.
+    """
+    attracting = [law.name() for law in build.interface.potentials if _attracts(law)]
+    readers = [*build.interface.frictions, *build.interface.reactions, *build.scene.heat]
+    net = [law.name() for law in readers if _reads_net_pressure(law) and not getattr(law, "t_n_max", 0)]
+    if attracting and net:
+        build.warnings.append(
+            f"The attraction of {' and '.join(attracting)} lowers the net pressure, which is read by "
+            f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
+            "bears give the law `pressure: contact`, or a factor `of: p_contact`."
+        )
+
+
+def _reads_net_pressure(law: Law) -> bool:
+    return law_reads(law, "p") and not (isinstance(law, UnderPressure) and law.pressure == "contact")
+
+
+def _per_reference_area(
+    build: Build,
+    law: Potential,
+    formula: Callable[..., Expression],
+    gaps: Mapping[str, Expression] | None = None,
+) -> Expression:
+    """Free energy of a bound law per reference area, as a function of the area stretch where it depends on that."""
+    F = build.variables.call(law, formula, gaps)
+    if not build.variables.has("J_c"):
+        return F
+    F = build.stretch * F if law.per == "current" else F
+    n_c = symengine.Symbol("n_c")
+    return F.subs({n_c: build.variables.get("N_c", law) / build.stretch}) if depends(F, n_c) else F
+
+
+def _sides_of_touch(build: Build) -> None:
+    """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
+    g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
+    psi = symengine.sympify(build.psi).xreplace(_by_side(g))
+    if not depends(psi, side):
+        return
+    if "g_n" not in build.motion.gap_rates:
+        build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
+        return
+    build.psi = psi
+    rests = _rests(build)
+    start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
+    build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
+    for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
+        margin = where(value * side > 0, value * g, 1)
+        other = {side: symengine.Integer(-value)}
+        bears = rests and name == "release"
+        build.transitions.append(Transition(name, margin, reason, other, settles=True, to_pass=bears, measure="g_n"))
+
+
+def _by_side(g: Any) -> dict[Any, Any]:
+    side = symengine.Symbol("side")
+    return {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
+
+
+def _in_modes(build: Build, F: Expression) -> Expression:
+    """An energy with the sides of touch in the mode, where there is one."""
+    return F if build.find_mode("side") is None else symengine.sympify(F).xreplace(_by_side(symengine.Symbol("g_n")))
+
+
+def _rests(build: Build) -> bool:
+    """Whether bodies at no gap are in contact, loaded or not: under a dead load nothing else holds them there."""
+    mount = held(build, "n")
+    return mount is not None and mount.quasi_static and not mount.law.k
+
+
+def _known(build: Build) -> set[Any]:
+    """What the balance of the interface accounts for: its own temperature, bonds, gaps and the stretch of its area."""
+    names = {"phi", "g_n", "g_t", "u_t", "u_t2", "J_c", *build.bonding}
+    if build.interface.temperature is not None:
+        names.add(build.node_of["interface"].name)
+    return {symengine.Symbol(name) for name in names}
+
+
+def _tractions(build: Build) -> None:
+    """Tractions of the elastic gaps; the normal one gives the contact pressure where the potential states it."""
+    for gap, traction, text in TRACTIONS:
+        symbol = symengine.Symbol(gap)
+        if depends(build.psi, symbol):
+            build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(build.psi, symbol))
+    if parallel := in_parallel(build):
+        traction = "t_a" if depends(build.psi, symengine.Symbol("u_t")) else "t_e"
+        names = " and ".join(law.name() for law in parallel)
+        text = f"{names} in parallel with friction" if build.interface.frictions else names
+        build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", text)
+    if depends(build.psi, symengine.Symbol("g_n")):
+        pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
+        build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

@@ -1,0 +1,42 @@
+"""The bonding state as its logarithm, where the case gives ``ln_phi`` its initial value: survival far below 1e-16."""
+
+from __future__ import annotations
+
+import math
+
+import symengine
+
+from surfacechem.errors import InputError
+from surfacechem.model.build import Build
+from surfacechem.model.system import Named, State
+from surfacechem.quantities import VARIABLES, Quantity
+
+LOGARITHM = "ln_phi"
+
+
+def initial_bonding(build: Build, name: str) -> float:
+    """Initial value of a bonding variable, from its logarithm where that is given."""
+    initial = build.scene.initial
+    if name != "phi" or LOGARITHM not in initial:
+        return build.initial(name)
+    if "phi" in initial:
+        raise InputError(f"initial: phi has two roles: given by itself and by {LOGARITHM}. Remove one of them.")
+    if initial[LOGARITHM] < math.log(math.ulp(0.0)):
+        raise InputError(f"initial: {LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold.")
+    return math.exp(initial[LOGARITHM])
+
+
+def logarithmic_state(build: Build) -> None:
+    """Replace the state phi by ln phi: d ln phi / dt is the balance of the bonds per bond."""
+    if "phi" not in build.bonding or LOGARITHM not in build.scene.initial:
+        return
+    bond = build.bonding["phi"]
+    if any(bond.symbol in transition.jump for transition in build.transitions):
+        raise InputError(f"initial: bonds that break at once have no {LOGARITHM}. Give `phi` instead.")
+    symbol, dot = symengine.symbols(f"{LOGARITHM} d{LOGARITHM}_dt")
+    phi = Named(VARIABLES["phi"], symengine.exp(symbol))
+    change = Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), bond.symbol * dot, False)
+    build.named[:0] = [phi, change]
+    build.rows[LOGARITHM] = symengine.expand(build.expanded(build.rows.pop("phi")) * symengine.exp(-symbol))
+    state = State(VARIABLES[LOGARITHM], symbol, dot, build.scene.initial[LOGARITHM], 1.0, algebraic=False)
+    build.states = [state if item.name == "phi" else item for item in build.states]

@@ -1,0 +1,282 @@
+"""How the far field holds a direction of the gap: springs, masses, dampers and their energies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import symengine
+
+from surfacechem.contracts.terms import Law, Varying, reads
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, derivative, sqrt
+from surfacechem.model.balances import Node
+from surfacechem.model.build import Build
+from surfacechem.model.springs import stored
+from surfacechem.model.system import Account, Pace
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Mounting
+
+LENGTH = 1e-6
+"""Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
+
+AXES = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
+KEYS = {"n": "normal", "t": "tangential", "t2": "transverse"}
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction along the interface: the names of what moves along it."""
+
+    axis: str
+    velocity: str
+    cosine: str
+    """Component of the direction of sliding."""
+    traction: str
+    total: str
+    text: str
+
+    @property
+    def displacement(self) -> str:
+        return f"u_{self.axis}"
+
+
+ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
+ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
+
+
+@dataclass(frozen=True)
+class Held:
+    """The mounting of a direction as the case gives it."""
+
+    law: Mounting
+    axis: str
+    by: str
+    beside: Held | None = None
+    """The mounting whose mass this one has, and all else where it is given for both."""
+
+    @property
+    def inertial(self) -> bool:
+        return self.beside.inertial if self.beside else self.law.m > 0
+
+    @property
+    def damped(self) -> bool:
+        return self.law.c_b > 0 or self.law.c_g > 0
+
+    @property
+    def quasi_static(self) -> bool:
+        return not (self.inertial or self.damped)
+
+
+def held(build: Build, axis: str) -> Held | None:
+    """The mounting of a direction; a far-field traction alone is a dead load."""
+    scene = build.scene
+    law: Mounting | None = getattr(scene, KEYS[axis])
+    if law is not None:
+        if not (law.k or law.m or law.c_b or law.c_g or pulled(build, axis)):
+            raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
+        _refuse_restitution(law, axis)
+        return Held(law, axis, law.path)
+    if pulled(build, axis):
+        return Held(Mounting(), axis, f"loading.F_{axis}" if f"F_{axis}" in scene.loading else "programme")
+    return None
+
+
+def _refuse_restitution(law: Mounting, axis: str) -> None:
+    if axis != "n" and law.e:
+        message = f"bodies rebound along the normal: give the coefficient of restitution e there, not {KEYS[axis]}."
+        raise InputError(message, law.place)
+
+
+def held_across(build: Build, along: Held) -> Held | None:
+    """The mounting across a tangential one where the scene moves there: its own, else the same."""
+    law = build.scene.transverse
+    if law is not None:
+        if law.m:
+            raise InputError("a mass is the same in every direction. Give `m` under `tangential`.", law.place)
+        _refuse_restitution(law, "t2")
+        return Held(law, "t2", law.path, along)
+    given = any(driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
+    if given or any(hasattr(friction, "transverse") for friction in build.interface.frictions):
+        return Held(along.law, "t2", along.by, along)
+    return None
+
+
+def pulled(build: Build, axis: str) -> bool:
+    """Whether a history or the programme gives a far-field traction."""
+    return driven(build, f"F_{axis}")
+
+
+def driven(build: Build, name: str) -> bool:
+    """Whether a history or the programme gives a variable."""
+    return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
+
+
+def read_by_potentials(build: Build, name: str) -> bool:
+    """Whether the free energy of the interface depends on a variable."""
+    return any(law_reads(law, name) for law in build.interface.potentials)
+
+
+def law_reads(law: Law, name: str) -> bool:
+    """Whether a law depends on a variable, by itself or by a factor."""
+    values = (getattr(law, parameter) for parameter, _ in law.specs())
+    factors = (factor for value in values if isinstance(value, Varying) for factor in value.factors)
+    return name in reads(law.statement) or any(factor.of == name for factor in factors)
+
+
+@dataclass(frozen=True)
+class FarField:
+    """A mounting with its parameters as symbols, and the histories that drive it."""
+
+    axis: str
+    k: Expression
+    m: Expression
+    c_b: Expression
+    c_g: Expression
+    beta_1: Expression
+    e: Expression
+    w: Expression
+    w_dot: Expression
+    F: Expression
+
+    def stored(self, g: Expression) -> Expression:
+        """Elastic energy of the bodies [J/m^2]."""
+        return stored(self.k, self.w, g)
+
+    def carried(self, g: Expression) -> Expression:
+        """Traction that the bodies carry elastically [Pa], the fall of what they store as the gap opens."""
+        slot = symengine.Symbol("opening")
+        return -derivative(self.stored(slot), slot).subs({slot: g})
+
+    def force(self, g: Expression, rate: Expression) -> Expression:
+        """Traction with which the far field pulls the gap open [Pa]."""
+        return self.carried(g) + self.c_b * (self.w_dot - rate) + self.F
+
+    def size(self, g: Expression) -> Expression:
+        """Size of the tractions that cancel where the far field is in balance [Pa]."""
+        return self.k * (absolute(self.w) + absolute(g)) + absolute(self.F)
+
+    def paces(self, text: str) -> list[Pace]:
+        """The period of a mass on the stiffness of the bodies, or the relaxation of a damper beside it."""
+        if self.k == 0:
+            return []
+        if self.m != 0:
+            remedy = "leave out the mass, so that it follows at once, or end the run sooner"
+            return [Pace(f"period of the {text}", 2 * math.pi * sqrt(self.m / self.k), remedy)]
+        if self.c_b + self.c_g != 0:
+            remedy = "leave out the damper, so that it snaps where it loses its equilibrium"
+            return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
+        return []
+
+    def shares(self, build: Build) -> list[tuple[str, Expression]]:
+        """The bodies, and which part of what the support dissipates each takes."""
+        return list(zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True))
+
+    def takers(self, build: Build) -> list[tuple[Node, Expression]]:
+        """The same over the volume of the bodies."""
+        return [(node, share * part) for body, share in self.shares(build) for node, part in build.volume(body)]
+
+    def yielding(self, g: Expression, traction: Expression) -> Expression:
+        """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
+        return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
+
+    def book(self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None) -> None:
+        """Energies of the bodies, work of the far field, heat of the dampers.
+
+        Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
+        ``moves``: then energy is conserved in each step, however stiff the damper.
+        """
+        moves = rate if moves is None else moves
+        text = AXES[self.axis]
+        build.paces += self.paces(text)
+        spring, kinetic = self.stored(g), self.m * rate**2 / 2
+        for name, energy, what in (
+            ("spring", spring, "elastic energy of the bodies"),
+            ("kinetic", kinetic, "kinetic energy"),
+        ):
+            if energy != 0:
+                quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
+                build.motion.mechanical.append(build.name(quantity, energy))
+        bulk = self.w_dot - rate
+        power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
+        if power != 0:
+            build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
+            build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
+        if self.F != 0:
+            build.motion.given[f"W_{self.axis}"] = self.F * g
+        if self.c_b != 0:
+            _bulk_damper(build, self, self.c_b * bulk * (self.w_dot - moves))
+        if self.c_g != 0:
+            label = build.unique(f"contact_damper_{self.axis}")
+            build.dissipation[label] = self.c_g * rate * moves
+            build.frictions.add(label)
+
+
+def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
+    label = f"bulk_damper_{far.axis}"
+    text = f"the damper of the bodies, {AXES[far.axis]}"
+    symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power)
+    build.ledger.append(
+        Account(Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}"), symbol, "dissipation", label)
+    )
+    produced = []
+    for node, share in far.takers(build):
+        node.inflow.append(share * symbol)
+        produced.append(share * symbol / node.T)
+    for body, share in far.shares(build):
+        contact = build.volume(body)[0][1]
+        build.into_body[body].append(share * contact * symbol)
+    build.production(label, text, symengine.Add(*produced))
+
+
+def far_field(build: Build, mount: Held) -> FarField:
+    """The mounting with symbols for its parameters; made once."""
+    if mount.axis not in build.motion.far_fields:
+        law = _bound(build, mount)
+        w, F = f"w_{mount.axis}", f"F_{mount.axis}"
+        given = build.variables.has(w)
+        needed = law.k != 0 or law.c_b != 0
+        drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
+        force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
+        if law.c_b != 0 and given:
+            _refuse_jumps(build, w)
+        w_dot = build.slope_of(w) if needed and given else symengine.Integer(0)
+        build.motion.far_fields[mount.axis] = FarField(
+            mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
+        )
+    far: FarField = build.motion.far_fields[mount.axis]
+    return far
+
+
+def _bound(build: Build, mount: Held) -> Mounting | FarField:
+    """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
+    if mount.beside is None:
+        law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+        _keep_above_zero(build, mount)
+        return law
+    first = far_field(build, mount.beside)
+    if mount.law is mount.beside.law:
+        return first
+    law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
+    return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
+
+
+def _keep_above_zero(build: Build, mount: Held) -> None:
+    """What makes a gap inertial, overdamped or quasi-static may change, but not vanish."""
+    dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
+    makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
+    path = f"mechanics.{KEYS[mount.axis]}.{makes}"
+    items = build.parameters.items
+    for i, item in enumerate(items):
+        if item.path == path and item.value > 0:
+            items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
+
+
+def _refuse_jumps(build: Build, w: str) -> None:
+    load = build.loads.get(w)
+    if load is not None and load.jumps():
+        raise InputError(
+            f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
+            "traction. Give the jump a duration, or leave out the damper.",
+            load.place,
+        )

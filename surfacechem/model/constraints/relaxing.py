@@ -1,0 +1,25 @@
+"""What follows a local jump: gaps without inertia or damper stayed where they were, and then find their equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import symengine
+
+from surfacechem.expressions import where
+from surfacechem.model.automaton import Transition
+from surfacechem.model.build import Build
+
+
+def relaxing(build: Build) -> None:
+    """Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do."""
+    local = [j for j, item in enumerate(build.transitions) if item.name == "debond" and item.sinks == "local"]
+    if not (local and build.equilibria):
+        return
+    loose = build.mode("loose", 0.0, {0.0: "whether the gaps have yet to follow a local jump"})
+    for j in local:
+        item = build.transitions[j]
+        modes = {**item.modes, loose: symengine.Integer(1)}
+        build.transitions[j] = replace(item, modes=modes, settles=False)
+    margin, reason = where(loose > 0, -1, 1), "the gap follows what gave way"
+    build.transitions.insert(0, Transition("relax", margin, reason, {loose: symengine.Integer(0)}, settles=True))

@@ -1,0 +1,149 @@
+"""Gradual debonding: the mode in which bonds break along an envelope, entered as it is reached, left on unloading."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import symengine
+
+from surfacechem.contracts.terms import RateLaw
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, derivative, where
+from surfacechem.model.automaton import Transition
+from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.components.mounting import far_field, held
+from surfacechem.model.system import Margin
+from surfacechem.quantities import VARIABLES
+
+MATCH = 1e-6
+"""Relative difference of two statements of a strength that rounded input explains."""
+
+RESOLVED, FINEST = 1 - 1e-9, 1e-9
+"""Largest and least part of the opening at which the last bonds break, at which the first ones may."""
+
+SAME = "Give `bond-stiffness` and this law the same E_b."
+
+
+def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:
+    """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
+    mount = held(build, "n")
+    if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
+        return []
+    g, k = symengine.Symbol("g_n"), far_field(build, mount).k
+    slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
+    margin = where(mode > 0, (k + slope) / (k + absolute(slope)), 1)
+    lost, none = -symengine.Integer(1), symengine.Integer(0)
+    reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
+    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True, sinks="snap")]
+
+
+def softening_mode(build: Build) -> None:
+    """The mode, for the laws that read it."""
+    if not any(hasattr(law, "envelope") for law in build.interface.reactions):
+        return
+    words = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
+    mode = build.mode("debonding", 0.0, words)
+    build.variables.define("softening", lambda: (mode + mode**2) / 2, "mode", "interface.bonding")
+
+
+def within_reach(build: Build) -> Expression:
+    """One while bonds can form, zero where the gap is open beyond their reach."""
+    mode = build.find_mode("debonding")
+    return symengine.Integer(1) if mode is None else 1 - mode * (mode - 1) / 2
+
+
+def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> None:
+    """The envelope falls after it rose, from the traction that complete bonding bears there."""
+    t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
+    t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
+    bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
+    _refuse_steep(law, build.at_start(peak), build.at_start(g_f))
+    if bonds.has(symengine.zoo):
+        return  # the potential does not exist without bonds, which then bear nothing of their own
+    borne, strength = build.at_start(bonds), build.at_start(t_max)
+    if abs(borne - strength) > MATCH * strength:
+        raise InputError(
+            f"{law.name()}: at t_max / E_b = {build.at_start(peak):g} m the bonds of the potential bear {borne:g} Pa, "
+            f"not the t_max of {strength:g} Pa. {SAME}",
+            law.place,
+        )
+    # What varies, and what a sweep gives, is watched.
+    reason = "the bonds of the potential bear another traction than t_max where they begin to break"
+    build.margins += [
+        Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
+        Margin("t_max", 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1), reason, remedy=SAME),
+    ]
+
+
+def _refuse_steep(law: RateLaw, peak: float, g_f: float) -> None:
+    what = f"{law.name()}: t_max / E_b = {peak:g} m, where complete bonding begins to break,"
+    if not peak < RESOLVED * g_f:
+        message = f"is not below g_f = {g_f:g} m: the traction would have to snap back. Raise g_f, or use a limit."
+        raise InputError(f"{what} {message}", law.place)
+    if peak < FINEST * g_f:
+        raise InputError(f"{what} is less than {FINEST:g} g_f, too little to be resolved. Lower E_b.", law.place)
+
+
+def softening(build: Build, law: RateLaw, forming: Expression, free: Expression) -> Expression:
+    """Rate of a bound law with an envelope, where others form bonds, and what starts and ends the loss of bonds."""
+    mode = build.find_mode("debonding")
+    phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
+    left = build.variables.call(law, law.envelope)  # type: ignore[attr-defined]
+    peak = law.peak()  # type: ignore[attr-defined]
+    _check(build, law, phi, g_n, peak)
+    quantity = VARIABLES["overshoot"]
+    overshoot = build.name(quantity, forming * free / n_c - _rate(build, left), output=False)
+    none, one = symengine.Integer(0), symengine.Integer(1)
+    lost, held = {mode: -one}, build.find_mode("held")
+    breaks = {mode: one} if held is None else {mode: one, held: none}
+    # Where there are no bonds, and none form, none break.
+    present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
+    begins = where(mode**2 > 0, 1, present)
+    beyond = where(mode**2 > 0, 1, where(phi > 0, left - phi + NOTHING, 1))
+    ended = where(mode > 0, left, 1)
+    remains = where(left < phi, where(left > 0, left, 0), phi)
+    if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
+        build.motion.follows[phi] = remains
+    fewer = "a jump leaves fewer bonds than there were"
+    build.transitions += [
+        Transition("yield", beyond, fewer, jump={phi: remains}, settles=True, sinks="snap"),
+        # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
+        Transition("soften", begins, "bonds begin to break as the gap opens", breaks, to_pass=True),
+        *_tear(build, mode, phi, left),
+        Transition("part", ended, "the last bonds break", lost, {phi: none}, settles=True, sinks="snap"),
+        Transition("unload", where(mode > 0, overshoot, 1), "bonds do not reach what the gap leaves", {mode: none}),
+    ]
+    if forming != 0:
+        margin, reason = where(mode < 0, where(forming > 0, -left, 1), 1), "the gap is closed enough to bond"
+        build.transitions.append(Transition("rejoin", margin, reason, {mode: none}, to_pass=True))
+    _start(build, phi, left)
+    return build.variables.call(law, law.statement, {"overshoot": overshoot})
+
+
+def apart_from_envelope(build: Build) -> None:
+    """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
+    mode = build.find_mode("debonding")
+    for j, item in enumerate(build.transitions):
+        if mode is not None and item.settles and mode not in item.modes:
+            modes = {**item.modes, mode: where(mode > 0, 0, mode)}
+            build.transitions[j] = replace(item, modes=modes)
+
+
+def _start(build: Build, phi: Expression, left: Expression) -> None:
+    """The mode in which a run begins, with no more bonds than the gap leaves."""
+    j = next(j for j, mode in enumerate(build.modes) if mode.name == "debonding")
+    build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
+    slack = build.variables.get("slack", "the bonds")
+    given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + slack)
+    remedy = "Give fewer bonds under `initial`, or a smaller gap."
+    build.margins.append(
+        Margin("bonds within their envelope", given, "there are more bonds than the gap leaves", remedy=remedy)
+    )
+
+
+def _rate(build: Build, left: Expression) -> Expression:
+    """How fast the envelope rises [1/s], a moving gap by its velocity where that has a variable of its own."""
+    rate = build.total_derivative(left)
+    if not build.variables.has("v_n"):
+        return rate
+    return rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})

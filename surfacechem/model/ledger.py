@@ -1,0 +1,209 @@
+"""Totals that the ledger must explain, the fluxes into the bodies, and the regime in words."""
+
+from __future__ import annotations
+
+import symengine
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.model import balances
+from surfacechem.model.automaton import INTERFACE, Sink
+from surfacechem.model.balances import Node
+from surfacechem.model.build import Build
+from surfacechem.model.components.exchange import takers
+from surfacechem.model.components.sources import GAPS, GEOMETRY, by_channel, by_source, heat_of_reaction
+from surfacechem.model.system import Account
+from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.scene import Body
+
+
+def totals(build: Build) -> None:
+    """Energies, entropies and the fluxes into the bodies."""
+    energies, entropies = [], []
+    for member, parts in _energies(build).items():
+        suffix = _suffix(build, member)
+        U = _sum([balances.internal_energy(F, node.T) if node else F for node, F in parts])
+        energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
+        S = _sum([balances.entropy(F, node.T) for node, F in parts if node])
+        if S != 0:
+            quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
+            entropies.append(build.name(quantity, S))
+    energies += build.motion.mechanical
+    build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
+    build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
+    _fluxes(build)
+    _enthalpy(build)
+    for mode in build.modes:
+        if len(mode.words) > 1:
+            words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
+            build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
+    if build.interface.bonds:
+        build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
+
+
+def _enthalpy(build: Build) -> None:
+    """Heat of reaction and contact enthalpy per bonding site, where bonds alone change on the interface."""
+    bonds = [x for x in build.rates if str(x) not in GEOMETRY and depends(build.psi, x)]
+    if not bonds or any(law.taken is not None for law in build.interface.reactions):
+        return
+    text = "heat of reaction at constant temperature and gap, positive where exothermic"
+    build.name(Quantity("q_reaction", "W/m^2", text), heat_of_reaction(build))
+    if build.variables.has("N_c"):
+        borne = sum((symengine.Symbol(g) * derivative(build.psi, symengine.Symbol(g)) for g in GAPS), 0)
+        site = build.variables.get("N_c", "the contact enthalpy")
+        text = "contact enthalpy per bonding site"
+        build.name(Quantity("e_c", "J", text), (symengine.Symbol("U_c") - borne) / site)
+
+
+def _sum(terms: list[Expression]) -> Expression:
+    """The sum; one term alone as it is, since a sum of one rounds differently."""
+    return terms[0] if len(terms) == 1 else symengine.Add(*terms)
+
+
+def _energies(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
+    """Nodes and free energies of every member that stores energy; no node where there is no medium."""
+    found: dict[str, list[tuple[Node | None, Expression]]] = {}
+    inside = [node for slab in build.slabs.values() for node in slab.inner]
+    for node in (*build.nodes.values(), *inside):
+        for member, F in node.energies.items():
+            if F != 0:
+                found.setdefault(member, []).append((node, F))
+    if build.interface.temperature is None and build.psi != 0:
+        found["interface"] = [(None, build.psi)]
+    return found
+
+
+def _suffix(build: Build, member: str) -> str:
+    names = [body.name for body in build.scene.bodies]
+    return str(names.index(member) + 1) if member in names else "c"
+
+
+def _fluxes(build: Build) -> None:
+    fluxes = [_flux(build, k, body) for k, body in enumerate(build.scene.bodies, start=1)]
+    known = [flux for flux in fluxes if flux is not None]
+    if all(flux == 0 for flux in known):
+        return
+    for k, body, flux in zip((1, 2), build.scene.bodies, fluxes, strict=True):
+        if flux is not None:
+            text = f"heat flux from the interface into {body.name}"
+            build.areal(Quantity(f"q_{k}", "W/m^2", text, tag="e:qc_k1"), flux)
+    if len(known) == 2:
+        q_1, q_2 = symengine.symbols("q_1 q_2")
+        build.name(Quantity("q_m", "W/m^2", "mean heat flux into the bodies", tag="e:qm_def"), (q_1 + q_2) / 2)
+        text = "transfer heat flux from body 2 to body 1"
+        build.name(Quantity("q_t", "W/m^2", text, tag="e:qt_def"), (q_1 - q_2) / 2)
+
+
+def _flux(build: Build, k: int, body: Body) -> Expression | None:
+    """Heat into a body from the interface: stated by its laws, or recovered from a balance where it has none.
+
+    Two bodies that share a prescribed temperature leave open which of them the heat goes into.
+    """
+    node = build.node_of[body.name]
+    sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
+    stated = symengine.Add(*build.from_interface[body.name].values())
+    flux = stated if sharing else by_channel(build, k, body)
+    if sharing and node.prescribed:
+        if sharing != ["interface"]:
+            return None
+        flux = flux + sum(build.into_interface) - balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
+    elif body.name in node.energies:
+        rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
+        recovered = rate - symengine.Add(*build.into_body[body.name])
+        flux = recovered if sharing else flux
+        if not node.prescribed:
+            _book_heat(build, k, body, recovered)
+            if sharing and not build.slabs:
+                by_source(build, k, body, flux)
+            return flux
+    _book_heat(build, k, body, flux)
+    return flux
+
+
+def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
+    if flux != 0:
+        account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
+        build.ledger.append(Account(account, flux, "heat"))
+
+
+def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
+    """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
+    if not build.transitions:
+        return {}
+    _jump_accounts(build)
+    centre = build.node_of.get("interface")
+    if centre is None or not centre.takes_heat:
+        _refuse_local(build)
+    supports = {axis: _merged(far.takers(build)) for axis, far in build.motion.far_fields.items()}
+    return {INTERFACE: _merged(takers(build)), **supports}
+
+
+def _refuse_local(build: Build) -> None:
+    """Only an interface that stores heat can pay for what breaks."""
+    for law in build.interface.limits:
+        if law.release == "local":
+            raise InputError(
+                "in a local release the interface pays, but here it has no heat of its own. Give it a temperature and "
+                "a capacity, or use `release: joint`, in which the bodies do.",
+                law.place,
+            )
+
+
+def _jump_accounts(build: Build) -> None:
+    """Accounts that only jumps change."""
+    nothing = symengine.Integer(0)
+    rows = [
+        ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
+        ("entropy_events", "J/(m^2 K)", "entropy produced by jumps", "entropy production"),
+    ]
+    if any(node.prescribed for node in build.nodes.values()):
+        rows += [
+            ("H_events", "J/m^2", "heat of jumps supplied to prescribed temperatures", "energy supply"),
+            ("H_events_entropy", "J/(m^2 K)", "entropy of that heat", "entropy supply"),
+        ]
+    for name, unit, text, kind in rows:
+        build.ledger.append(Account(Quantity(name, unit, text), nothing, kind, "events"))
+
+
+def _merged(shares: list[tuple[Node, Expression]]) -> tuple[Sink, ...]:
+    """One sink a node; shares of the same node add up."""
+    total: dict[str, Expression] = {}
+    nodes = {node.name: node for node, _ in shares}
+    for node, share in shares:
+        total[node.name] = total.get(node.name, 0) + share
+    return tuple(
+        Sink(
+            name,
+            nodes[name].T,
+            balances.internal_energy(nodes[name].free_energy, nodes[name].T),
+            share,
+            nodes[name].prescribed,
+        )
+        for name, share in total.items()
+    )
+
+
+def _has_medium(build: Build) -> bool:
+    """Whether something between the bodies conducts: a medium that the case names, or a law of a film or a gap."""
+    channels = {channel for law in build.scene.heat for channel in law.channels()}
+    return build.interface.medium is not None or bool(channels & {"film", "gas", "gap"})
+
+
+def regime(build: Build) -> str:
+    """The thermal regime in words."""
+    nodes = [build.node_of[body.name] for body in build.scene.bodies]
+    centre = build.node_of.get("interface")
+    if centre is not None and all(node.prescribed for node in (*nodes, centre)):
+        loads = [build.loads[node.name] for node in (*nodes, centre)]
+        starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
+        still = not any(build.slope_of(node.name) != 0 or build.loads[node.name].jumps() for node in (*nodes, centre))
+        return "isothermal" if still and len(starts) == 1 else "prescribed temperatures"
+    if centre is None:
+        if nodes[0] is nodes[1]:
+            return "perfect contact without a medium"
+        return "medium without temperature" if _has_medium(build) else "no medium"
+    if nodes[0] is nodes[1] is centre:
+        return "perfect contact"
+    if centre in nodes:
+        return "one-sided perfect contact"
+    return "separate interface temperature"

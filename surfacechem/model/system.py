@@ -1,0 +1,380 @@
+"""The assembled scene: states, equations, ledgers, margins and named quantities as one graph of expressions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pickle import PicklingError
+from typing import Any
+
+import numpy as np
+import symengine
+from numpy.typing import NDArray
+
+from surfacechem.contracts.terms import Load, Spec
+from surfacechem.expressions import Expression
+from surfacechem.model.automaton import Equilibrium, Mode, Sink, Transition
+from surfacechem.model.conductors import Conductor, Profile
+from surfacechem.model.holding import Holding
+from surfacechem.model.refit import Fit
+from surfacechem.quantities import Quantity
+from surfacechem.scene import Engine
+
+Array = NDArray[np.float64]
+
+STABLE = "stable "
+"""How the names of margins begin that tell a stable state from an unstable one."""
+
+START = "run.t_start"
+"""Path of the time at which a stretch between events starts; within it time counts from there."""
+
+TOLERANCE = "run.rtol"
+"""Path of the relative tolerance of a run, where what follows each other without end has to end."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A run-time number of the compiled scene: a field of a law, or a local field of a history."""
+
+    symbol: Any
+    path: str
+    spec: Spec
+    value: float
+    load: Load | None = None
+    """The history whose pieces change the value, if any."""
+    field: str = ""
+    internal: bool = False
+    """Whether it belongs to the solution method, so that no run may change it."""
+
+    @property
+    def changeable(self) -> bool:
+        """Whether a run may give it another value."""
+        return not self.internal and self.load is None
+
+    def at(self, start: float) -> float:
+        """Value on the piece of time that begins at ``start`` [s]."""
+        return self.load.piece(start)[self.field] if self.load else self.value
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a case gives at the start for a state that stands for it: as a rule one that is its logarithm."""
+
+    quantity: Quantity
+    value: float
+    state: Callable[[Mapping[str, float]], float] | None = None
+    """The state from all values by path, where it is not the logarithm."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A variable that the run solves for: evolved by a balance, or algebraic where that has no capacity."""
+
+    quantity: Quantity
+    symbol: Any
+    dot: Any
+    initial: float
+    scale: float
+    algebraic: bool
+    start: str = ""
+    """Whose initial value it takes, where not its own."""
+    finest: float | None = None
+    """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
+    given: Given | None = None
+    """What is given in its place, where it stands for that."""
+
+    @property
+    def name(self) -> str:
+        """Name in the dataset."""
+        return self.quantity.name
+
+    @property
+    def path(self) -> str:
+        """Path of its initial value, or of what is given in its place."""
+        return f"initial.{self.given.quantity.name if self.given else self.start or self.name}"
+
+    @property
+    def at_start(self) -> tuple[Quantity, float]:
+        """What is given at the start, and its value."""
+        return (self.given.quantity, self.given.value) if self.given else (self.quantity, self.initial)
+
+    def from_given(self, values: Mapping[str, float]) -> float:
+        """Its initial value, from what is given by path."""
+        if self.given is None:
+            return values[self.path]
+        return self.given.state(values) if self.given.state else math.log(values[self.path])
+
+
+@dataclass(frozen=True)
+class Named:
+    """A named quantity; its expression may use the names of earlier ones."""
+
+    quantity: Quantity
+    expression: Expression
+    output: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name in the dataset and in the printed source."""
+        return self.quantity.name
+
+
+@dataclass(frozen=True)
+class Account:
+    """A line of the ledger, integrated beside the state.
+
+    ``kind`` is 'energy supply', 'entropy supply', 'entropy production', 'dissipation', 'heat', 'bonds' or 'statistics';
+    ``law`` names what it belongs to.
+    """
+
+    quantity: Quantity
+    rate: Expression
+    kind: str
+    law: str = ""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Something that must stay positive. Where it crosses zero the run ends, or restarts if it is only a kink."""
+
+    name: str
+    expression: Expression
+    reason: str
+    terminal: bool = True
+    remedy: str = ""
+    """What to change where it is closed from the start."""
+    peak: bool = False
+    """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
+    domain: bool = False
+    """Whether a law ends there, so that no equilibrium lies beyond."""
+    below: tuple[Expression, str] | None = None
+    """An expression, and the reason where it is below zero as the margin closes."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a law is not an extrapolation: a variable between two values."""
+
+    variable: str
+    low: float
+    high: float
+    law: str
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Rates forward and backward that are stated apart, held against equilibrium along a run.
+
+    ``departure`` names the quantity ln(k_f/k_r) - ln K(g, T), ``law`` the account of the entropy they produce together.
+    """
+
+    departure: str
+    title: str
+    law: str
+
+
+@dataclass(frozen=True)
+class Pace:
+    """A time in which something moves by itself, and what to do where it is too short for a run."""
+
+    text: str
+    time: Expression
+    remedy: str
+
+
+@dataclass(frozen=True)
+class Outside:
+    """An engine with the expressions of what it reads."""
+
+    engine: Engine
+    reads: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a variable is in this scene: evolved, algebraic, prescribed, constant, derived or merged."""
+
+    variable: str
+    role: str
+    by: str
+
+
+@dataclass(frozen=True)
+class Capped:
+    """The exponents of a law, in words, above whose cap its exponentials go on along their tangents."""
+
+    title: str
+    exponents: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Caution:
+    """What a reader has to know where an expression falls below zero, at the start or along a run."""
+
+    expression: Expression
+    text: str
+
+
+@dataclass(frozen=True)
+class System:
+    """States, equations and everything that is read off them.
+
+    The equations are G(t, y, dy/dt; p) = 0, linear in dy/dt; ``rows`` names them. ``energy`` and ``entropy`` are the
+    totals whose changes the ledger must explain.
+    """
+
+    t: Any
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...]
+    named: tuple[Named, ...]
+    rows: Mapping[str, Expression]
+    ledger: tuple[Account, ...]
+    margins: tuple[Margin, ...]
+    roles: tuple[Role, ...]
+    ranges: tuple[Range, ...]
+    capped: tuple[Capped, ...]
+    regime: str
+    breakpoints: tuple[float, ...]
+    warnings: tuple[str, ...] = ()
+    cycles: tuple[str, ...] = ()
+    """Frequencies, by path, of loads under which the state may rest: their work still has to be followed."""
+    modes: tuple[Mode, ...] = ()
+    transitions: tuple[Transition, ...] = ()
+    equilibria: tuple[Equilibrium, ...] = ()
+    sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
+    """Who takes the heat of a jump, by what makes it: the interface, or the support of an axis."""
+    follows: Mapping[str, Expression] = field(default_factory=dict)
+    """New values of states that follow the normal gap where it jumps, by name."""
+    given: Mapping[str, Expression] = field(default_factory=dict)
+    """Tractions of the far field times their gaps, and what impacts rub off a drive [J/m^2], by account of the work."""
+    pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
+    """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
+    work."""
+    pairs: tuple[Pair, ...] = ()
+    paces: tuple[Pace, ...] = ()
+    cautions: tuple[Caution, ...] = ()
+    profiles: tuple[Profile, ...] = ()
+    """Temperatures across bodies; their states stand behind all others, profile after profile."""
+    conductors: tuple[Conductor, ...] = ()
+    fit: Fit | None = None
+    """How the properties of the medium's fluid follow a run; None where nothing reads any."""
+    outside: Outside | None = None
+    holding: Holding | None = None
+    """How the bonding state is held at its bounds, where a law could carry it there."""
+    constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
+    """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
+    unless they are assembled with another value."""
+    origin: partial[System] | None = None
+    """What makes it anew, to the last bit: a pickle keeps this and no expressions."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Expressions are not pickled but made again, in the same order."""
+        if self.origin is None:
+            raise PicklingError("a system that was not assembled from a scene cannot be pickled.")
+        return self.origin.func, self.origin.args
+
+    @cached_property
+    def definitions(self) -> dict[Any, Expression]:
+        """Every name with its expression in t, states, derivatives and parameters only."""
+        result: dict[Any, Expression] = {}
+        for item in self.named:
+            result[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(result)
+        return result
+
+    def expand(self, expression: Expression) -> Expression:
+        """The expression in t, states, derivatives and parameters only."""
+        return symengine.sympify(expression).subs(self.definitions)
+
+    @cached_property
+    def changeable(self) -> dict[str, str]:
+        """Units of all that a run may change, by path: parameters and initial values."""
+        given = set(self.outside.engine.gives) if self.outside else set()
+        units = {p.path: p.spec.unit for p in self.parameters if p.changeable and p.path not in given}
+        return units | {state.path: state.at_start[0].unit for state in self.states}
+
+    @property
+    def inputs(self) -> list[Any]:
+        """Arguments of every compiled function: t, states, derivatives, parameters."""
+        states = [state.symbol for state in self.states] + [state.dot for state in self.states]
+        return [self.t, *states, *(parameter.symbol for parameter in self.parameters)]
+
+    @cached_property
+    def inside(self) -> frozenset[str]:
+        """Names of the states inside bodies, which the profiles show together."""
+        return frozenset(name for profile in self.profiles for name in profile.states)
+
+    @property
+    def chains(self) -> list[tuple[int, int, int]]:
+        """First state, end and anchor of each profile; the anchor is -1 where the contact's temperature is given."""
+        names = [state.name for state in self.states]
+        return [
+            (names.index(p.states[0]), names.index(p.states[-1]) + 1, names.index(p.surface) if p.anchored else -1)
+            for p in self.profiles
+            if p.states
+        ]
+
+    @cached_property
+    def outputs(self) -> tuple[Named, ...]:
+        """The named quantities that go into the dataset."""
+        return tuple(item for item in self.named if item.output)
+
+    def reason(self, margin: Margin, inputs: Array) -> str:
+        """Why a margin closed, at the arguments of compiled functions there."""
+        if margin.below is None:
+            return margin.reason
+        sign, other = margin.below
+        value = symengine.Lambdify(self.inputs, [self.expand(sign)], backend="lambda")(inputs)[0]
+        return other if value < 0 else margin.reason
+
+    def residual(self) -> list[Expression]:
+        """The equations, expanded, in the order of the rows."""
+        return [self.expand(row) for row in self.rows.values()]
+
+    def local(self, expressions: Sequence[Expression]) -> list[Expression]:
+        """Expanded expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
+        start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
+        origins = [self.parameters[j].symbol for j in self.origins]
+        # What counts from an origin does so in either time; shifted both ways it would be rounded to digits of t.
+        lapses = {self.t - origin: symengine.Symbol(f"since {k}") for k, origin in enumerate(origins)}
+        shift = {symbol: symbol + start for symbol in (self.t, *origins)}
+        back = {dummy: lapse for lapse, dummy in lapses.items()}
+        return [symengine.sympify(self.expand(item)).subs(lapses).subs(shift).subs(back) for item in expressions]
+
+    @cached_property
+    def origins(self) -> list[int]:
+        """Columns of the times from which pieces of histories count; a stretch gives them in its own time."""
+        return [j for j, p in enumerate(self.parameters) if p.load is not None and p.field == "origin"]
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which states are velocities without inertia, shape (states,)."""
+        return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
+
+    def moving_margins(self) -> tuple[Margin, ...]:
+        """The margins that change in the course of a run; when time alone leads to a peak is known before."""
+        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {mode.symbol for mode in self.modes}
+        moving = {True: evolved, False: evolved | {self.t}}
+        return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving[m.peak])
+
+    @property
+    def in_stretches(self) -> bool:
+        """Whether a run is made of stretches, each in a time of its own."""
+        return any(parameter.path == START for parameter in self.parameters)
+
+    @property
+    def jump_energy(self) -> Expression:
+        """What a jump conserves: the total energy less the work that far-field tractions do in it [J/m^2].
+
+        Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
+        """
+        moving = {state.symbol for state in self.states if state.quantity.unit != "K"}
+        moving |= {self.t, *(mode.symbol for mode in self.modes)}
+        members = symengine.sympify(self.find("E_total").expression).free_symbols
+        moved = [member for member in members if self.expand(member).free_symbols & moving]
+        return symengine.Add(*moved, *(-work for work in self.given.values()))
+
+    def find(self, name: str) -> Named:
+        """The named quantity of that name."""
+        return next(item for item in self.named if item.name == name)

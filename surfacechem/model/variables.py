@@ -1,0 +1,206 @@
+"""Symbols of a scene: parameters of laws, variables and their roles. A law gets what its formula asks for by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import symengine
+
+from surfacechem.contracts.terms import (
+    Factor,
+    Law,
+    Load,
+    Spec,
+    UnderPressure,
+    Varying,
+    optional,
+    reads,
+    resolved_unit,
+)
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.expressions import Expression, product
+from surfacechem.model.system import Parameter, Role
+from surfacechem.quantities import VARIABLES
+
+L = TypeVar("L", bound=Law)
+
+REMEDIES = {
+    "g_n": "Prescribe `g_n` under `loading`, or mount the bodies: `mechanics: {normal: {k: ...}}`.",
+    "g_t": "Prescribe `g_t` under `loading`, or mount the bodies: `mechanics: {tangential: {k: ...}}`.",
+    "v": "Prescribe `v` under `loading`, or let `mechanics` give it.",
+    "v_2": "Prescribe `v` and `v_2` under `loading`, or let `mechanics` give both.",
+    "w_n": "Prescribe `w_n` under `loading` or move it in the programme: 0 m where the far field does not move.",
+    "w_t": "Prescribe `w_t` under `loading` or move it in the programme: 0 m where the far field does not move.",
+    "w_t2": "Prescribe `w_t2` under `loading`, beside `w_t`: 0 m where the far field does not move across.",
+    "direction": "Prescribe `v` under `loading`, or mount the bodies, `mechanics: {tangential: ...}`, and give the "
+    "interface what resists sliding: `friction`, or a potential of the tangential gap.",
+    "direction_2": "Prescribe `v` and `v_2` under `loading`, or mount the bodies: `mechanics: {tangential: ...}`.",
+    "p": "Prescribe `p` under `loading`, or give the interface a potential that reads the normal gap.",
+    "p_contact": "Give the interface a potential that reads the normal gap, or prescribe `p`.",
+    "t_n": "Prescribe `t_n` under `loading`, or give the interface a potential that reads the normal gap.",
+    "f": "Prescribe `f` under `loading`, or a load on the bonds: `t_n`, or a potential that reads the normal gap.",
+    "phi": "Give `phi` under `initial` and a law under `bonding`, or prescribe `phi` under `loading`.",
+    "T_0": "Give the reference temperature `T_0` at the top of the case.",
+    "T_c": "Give `interface.temperature`, or both bodies a temperature.",
+    "N_c": "Give `interface.sites`.",
+    "n_c": "Give `interface.sites`.",
+    "n_1": "Give `interface.sites`.",
+    "n_2": "Give `interface.sites`.",
+    "mu": "Give `interface.sites` and a potential that reads the bonding state.",
+}
+
+
+def unit_of(name: str) -> str:
+    """Unit of a variable; what the table does not name is a temperature node or a coverage."""
+    if name in VARIABLES:
+        return VARIABLES[name].unit
+    return "K" if name.startswith("T") else "1"
+
+
+class Parameters:
+    """The run-time numbers, each with a short name that is unique in the scene."""
+
+    def __init__(self, reserved: Iterable[str] = ()) -> None:
+        self.items: list[Parameter] = []
+        self.constants: dict[str, tuple[Spec, float]] = {}
+        """Specification and value of parameters of laws that are at their defaults, hence numbers in formulas."""
+        self._taken = {*VARIABLES, *reserved}
+
+    def add(
+        self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
+    ) -> Expression:
+        """A new parameter of a law as a symbol; its name gives way to names that are taken."""
+        return self._append(Parameter(symengine.Symbol(self._unique(name, path)), path, spec, value, load, field))
+
+    def constant(self, name: str, path: str, spec: Spec, value: float, internal: bool) -> Expression:
+        """A scene-level number under exactly this name."""
+        spec.check(path, value)
+        self._taken.add(name)
+        return self._append(Parameter(symengine.Symbol(name), path, spec, value, internal=internal))
+
+    def _append(self, parameter: Parameter) -> Expression:
+        taken = {item.path for item in self.items}
+        numbered = (f"{parameter.path}[{i}]" for i in range(2, 1000))
+        path = next(path for path in (parameter.path, *numbered) if path not in taken)
+        self.items.append(replace(parameter, path=path))
+        return parameter.symbol
+
+    def _unique(self, name: str, path: str) -> str:
+        owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
+        candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
+        numbered = (f"{name}_{i}" for i in range(2, 1000))
+        free = next(c for c in (*candidates, *numbered) if c not in self._taken)
+        self._taken.add(free)
+        return free
+
+
+class Variables:
+    """What formulas may read. A definition is made when it is first read, so what nobody reads is not there."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.roles: list[Role] = []
+        self.varying: list[tuple[Law, str, Spec, Expression]] = []
+        """Parameters whose factors may carry them out of their range: law, name, range and expression."""
+        self._makers: dict[str, Callable[[], Expression]] = {}
+        self._symbols: dict[str, Expression] = {}
+
+    def define(self, name: str, make: Callable[[], Expression], role: str, by: str) -> None:
+        """Give a name its role and the way to make its expression; a second role is an error."""
+        taken = next((r for r in self.roles if r.variable == name), None)
+        if taken is not None:
+            raise InputError(f"{name} has two roles: {taken.role} ({taken.by}) and {role} ({by}). Remove one of them.")
+        self._makers[name] = make
+        self.roles.append(Role(name, role, by))
+
+    def has(self, name: str) -> bool:
+        """Whether the name has a role."""
+        return name in self._makers
+
+    def was_read(self, name: str) -> bool:
+        """Whether anything asked for the name so far."""
+        return name in self._symbols
+
+    def get(self, name: str, reader: str | Law) -> Expression:
+        """The expression of a name for a law, or something else in words, that reads it."""
+        if name == "p" and isinstance(reader, UnderPressure) and reader.pressure == "contact":
+            name = "p_contact"
+        if name not in self._symbols:
+            if name not in self._makers:
+                raise self._missing(name, reader)
+            self._symbols[name] = self._makers[name]()
+        return self._symbols[name]
+
+    def _missing(self, name: str, reader: str | Law) -> InputError:
+        who = f"the law {reader.name()}" if isinstance(reader, Law) else reader
+        remedy = REMEDIES.get(name, suggestion(name, self._makers).strip())
+        message = f"{who} reads {self._described(name)}, but nothing evolves or prescribes it. {remedy}"
+        return InputError(message, reader.place if isinstance(reader, Law) else None)
+
+    def _described(self, name: str) -> str:
+        words = VARIABLES[name].long_name.partition(":")[0] if name in VARIABLES else "variable"
+        if words.startswith("one while"):
+            return f"the variable {name}"
+        return f"the {words}" if name in words.split() else f"the {words} {name}"
+
+    def call(
+        self, law: Law, formula: Callable[..., Expression], extra: Mapping[str, Expression] | None = None
+    ) -> Expression:
+        """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables.
+
+        An argument with a default is left out where the scene has no variable of that name.
+        """
+        own = extra or {}
+        names = [name for name in reads(formula) if name in own or self.has(name) or name not in optional(formula)]
+        return formula(**{name: own[name] if name in own else self.get(name, law) for name in names})
+
+    def bind(self, law: L, path: str, suffix: str = "", unit: str = "") -> L:
+        """The law with every numeric parameter replaced by its symbol, times its factors where it varies.
+
+        ``path`` is where a law that was built in Python would stand in a case file, ``unit`` what "[x]" stands for.
+        """
+        law = law if law.place else replace(law, place=Place(path=path))
+        values: dict[str, Expression] = {}
+        for name, spec in law.specs():
+            values[name] = self._parameter(law, name, law.refine(name, spec).resolved(unit), suffix)
+        if isinstance(law, Load):
+            for name, local_unit in law.local.items():
+                spec = Spec(resolved_unit(local_unit, unit), f"{name} of the present piece")
+                values[name] = self.parameters.add(name, f"{law.path}.{name}", spec, 0.0, law, name)
+        return law.bind(values)
+
+    def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
+        """The symbol of a parameter as the formula sees it: where the surface stretches, not always what is given."""
+        symbol = self._symbol(law, name, spec, suffix)
+        if spec.stretch and symbol is not None and self.has("J_c"):
+            return symbol * self.get("J_c", law) ** spec.stretch
+        return symbol
+
+    def _symbol(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
+        value = getattr(law, name)
+        path = f"{law.path}.{name}"
+        if isinstance(value, Varying):
+            symbol = self.parameters.add(name + suffix, path, spec, value.value)
+            bound = [self.bind(item, f"{path}.{item.name()}", unit=unit_of(item.of)) for item in value.factors]
+            symbol = product(symbol, *map(self._factor, bound))
+            low = max(spec.above, spec.at_least)
+            bounded = low > 0 or math.isfinite(spec.at_most)
+            if bounded or not all(factor.keeps_sign for factor in value.factors):
+                self.varying.append((law, name, spec, symbol))
+            return symbol
+        if value is None:
+            return None
+        if law.is_default(name):
+            self.parameters.constants[path] = (spec, float(value))
+            return int(value) if float(value).is_integer() else value
+        return self.parameters.add(name + suffix, path, spec, value)
+
+    def _factor(self, factor: Factor) -> Expression:
+        if "T_0" in reads(factor.factor) and unit_of(factor.of) != "K":
+            message = f"the factor {factor.name()} is one of temperature; of: {factor.of} is none. Use `linear`."
+            raise InputError(message, factor.place)
+        sources = {argument: factor.of if argument == "x" else argument for argument in reads(factor.factor)}
+        return factor.factor(**{argument: self.get(source, factor) for argument, source in sources.items()})

@@ -1,0 +1,90 @@
+"""What happened on the way: events as thin lines with their names, modes and stages as bands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+
+from surfacechem.plots.panels import MODE
+
+FEW = 8
+"""Up to this many events, or spans of a mode, have their names written to them."""
+
+MANY = 60
+"""Above this many lines nothing could be told from them."""
+
+WIDE = 0.09
+"""Part of the run that a stage must last for its name to fit."""
+
+GREY = "#555555"
+
+
+def events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """Thin vertical lines at the events; ends of stages show as bands."""
+    if "event_time" not in dataset:
+        return
+    times = dataset["event_time"].values
+    names = dataset["event_name"].values.astype(str) if "event_name" in dataset else np.full(times.shape, "")
+    moments = dict(zip(times.tolist(), names.tolist(), strict=True))
+    for moment in moments if len(moments) <= MANY else ():
+        for ax in axes:
+            ax.axvline(moment, color="black", linewidth=0.6, linestyle=":")
+    told = {t: name for t, name in moments.items() if not name.startswith("end of ")}
+    if len(told) <= FEW:
+        for moment, name in told.items():
+            _write(axes[0], moment, name, rotation=90, ha="right", va="top", y=0.97)
+
+
+def bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """The stages of a programme; else spans of time in which a mode is not what it was at the start."""
+    modes = [name for name in map(str, dataset.data_vars) if _long_name(dataset, name).startswith(MODE)]
+    if dataset.sizes["time"] < 2:
+        return
+    if "stage" in modes:
+        _stages(axes, dataset)
+        return
+    for name in modes:
+        first, *_ = spans = list(_spans(dataset, name))
+        _shade(axes, [span for span in spans if span[2] != first[2]])
+
+
+def _stages(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    spans, length = list(_spans(dataset, "stage")), float(np.ptp(dataset["time"].values))
+    words = dict(re.findall(r"(-?\d+): ([^,)]+)", _long_name(dataset, "stage")))
+    _shade(axes, [span for span in spans if span[2] % 2])
+    for start, end, value in spans:
+        if end - start > WIDE * length:
+            _write(axes[0], (start + end) / 2, words.get(f"{value:.0f}", ""), ha="center", va="bottom", y=0.02)
+
+
+def _shade(axes: Sequence[Axes], spans: Sequence[tuple[float, float, float]]) -> None:
+    for start, end, _ in spans if len(spans) <= MANY else ():
+        for ax in axes:
+            ax.axvspan(start, end, color="black", alpha=0.05, linewidth=0)
+
+
+def _long_name(dataset: xarray.Dataset, name: str) -> str:
+    return str(dataset[name].attrs.get("long_name", ""))
+
+
+def _spans(dataset: xarray.Dataset, name: str) -> Iterator[tuple[float, float, float]]:
+    """Start, end and value of a mode between events; what lies between two outputs is too short to be seen."""
+    times, values = dataset["time"].values, dataset[name].values
+    known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
+    changes = [j for j in range(1, len(values)) if values[j] != values[j - 1]]
+    edges = [float(times[0])]
+    for j in changes:
+        inside = known[(known >= times[j - 1]) & (known <= times[j])]
+        edges.append(float(inside[-1]) if len(inside) else float(times[j]))
+    ends = [*edges[1:], float(times[-1])]
+    return zip(edges, ends, (float(values[j]) for j in [0, *changes]), strict=True)
+
+
+def _write(ax: Axes, x: float, text: str, y: float, **how: object) -> None:
+    """A small word at a time, at a height relative to the panel."""
+    if text:
+        ax.text(x, y, text, transform=ax.get_xaxis_transform(), fontsize=7, color=GREY, clip_on=True, **how)  # type: ignore[arg-type]

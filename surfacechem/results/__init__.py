@@ -1,0 +1,1 @@
+"""What a run hands over: dataset, events, balances and the error of each answer."""

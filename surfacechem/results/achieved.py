@@ -1,0 +1,237 @@
+"""How far a run is from the truth: against an exact solution, a second run at another tolerance, or its own balances.
+
+>>> import surfacechem
+>>> case = surfacechem.load("exothermic")
+>>> case.run().accuracy.source, case.run(error="balances").accuracy.source
+('exact solution exothermic-bonding', 'balances only: what they miss is not seen')
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.results.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.results.audit import audit
+from surfacechem.results.event_table import SIDE, event_times
+from surfacechem.results.profiles import profile_values
+from surfacechem.results.solution import EARLIER, Accuracy
+from surfacechem.scene import Scene
+from surfacechem.solve.run import Run, Trajectory
+
+Array = NDArray[np.float64]
+
+WAYS = ("auto", "estimate", "balances")
+"""How a run tells its error: against the exact solution if there is one, else by a second run; always by a second run;
+from the balances, which costs nothing."""
+
+EVENTS = "event times"
+"""What stands for the times of events among the compared variables."""
+
+
+def check_way(way: str) -> None:
+    """InputError for what is none of the WAYS."""
+    if way not in WAYS:
+        raise InputError(f"no source '{way}' of an error.{suggestion(way, WAYS)}", Place(path="--error"))
+
+
+def accuracy(
+    trajectory: Trajectory,
+    scene: Scene,
+    exact: tuple[str, Mapping[str, float]] | None,
+    way: str,
+    cells: Callable[[], CellErrors] = CellErrors,
+    estimate: Accuracy | None = None,
+) -> Accuracy:
+    """The error of a run in one of the WAYS; ``exact`` names the exact solution of its case, with its parameters.
+
+    ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
+    ``estimate`` is that of a second run, where there was one.
+    """
+    if way == "balances":
+        return from_balances(trajectory, "balances only: what they miss is not seen")
+    unused = ""
+    if exact is not None and way != "estimate" and len(trajectory.result.times) < 2:
+        unused = f"; with one output nothing is compared with the exact solution {exact[0]}"
+    elif exact is not None and way != "estimate":
+        try:
+            return replace(against_exact(trajectory, scene, *exact), asked=estimate.asked if estimate else None)
+        except InputError as error:
+            unused = f"; the exact solution {exact[0]} is not of this scene: {error.message}"
+    estimate = with_cells(estimate, cells()) if estimate else against_tighter(trajectory, cells())
+    return replace(estimate, source=f"{estimate.source}{unused}")
+
+
+def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapping[str, float]) -> Accuracy:
+    """Largest errors at the output times, and those of the times of events, which a second run tells.
+
+    InputError where the exact solution is another scene's.
+    """
+    from surfacechem.results.matching import exact_values
+
+    exact = exact_values(name, options, scene, trajectory)
+    columns = computed(trajectory)
+    errors = {key: relative_error(columns[key], values, floor(trajectory, key)) for key, values in exact.items()}
+    if event_times(trajectory):
+        errors |= _event_errors(trajectory)
+    return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
+
+
+def _event_errors(trajectory: Trajectory) -> dict[str, float]:
+    """Error of the times of events from a second run; nothing where that has others."""
+    second = trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))
+    found, expected = event_times(trajectory), event_times(second)
+    if difference(found, expected):
+        return {}
+    return {EVENTS: event_error(found, expected, trajectory.run.times[-1])}
+
+
+def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
+    """Errors of states and of the times of events, estimated from a second run. Those of the cells across bodies are
+    added.
+    """
+    other = second_tolerance(trajectory.run.rtol)
+    second = trajectory.model.resolve(trajectory, other)
+    if trajectory.status == "failed" and len(trajectory.result.times) < 2:
+        return unknown(f"the run failed: {trajectory.reason}")
+    if second.status == "failed" or len(second.result.times) < len(trajectory.result.times):
+        fate = EARLIER if len(second.result.times) <= len(trajectory.result.times) else "failed later"
+        return unknown(f"a second run at rtol {other:.0e} {fate}: {second.reason}")
+    errors, note = apart(trajectory, second)
+    if not errors:
+        return unknown("the run ended before its second output")
+    if note:  # one of the two went another way
+        return unknown(f"a second run at rtol {other:.0e}, which had {note}")
+    found = Accuracy(stated(errors), second_run(second.run), errors)
+    return with_cells(found, cells) if cells else found
+
+
+def unknown(why: str) -> Accuracy:
+    """The error of a run of which nothing is known."""
+    return Accuracy(math.nan, f"unknown: {why}")
+
+
+def stated(errors: Mapping[str, float]) -> float:
+    """The error of a whole run: the largest, and never less than the last digit."""
+    return max(*errors.values(), ROUNDING)
+
+
+def second_run(run: Run, kind: str = "run") -> str:
+    """What an estimate is from, in words: what is briefer, and that no law tells of, may be missed by both runs."""
+    return f"estimate: a second {kind} at rtol {run.rtol:.0e} that sees what lasts 1/{run.samples:.0f} of it"
+
+
+def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:
+    """Largest differences of two runs in each state and in the times of events, and in which events they differ.
+
+    Of a run that ended before its second output only the events and the end are known.
+    """
+    found, expected = event_times(first), event_times(second)
+    note = difference(found, expected)
+    times = first.result.times[: len(second.result.times)]
+    errors: dict[str, float] = {}
+    if len(times) > 1:
+        shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
+        ours, theirs = states(first), states(second)
+        errors = {name: relative_error(ours[name][shared], theirs[name][shared], floor(first, name)) for name in ours}
+    if found and not note:
+        errors[EVENTS] = event_error(found, expected, first.run.times[-1])
+    return errors, note
+
+
+def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:
+    """At which times two runs with the same events have made the same jumps; those of the events are compared apart.
+
+    One of them may have made another at the end, where rounding decides whether it still happens.
+    """
+    both = min(len(first.jumps), len(second.jumps))
+    pairs = [(one.t, other.t) for one, other in zip(first.jumps[:both], second.jumps[:both], strict=True)]
+    pairs += [(jump.t, jump.t) for jump in (*first.jumps[both:], *second.jumps[both:])]
+    ways = np.array(pairs).reshape(-1, 2)
+    early, late = ways.min(axis=1) * (1 - SIDE), ways.max(axis=1) * (1 + SIDE)
+    return np.asarray(np.all((times[:, None] < early) | (times[:, None] > late), axis=1))
+
+
+def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
+    """An estimate with the errors of the cells across bodies added; not known where those are not."""
+    if not cells.variables:
+        return estimate
+    if not cells.converged:
+        return replace(estimate, error=math.nan, source=f"unknown: {UNKNOWN}", variables={})
+    errors = dict(estimate.variables)
+    for name, error in cells.variables.items():
+        errors[name] = errors.get(name, 0.0) + error
+    worst = max(estimate.error, stated(errors))
+    return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, {cells.source}")
+
+
+def from_balances(trajectory: Trajectory, source: str) -> Accuracy:
+    """What the residuals of the balances tell of the error."""
+    if len(trajectory.result.times) < 2:
+        return unknown("the run ended before its second output")
+    books = audit(trajectory)
+    errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
+    return Accuracy(stated(errors), source, errors)
+
+
+def states(trajectory: Trajectory) -> dict[str, Array]:
+    """States at the output times, by name; those inside bodies together."""
+    system = trajectory.model.system
+    lone = {s.name: j for j, s in enumerate(system.states) if s.name not in system.inside}
+    found = {name: trajectory.result.outputs[:, j] for name, j in lone.items()}
+    return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
+
+
+def computed(trajectory: Trajectory) -> dict[str, Array]:
+    """States and named quantities at the output times, by name."""
+    names = [item.name for item in trajectory.model.system.outputs]
+    return states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
+
+
+def floors(trajectory: Trajectory) -> Array:
+    """Sizes of the states below which their errors are relative to these, shape (states,): those at which the absolute
+    tolerance is as much as the relative one, and at most their scales.
+    """
+    run, problem = trajectory.run, trajectory.result.problem
+    scales = np.array([state.scale for state in trajectory.model.system.states])
+    return np.asarray(np.minimum(problem.atol / run.rtol, scales))
+
+
+def floor(trajectory: Trajectory, name: str) -> float:
+    """Size of a variable below which its errors are relative to this; for named quantities the largest value."""
+    system, known = trajectory.model.system, dict(zip(_names(trajectory), floors(trajectory), strict=True))
+    for profile in system.profiles:
+        if name == profile.name:
+            return float(max((known[state] for state in profile.states), default=0.0))
+    if name in known:
+        return float(known[name])
+    values = trajectory.outputs[:, [item.name for item in system.outputs].index(name)]
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _names(trajectory: Trajectory) -> list[str]:
+    return [state.name for state in trajectory.model.system.states]
+
+
+def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
+    """In which events two runs differ, in words; empty where they have the same.
+
+    >>> difference({"slip": [0.1]}, {"slip": [0.1, 0.2], "stop": [0.3]})
+    'other events: 2 slip instead of 1, 1 stop instead of 0'
+    """
+    counts = {name: (len(expected.get(name, ())), len(found.get(name, ()))) for name in {**expected, **found}}
+    parts = [f"{theirs} {name} instead of {ours}" for name, (theirs, ours) in counts.items() if theirs != ours]
+    return f"other events: {', '.join(parts)}" if parts else ""
+
+
+def event_error(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> float:
+    """Largest error of the times of events, each relative to its own time, or to FLOOR of the run if that is more."""
+    errors = [
+        np.abs(found[name] - times) / np.maximum(times, FLOOR * end) for name, times in expected.items() if len(times)
+    ]
+    return float(max((error.max() for error in errors), default=0.0))

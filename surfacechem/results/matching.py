@@ -1,0 +1,218 @@
+"""From a scene to its exact solution: parameters read off the scene, and a check that it solves the scene's equations.
+
+An exact solution that is named for a scene it does not belong to is refused: it must start where the scene starts and
+satisfy the assembled equations.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import references
+from surfacechem.errors import InputError
+from surfacechem.references._across import across
+from surfacechem.references._start import Start
+from surfacechem.references.base import Reference
+from surfacechem.results.event_table import SIDE
+from surfacechem.scene import Scene
+from surfacechem.solve.run import Trajectory
+
+Array = NDArray[np.float64]
+Solution = Callable[[Array], dict[str, Array]]
+"""Exact values under the names of the scene, at any times."""
+
+MISMATCH = 1e-6
+"""Largest part of an equation by which a solution may miss it; differences in time are good to 1e-7 or better."""
+
+SAME, NOTHING = 1e-9, 1e-12
+"""Relative difference of numbers that are the same, and the part of a scale that counts as nothing."""
+
+ROUNDING = 8 * float(np.finfo(float).eps)
+"""Last digits of a difference."""
+
+PROBES = 7
+"""Times at which the equations are tested; as many stretches between events, where there are so many."""
+
+STEEPER = 10.0
+"""A solution jumps where it changes by so many times as much as over an equal time before."""
+
+EDGE = 0.01
+"""Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
+
+BRIEF = 1e-7
+"""Part of the time so far below which a stretch is too short for differences in time."""
+
+
+def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
+    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
+    start = Start(run, scene)
+    reference = match(references.get(name), options, start)
+    solution = partial(_solution, reference, start)
+    exact = beside_events(solution, run)
+    if reference.continuous:
+        return across(reference, exact, scene, run)
+    _check_start(exact, run)
+    _check(solution, run)
+    return exact
+
+
+def beside_events(solution: Solution, run: Trajectory) -> dict[str, Array]:
+    """Exact values at the output times; where one of them is that of a jump, on the side on which the run has it.
+
+    That may be a jump of the run, or one of the solution at the very end, of which rounding decides whether a run
+    still has it.
+    """
+    times, jumps = run.result.times, np.array([jump.t for jump in run.jumps])
+    exact = {name: np.array(values) for name, values in solution(times).items()}
+    near = np.any(np.abs(times[:, None] - jumps) <= SIDE * times[:, None], axis=1)
+    for way in (-SIDE, SIDE) if near.any() else ():
+        _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+    if len(times) and not near[-1]:
+        last = np.arange(len(times)) == len(times) - 1
+        before = solution(times[-1] * (1 - SIDE * np.array([2.0, 4.0])))
+        jumped = {
+            name: other[:1]
+            for name, other in before.items()
+            if abs(exact[name][-1] - other[0]) > STEEPER * abs(other[0] - other[1]) + SAME * abs(other[0])
+        }
+        _take_nearer(exact, jumped, run, last)
+    return exact
+
+
+def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:
+    """Put other values at some outputs in the place of those that are farther from the run's."""
+    names = [*(state.name for state in run.model.system.states), *(item.name for item in run.model.system.outputs)]
+    ours = np.concatenate([run.result.outputs[at], run.outputs[at]], axis=1)
+    for name, other in others.items():
+        if name in names:
+            own = ours[:, names.index(name)]
+            nearer = np.abs(other - own) < np.abs(exact[name][at] - own)
+            exact[name][at] = np.where(nearer, other, exact[name][at])
+
+
+def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> Reference:
+    """The reference with the parameters of the scene, and with ``options`` for those that the scene does not tell.
+
+    InputError where an option is not what the scene has, as after a change of the scene alone.
+    """
+    values = dict(options)
+    for item in dataclasses.fields(kind):  # type: ignore[arg-type]
+        found, spec = start.find(item.name), item.metadata["spec"]
+        if found is None and item.name not in values and item.default is dataclasses.MISSING:
+            raise InputError(f"it needs {item.name} ({spec.text}), which the scene has not.")
+        if found is not None and not _same(values.setdefault(item.name, found), found, 0.0):
+            ours, theirs = (f"{value:.9g} {spec.unit}" for value in (found, values[item.name]))
+            raise InputError(f"it is given for {item.name} = {theirs}; the scene has {ours}.")
+    return kind(**values)
+
+
+def _same(a: float, b: float, scale: float) -> bool:
+    return abs(a - b) <= max(SAME * max(abs(a), abs(b)), NOTHING * scale)
+
+
+def _solution(reference: Reference, start: Start, t: Array) -> dict[str, Array]:
+    """Exact values under the names of the scene; from the heat also the temperature that it gives."""
+    exact = reference.solution(t)
+    if "T" not in exact and "heat" in exact:
+        with suppress(KeyError):
+            exact["T"] = start.heated(exact["heat"])
+    return renamed(exact, start.run)
+
+
+def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
+    """Exact values under the names of the scene; those it does not have are left out."""
+    system = run.model.system
+    known = [state.name for state in system.states] + [item.name for item in system.outputs]
+    stands_for = {
+        "T": [s.name for s in system.states if s.quantity.unit == "K" and s.name not in system.inside],
+        "R_c": [name for name in known if name.startswith("R_")],
+        "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
+    }
+    result = {}
+    for name, values in exact.items():
+        candidates = [name] if name in known else stands_for.get(name, [])
+        if len(candidates) == 1:
+            result[candidates[0]] = values
+    return result
+
+
+def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
+    """Refuse a solution that starts elsewhere."""
+    for j, state in enumerate(run.model.system.states):
+        if state.name in exact:
+            start, ours = exact[state.name][0], run.result.outputs[0, j]
+            if not _same(start, ours, state.scale):
+                raise InputError(f"it starts from {state.name} = {start:.9g}, the scene from {ours:.9g}.")
+
+
+def _check(solution: Solution, run: Trajectory) -> None:
+    """Refuse a solution that does not satisfy the scene's equations."""
+    if len(run.result.times) < 2:
+        return  # the run ended at its start
+    probes, since = _probes(run)
+    y, ydot, rounding = _along(solution, run, probes, since)
+    _check_given(solution(probes), run, run.model.evaluate(run.result, probes, y, ydot), probes)
+    problem, program = run.result.problem, run.model.program
+    segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
+    inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
+    misses = program.residual(inputs)
+    by_rate = program.derivatives(inputs)[1]
+    terms = by_rate * ydot[:, None, :]
+    known = (np.abs(by_rate) * rounding[:, None, :]).sum(axis=2)
+    misses -= np.clip(misses, -known, known)
+    sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
+    # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
+    largest = sizes.max(axis=0)
+    parts = np.abs(misses) / np.where(largest > 0, largest, 1.0)
+    if parts.max() > MISMATCH:
+        j, row = np.unravel_index(parts.argmax(), parts.shape)
+        equation = list(run.model.system.rows)[row]
+        raise InputError(f"at t = {probes[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
+
+
+def _check_given(exact: Mapping[str, Array], run: Trajectory, named: Array, t: Array) -> None:
+    """Refuse a solution under another load."""
+    given = {role.variable for role in run.model.system.roles if role.role == "prescribed"}
+    for j, item in enumerate(run.model.system.outputs):
+        if item.name in given and item.name in exact:
+            theirs, ours = exact[item.name], named[:, j]
+            largest = float(np.max(np.abs(ours)))
+            for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME * largest))[:1]:
+                raise InputError(f"at t = {t[k]:.3g} s its {item.name} is {theirs[k]:.6g}, the scene's {ours[k]:.6g}.")
+
+
+def _probes(run: Trajectory) -> tuple[Array, Array]:
+    """Times at which the equations are tested, inside the stretches between events, and how long each has lasted."""
+    edges = np.unique(np.append(run.result.problem.segments, run.result.times[-1]))
+    edges = edges[edges <= run.result.times[-1]]
+    if len(edges) < 2:
+        raise InputError("the run ended before anything could be compared.")
+    long = np.flatnonzero(np.diff(edges) > BRIEF * edges[1:])
+    spread = np.linspace(0, len(long) - 1, PROBES).astype(int)
+    chosen = long[np.union1d(spread, np.arange(min(PROBES, len(long))))]
+    parts = np.linspace(EDGE, 1 - EDGE, max(2, PROBES // len(chosen)))
+    starts, lengths = edges[chosen], np.diff(edges)[chosen]
+    since = np.multiply.outer(lengths, parts)
+    return np.ravel(starts[:, None] + since), np.ravel(since)
+
+
+def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple[Array, Array, Array]:
+    """Exact states, their rates by central differences, and how far these are rounding.
+
+    InputError where the solution leaves a state open.
+    """
+    step = 1e-4 * since
+    exact = solution(np.concatenate([t - 2 * step, t - step, t, t + step, t + 2 * step]))
+    names = [state.name for state in run.model.system.states]
+    missing = [name for name in names if name not in exact]
+    if missing:
+        raise InputError(f"it says nothing of {', '.join(missing)}.")
+    values = np.array([exact[name] for name in names]).reshape(len(names), 5, len(t))
+    slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
+    return values[:, 2].T, slope.T, (ROUNDING * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T

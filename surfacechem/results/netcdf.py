@@ -1,0 +1,189 @@
+"""Columns of data and netCDF files of them, with CF conventions: a file takes its place only when it is whole."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import stat
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from surfacechem.errors import InputError, OutputError, Place, SurfacechemError
+from surfacechem.results.waiting import wait_for
+
+R = TypeVar("R")
+
+CONVENTIONS = "CF-1.11"
+
+PATIENCE = 20.0
+"""Time [s] that reading a small file may take: in one that is damaged HDF5 may look for something without end."""
+
+SLOWEST = 1e7
+"""Bytes per second that a disk gives at the least."""
+
+SUFFIXES = (".nc", ".nc4", ".cdf")
+"""What names of netCDF files end with."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One variable of the dataset."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    values: Any
+    unit: str
+    long_name: str
+    tag: str = ""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes."""
+        result = {"units": cf_unit(self.unit), "long_name": self.long_name}
+        return result | ({"equation": self.tag} if self.tag else {})
+
+
+def cf_unit(unit: str) -> str:
+    """A unit of this package in the notation of the CF conventions.
+
+    >>> cf_unit("W/(m^2 K)"), cf_unit("1/m^2"), cf_unit("1"), cf_unit("m/s^2")
+    ('W m-2 K-1', 'm-2', '1', 'm s-2')
+    """
+    top, _, bottom = unit.partition("/")
+    factors = [re.sub(r"\^", "", factor) for factor in top.split() if factor != "1"]
+    for factor in bottom.strip("()").split():
+        base, _, power = factor.partition("^")
+        factors.append(f"{base}-{power or 1}")
+    return " ".join(factors) or "1"
+
+
+@cache
+def versions() -> str:
+    """Versions of what a result depends on."""
+    names = ("surfacechem", "numpy", "numba", "symengine")
+    return ", ".join(f"{name} {version(name)}" for name in names)
+
+
+def dataset_path(path: str | Path) -> Path:
+    """The path of a file that is to hold a dataset; InputError where its suffix is that of another format.
+
+    >>> dataset_path("run.nc").name
+    'run.nc'
+    """
+    target = Path(path)
+    if target.suffix and target.suffix.lower() not in SUFFIXES:
+        remedy = f"{', '.join(SUFFIXES)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
+        raise InputError(f"datasets are written as netCDF, not as '{target.suffix}': {remedy}", Place(str(path)))
+    return target
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """A temporary file beside the target that takes its place, and its permissions, when all went well.
+
+    A link is followed; what is no regular file, or protected, is left alone: InputError. OutputError where what is
+    written does not fit on the disk.
+    """
+    target = target.resolve()
+    place = Place(str(target))
+    if target.is_dir():
+        raise InputError("is a directory; give a file name to write to.", place)
+    if target.exists() and not target.is_file():
+        raise InputError("is no regular file; give a file name to write to.", place)
+    if target.exists() and not target.stat().st_mode & stat.S_IWUSR:
+        raise InputError("cannot be written: it is read-only.", place)
+    if not target.parent.is_dir():
+        raise InputError(f"cannot be written: there is no folder {target.parent}.", place)
+    replaced = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+    temporary = target.with_name(f".surfacechem-{secrets.token_hex(8)}{target.suffix}")
+    try:  # from here on, so that no signal finds a file that nobody removes
+        _create(temporary, 0o666 if replaced is None else replaced, place)
+        try:
+            yield temporary
+        except (OSError, RuntimeError) as error:  # RuntimeError is netCDF's
+            raise OutputError(f"cannot be written: {_reason(temporary, error)}.", place) from error
+        if replaced is not None:
+            temporary.chmod(replaced)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _create(path: Path, mode: int, place: Place) -> None:
+    """An empty file of these permissions without those that the user's umask takes away."""
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror or error}.", place) from error
+
+
+def _reason(path: Path, error: Exception) -> str:
+    """Why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    try:
+        with path.open("wb", buffering=0) as file:
+            for _ in range(64):
+                file.write(bytes(1 << 16))
+    except OSError as found:
+        return found.strerror or str(found)
+    return str(error)
+
+
+def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    """A netCDF file, whole or not at all; OutputError says where the data is kept where there is no room for it."""
+    try:
+        with replacing(target) as temporary:
+            write_netcdf(temporary, columns, attributes)
+    except OutputError as error:
+        kept = Path(tempfile.gettempdir()) / f"{target.stem}-{secrets.token_hex(4)}.nc"
+        try:
+            with replacing(kept) as temporary:
+                write_netcdf(temporary, columns, attributes)
+        except SurfacechemError:
+            raise OutputError(f"{error.message} There is no room in {kept.parent} either.", error.place) from None
+        raise OutputError(
+            f"{error.message} The results are kept in {kept}; move them from there.", error.place
+        ) from None
+
+
+def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
+    """Write columns and attributes to a new file."""
+    import netCDF4
+
+    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        for dimension, size in _dimensions(columns).items():
+            file.createDimension(dimension, size)
+        for column in columns:
+            kind = str if np.asarray(column.values).dtype == object else np.float64
+            variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
+            variable.setncatts(column.attributes)
+            variable[...] = column.values
+        file.setncatts(attributes)
+
+
+def reading(path: Path, read: Callable[[], R]) -> R:
+    """What is read from a netCDF file; InputError where it is none, or damaged."""
+    try:
+        size = path.stat().st_size
+        return wait_for(read, PATIENCE + size / SLOWEST)
+    except Exception as error:  # of a damaged file the library may meet anything
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
+        raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error
+
+
+def _dimensions(columns: Sequence[Column]) -> dict[str, int]:
+    sizes: dict[str, int] = {}
+    for column in columns:
+        for axis, dimension in enumerate(column.dimensions):
+            sizes[dimension] = np.shape(column.values)[axis]
+    return sizes

@@ -1,0 +1,339 @@
+"""A run as a labelled dataset: physics, balances, error and run time, in xarray and in netCDF with CF conventions."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from surfacechem.results.audit import Audit, audit
+from surfacechem.results.detailed_balance import Verdict, verdicts
+from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
+from surfacechem.results.extremes import capped_rates, cautions
+from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save, versions
+from surfacechem.results.profiles import profile_columns
+from surfacechem.solve import solver
+from surfacechem.solve.contract import Status
+from surfacechem.solve.run import Run, Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+LOST = 1e-4
+"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
+
+ROUNDING = 1e-12
+"""Values beyond a range by less than this part of their largest have not left it."""
+
+LARGE, WITHIN = 1e-2, 10
+"""Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
+
+LOST_HEAT = 1e-9
+"""Heat that rounding of a flux may carry in a run, relative to the total energy."""
+
+RECORDED = ("times", "atol", "max_steps")
+"""Settings of a run that a dataset records where they are not those of its case; others are attributes."""
+
+DATASET_NAMES = {
+    "Q_1": "Q_ext_1",
+    "Q_2": "Q_ext_2",
+    "Q_c": "Q_ext_c",
+    "W_n": "work_n",
+    "W_t": "work_t",
+    "W_t2": "work_t2",
+}
+"""Names that differ in the dataset, where no two may be the same but for their case."""
+
+
+CLASSES = {"exothermic": 1, "endothermic": -1}
+"""Classes of reactions, with the sign of their heat."""
+
+EARLIER = "ended earlier"
+"""What is said of a second run that did not come as far."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
+
+    error: float
+    source: str
+    """Words: the exact solution's name, the second run and its tolerance, or the balances."""
+    variables: Mapping[str, float] = field(default_factory=dict)
+    exact: Mapping[str, Any] = field(default_factory=dict)
+    """Exact values at the output times, by variable, where an exact solution was named."""
+    asked: float | None = None
+    """What was asked for, where the tolerance was chosen from it."""
+
+
+@dataclass(frozen=True, repr=False)
+class Solution:
+    """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
+
+    trajectory: Trajectory
+    title: str = ""
+    source: str = ""
+    case: str = ""
+    mechanism: str = ""
+    accuracy: Accuracy | None = None
+    changes: Mapping[str, float] = field(default_factory=dict)
+    """Parameters and initial values that differ from the case, by path."""
+    notes: tuple[str, ...] = ()
+    """What else a reader of the results has to know."""
+    case_run: Run | None = None
+    """How the case would be run; where the run was another, the dataset says so."""
+    error_from: str = "auto"
+    """Where the error was asked to be from."""
+
+    def __repr__(self) -> str:
+        """Title, end and error in a line."""
+        error = f", error {self.accuracy.error:.1e}" if self.accuracy else ""
+        return f"<Solution {self.title!r}: {self.status}, {self.reason}{error}>"
+
+    @property
+    def status(self) -> str:
+        """'finished', 'stopped' by physics, or 'failed' numerically."""
+        return self.trajectory.status
+
+    @property
+    def reason(self) -> str:
+        """Why the run ended."""
+        return self.trajectory.reason
+
+    @cached_property
+    def audit(self) -> Audit:
+        """Residuals of the balances and least dissipation."""
+        return audit(self.trajectory)
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Whether pairs of one-way reactions keep detailed balance."""
+        return verdicts(self.trajectory, self.audit)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of the results has to know, in words."""
+        system = self.trajectory.model.system
+        jumps = event_findings(self.trajectory.jumps)
+        unbalanced = (str(verdict) for verdict in self.verdicts if not verdict.consistent)
+        return (
+            *self.audit.findings,
+            *unbalanced,
+            *jumps,
+            *event_waits(self.trajectory),
+            *self._extrapolations(),
+            *capped_rates(self.trajectory),
+            *cautions(self.trajectory),
+            *self._lost_fluxes(),
+            *self._inaccurate(),
+            *system.warnings,
+            *self.notes,
+        )
+
+    def _inaccurate(self) -> list[str]:
+        """An error well beyond what was asked for, or so large that the result is none."""
+        found = self.accuracy
+        if found is not None and math.isnan(found.error) and self.status == "finished":
+            return [f"the error is not known: {found.source.partition(': ')[2]}"]
+        if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
+            return []
+        wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
+        worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
+        return [f"the error of {worst} is {found.error:.1e}{wanted}"]
+
+    def _lost_fluxes(self) -> list[str]:
+        """Fluxes through conductances so large that the temperature difference is rounding."""
+        fluxes = {name: size for name, size in self.trajectory.roundings.items() if name.startswith("q_")}
+        everywhere, duration = self.trajectory.everywhere, self.trajectory.result.t
+        largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
+        # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
+        content = self.trajectory.roundings.get("E_total", 0.0) / np.finfo(float).eps
+        felt = LOST_HEAT * max(_largest(everywhere["E_total"]), content)
+        lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
+        advice = "let the two share one temperature, or use the heat_into variables, which are exact"
+        return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
+
+    def _extrapolations(self) -> list[str]:
+        """Laws that the run has used outside their range."""
+        found = []
+        for limit in self.trajectory.model.system.ranges:
+            values = self.trajectory.everywhere[limit.variable]
+            low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
+            rounding = ROUNDING * max(abs(low), abs(high))
+            if low < limit.low - rounding or high > limit.high + rounding:
+                span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
+                found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
+        return found
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Every variable of the dataset, the time coordinate first."""
+        parts = (self._states(), self._named(), self._profiles(), self._ledger(), self._balances())
+        return (*(column for part in parts for column in part), *self._exact(), *self._events())
+
+    def _profiles(self) -> list[Column]:
+        return [Column(*column) for column in profile_columns(self.trajectory)]
+
+    def _states(self) -> list[Column]:
+        result = self.trajectory.result
+        columns = [Column("time", ("time",), result.times, "s", "time since the start")]
+        for j, state in enumerate(self.trajectory.model.system.states):
+            if state.name in self.trajectory.model.system.inside:
+                continue
+            q = state.quantity
+            columns.append(Column(q.name, ("time",), result.outputs[:, j], q.unit, q.long_name, q.tag))
+        return columns
+
+    def _named(self) -> list[Column]:
+        values = self.trajectory.outputs
+        items = self.trajectory.model.system.outputs
+        return [
+            Column(
+                DATASET_NAMES.get(i.name, i.name),
+                ("time",),
+                values[:, j],
+                i.quantity.unit,
+                i.quantity.long_name,
+                i.quantity.tag,
+            )
+            for j, i in enumerate(items)
+        ]
+
+    def _ledger(self) -> list[Column]:
+        values = self.trajectory.result.ledger_outputs
+        accounts = [account.quantity for account in self.trajectory.model.system.ledger]
+        return [
+            Column(DATASET_NAMES.get(q.name, q.name), ("time",), values[:, j], q.unit, q.long_name)
+            for j, q in enumerate(accounts)
+        ]
+
+    def _balances(self) -> list[Column]:
+        books = self.audit
+        columns = [
+            Column("energy_residual", ("time",), books.energy, "J/m^2", "total energy minus the energy supplied"),
+            Column(
+                "entropy_residual",
+                ("time",),
+                books.entropy,
+                "J/(m^2 K)",
+                "total entropy minus the entropy supplied and produced",
+            ),
+        ]
+        if any(account.kind == "bonds" for account in self.trajectory.model.system.ledger):
+            columns.append(
+                Column("site_residual", ("time",), books.sites, "1", "largest residual of the site balances")
+            )
+        for law, low in books.least.items():
+            text = f"least entropy production of {law.replace('_', ' ')}"
+            columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
+        return columns
+
+    def _exact(self) -> list[Column]:
+        exact = self.accuracy.exact if self.accuracy else {}
+        by_name = {c.name: c for c in (*self._states(), *self._named(), *self._profiles())}
+        return [
+            Column(
+                f"{name}_exact",
+                by_name[name].dimensions,
+                values,
+                by_name[name].unit,
+                f"exact {by_name[name].long_name}",
+            )
+            for name, values in exact.items()
+        ]
+
+    def _events(self) -> list[Column]:
+        return [Column(c.name, ("event",), c.values, c.unit, c.long_name) for c in event_columns(self.trajectory)]
+
+    @cached_property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+        run, result = self.trajectory.run, self.trajectory.result
+        told = result.counters._asdict()
+        if not solver(run.solver).counts_rejected:
+            del told["rejected"]
+        counters = {f"count_{name}": int(value) for name, value in told.items()}
+        books = self.audit
+        return {
+            "Conventions": CONVENTIONS,
+            "title": self.title,
+            "source": self.source or "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
+            "case": self.case,
+            **({"mechanism": self.mechanism} if self.mechanism else {}),
+            **self._departures(),
+            "status": self.status,
+            "reason": self.reason,
+            "warnings": "; ".join(self.warnings) or "none",
+            "regime": self.trajectory.model.system.regime,
+            **self._reaction(),
+            "solver": run.solver,
+            "rtol": float(run.rtol),
+            **{f"cells_{p.number}": len(p.points) - 1 for p in self.trajectory.model.system.profiles},
+            **counters,
+            "time_reached": float(result.t),
+            "run_seconds": float(self.trajectory.seconds),
+            "compile_seconds": float(self.trajectory.model.compile_seconds),
+            **self._error(),
+            "energy_error": books.energy_error,
+            "entropy_error": books.entropy_error,
+            "site_error": books.site_error,
+            "entropy_violations": ", ".join((*books.violations, *event_violations(self.trajectory.jumps))) or "none",
+            **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
+            "versions": versions(),
+        }
+
+    def _error(self) -> dict[str, str | float]:
+        found = self.accuracy
+        if found is None:
+            return {}
+        asked = {} if found.asked is None else {"error_asked": float(found.asked)}
+        return {"error": float(found.error), "error_source": found.source, **asked}
+
+    def _reaction(self) -> dict[str, str]:
+        """Class of what the reactions do, where they have a heat; what the tolerance does not resolve is none."""
+        heat = self.trajectory.everywhere.get("q_reaction")
+        if heat is None:
+            return {}
+        felt = self.trajectory.run.rtol * _largest(heat)
+        found = [name for name, sign in CLASSES.items() if np.any(sign * heat > felt)]
+        return {"reaction": " and ".join(found) or "isothermic"}
+
+    def _departures(self) -> dict[str, str]:
+        """In which way the run was not that of its case, for running it again."""
+        run = self.trajectory.run
+        departures: dict[str, object] = {"changes": dict(self.changes)} if self.changes else {}
+        if self.case_run is not None:
+            now, usual = ({name: getattr(r, name) for name in RECORDED} for r in (run, self.case_run))
+            departures |= {name: value for name, value in now.items() if value != usual[name]}
+        if self.error_from != "auto":
+            departures["error"] = self.error_from
+        if self.trajectory.result.status is Status.STOPPED:
+            departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
+        return {"departures": json.dumps(departures)} if departures else {}
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The run as an xarray Dataset."""
+        import xarray
+
+        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
+        coordinates = {c.name: data.pop(c.name) for c in self.columns if c.dimensions == (c.name,)}
+        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
+
+    def write(self, path: str | Path) -> Path:
+        """Save as netCDF; the file appears whole or not at all."""
+        target = dataset_path(path)
+        save(target, self.columns, self.attributes)
+        return target
+
+
+def _largest(values: Any) -> float:
+    return float(np.max(np.abs(values), initial=0.0))

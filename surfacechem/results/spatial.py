@@ -1,0 +1,291 @@
+"""Cells across bodies: how many, how wide, and the error that they leave.
+
+Heat that begins to enter through a face has reached the depth sqrt(alpha t) a time t later. An error of cells can only
+be told from other cells where both resolve that layer: cells far wider than it agree on almost nothing having happened.
+Where an accuracy asks for cells they are therefore graded towards the layer of what is looked at first, and as many as
+their error needs; where their number is given and too small for the layer, cells that are not are what they are held
+against.
+
+The cells are of second order: half of them have four times the error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from surfacechem.compile.program import compile_function
+from surfacechem.contracts import grids
+from surfacechem.model.system import System
+from surfacechem.results.accuracy import MARGIN, UNKNOWN, CellErrors, relative_error
+from surfacechem.results.achieved import EVENTS, beside_jumps, difference, event_error, floor
+from surfacechem.results.event_table import event_times
+from surfacechem.results.profiles import profile_values
+from surfacechem.results.solution import WITHIN, Accuracy
+from surfacechem.scene import Body, Conduction, Scene
+from surfacechem.solve.run import Run, Trajectory
+
+Array = NDArray[np.float64]
+
+FEW = 4
+
+PER_FOLD = 8
+"""Cells at first in which the distance from a face grows by e: errors are some 0.4 % of a rise in temperature then."""
+
+THINNEST = 2.0**-30
+"""Part of a body below which its layer is an atom's; the width of a cell at the far side has six digits there."""
+
+SPARE, FASTEST = 3.0, 16.0
+"""Part of the accuracy that temperatures use up, as heat fluxes are differences of them and err by more, and the most
+by which cells are multiplied at once."""
+
+MOST_CHOSEN = 1024
+"""Cells across a body at most that an accuracy chooses: the time to compile two bodies of them is some seconds, and
+grows with their square."""
+
+TRIALS = 6
+"""Grids after which a search for an accuracy ends; two or three are the rule."""
+
+ORDER, LEAST_ORDER = 4.0, 2.0
+"""By how much half of the cells err more: at second order, and at first, below which nothing converges."""
+
+
+def divided(scene: Scene) -> bool:
+    """Whether a body has cells."""
+    return any(True for _ in _laws(scene))
+
+
+def wanted(scene: Scene) -> float | None:
+    """The accuracy that cells are chosen by, the tighter of two; None where the scene gives their number."""
+    return min((law.accuracy for _, law in _laws(scene) if law.accuracy is not None), default=None)
+
+
+def _laws(scene: Scene) -> Iterable[tuple[str, Conduction]]:
+    laws = ((body.name, body.conduction) for body in scene.bodies)
+    return ((name, law) for name, law in laws if law is not None and law.cells)
+
+
+def _changed(scene: Scene, change: Callable[[str, Conduction], Conduction]) -> Scene:
+    def changed(body: Body) -> Body:
+        law = body.conduction
+        return replace(body, conduction=change(body.name, law)) if law is not None and law.cells else body
+
+    first, second = scene.bodies
+    return replace(scene, bodies=(changed(first), changed(second)))
+
+
+def tightened(scene: Scene, accuracy: float | None) -> Scene:
+    """The scene with cells as accurate as the run is asked to be, where an accuracy chooses them; itself where they
+    are.
+    """
+    least = wanted(scene)
+    if accuracy is None or least is None or least <= accuracy:
+        return scene
+    return _changed(scene, lambda _, law: law if law.accuracy is None else replace(law, accuracy=accuracy))
+
+
+def fixed(scene: Scene) -> list[str]:
+    """Names of the bodies whose number of cells is given."""
+    return [name for name, law in _laws(scene) if law.accuracy is None]
+
+
+def few(scene: Scene) -> Scene:
+    """The scene with a few cells, as its equations are alike for any number of them."""
+    return _changed(scene, lambda _, law: replace(law, cells=min(law.cells, FEW)))
+
+
+def part(scene: Scene, divisor: int, given: bool = True) -> Scene:
+    """The scene with a half or a quarter of its cells; without ``given`` of those that an accuracy chooses only."""
+    return _changed(
+        scene, lambda _, law: replace(law, cells=law.cells // divisor) if given or law.accuracy is not None else law
+    )
+
+
+def grid(scene: Scene) -> tuple[object, ...]:
+    """What tells the cells of a scene from those of another."""
+    return tuple((law.cells, law.layer, law.accuracy) for _, law in _laws(scene))
+
+
+def shortest(system: System, run: Run, values: Mapping[str, float], events: Iterable[float] = ()) -> float:
+    """Shortest time [s] between what starts a layer, a load or an event, and what is looked at, an output or an event.
+
+    What follows within the tolerance is at the same instant.
+    """
+    events = list(events)
+    begun = np.unique([0.0, *(t for t in system.breakpoints if 0 < t < run.times[-1]), *events])
+    seen = np.unique([*run.times[1:], *(t for t in events if t > 0)])
+    since = seen - begun[np.searchsorted(begun, seen) - 1]
+    since = since[since > run.rtol * seen]
+    swinging = [1 / (2 * math.pi * values[path]) for path in system.cycles if values[path] > 0]
+    return min([*since.tolist(), *swinging], default=run.times[-1])
+
+
+def layers(system: System, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> dict[str, float]:
+    """By body, the least part of its thickness that heat has reached after a time [s], rounded to a power of two.
+
+    ``points`` are values of runs by path, ``times`` go with them. Properties are those at the start.
+    """
+    paths = {p.symbol: p.path for p in system.parameters} | {s.symbol: s.path for s in system.states}
+    found = {}
+    for conductor in system.conductors:
+        slow = system.expand(conductor.resistance * conductor.capacity).subs({system.t: 0.0})
+        symbols = [symbol for symbol in slow.free_symbols if symbol in paths]
+        table = np.array([[point[paths[symbol]] for symbol in symbols] for point in points]).reshape(len(points), -1)
+        diffusion = compile_function(symbols, [slow])(table)[:, 0]  # time in which heat crosses the body [s]
+        part = math.sqrt(float(np.min(np.asarray(times) / diffusion)))
+        found[conductor.body] = 2.0 ** math.floor(math.log2(min(max(part, THINNEST), 1.0)))
+    return found
+
+
+def suited(scene: Scene, parts: Mapping[str, float], given: bool = False) -> Scene:
+    """The scene with cells that resolve layers of these ``parts`` of the bodies where an accuracy chooses them, or
+    where their number is ``given``.
+
+    Beside an accuracy, a ``grading`` is the least one.
+    """
+
+    def change(name: str, law: Conduction) -> Conduction:
+        if (law.accuracy is None) is not given:
+            return law
+        layer = min(parts[name], 1 / (law.grading - 1) if law.grading > 2 else 1.0)
+        return replace(law, layer=layer, cells=_cells(PER_FOLD * grids.folds(layer, law.far is not None)))
+
+    return _changed(scene, change)
+
+
+def _cells(number: float) -> int:
+    """A number of cells that has a half and a quarter."""
+    return min(4 * max(math.ceil(number / 4), 2), MOST_CHOSEN)
+
+
+def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scene | None:
+    """The scene with the cells that an accuracy needs, as far as the errors of these tell; None where there is no more
+    to do.
+
+    Layers that an event has begun since are graded for. Where nothing converges, something is thinner than known.
+    """
+    accuracy, laws = wanted(scene), {name: law for name, law in _laws(scene) if law.accuracy is not None}
+    if accuracy is None:
+        return None
+    factor, thinner = 1.0, 1.0
+    if not found.converged:
+        factor, thinner = 2.0, 0.25
+    elif found.largest > accuracy / SPARE and not found.in_noise:
+        # Rounded up, and a little more, lest the next estimate be just above what was aimed at.
+        factor = min(math.sqrt(1.1 * SPARE * found.largest / accuracy), FASTEST)
+    now = {name: max(min(parts[name], law.layer * thinner), THINNEST) for name, law in laws.items()}
+    if factor == 1.0 and all(now[name] == law.layer for name, law in laws.items()):
+        return None
+
+    def change(name: str, law: Conduction) -> Conduction:
+        if name not in laws:
+            return law
+        both = law.far is not None
+        more = factor * law.cells * grids.folds(now[name], both) / grids.folds(law.layer, both)
+        return replace(law, layer=now[name], cells=_cells(more))
+
+    changed = _changed(scene, change)
+    return None if grid(changed) == grid(scene) else changed
+
+
+def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
+    """Whether half of the cells resolve layers of these ``parts`` of the bodies, with two or more in a quarter."""
+    return all(law.cells >= 8 and _resolves(law, parts[name]) for name, law in _laws(scene))
+
+
+def _resolves(law: Conduction, layer: float) -> bool:
+    at = replace(law, cells=law.cells // 2).points
+    return all(b - a <= layer + (min(a, 1 - b) if law.far is not None else a) for a, b in pairwise(at))
+
+
+def judged(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
+    """Errors from the differences of a run to one with half of its cells, and of that to one with a quarter.
+
+    >>> judged({"T": 3e-6}, {"T": 1.2e-5}, 1e-11).variables["T"]
+    1e-06
+    >>> judged({"T": 1e-5}, {"T": 5e-6}, 1e-11).converged
+    False
+    """
+    first, second = (max(each.values(), default=0.0) for each in (near, far))
+    in_noise = first <= rtol / MARGIN  # errors of runs are below that
+    if in_noise:
+        return CellErrors(near, in_noise=True)
+    factors = {name: min(max(far[name] / d, LEAST_ORDER), ORDER) if d else ORDER for name, d in near.items()}
+    errors = {name: d / (factors[name] - 1) for name, d in near.items()}
+    return CellErrors(errors, converged=math.isfinite(second) and second >= LEAST_ORDER * first)
+
+
+def worst(errors: Sequence[CellErrors]) -> CellErrors:
+    """The errors of that of several runs whose errors are the largest, or are not known."""
+    return max(errors, key=lambda found: found.largest if found.converged else math.inf, default=CellErrors())
+
+
+def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
+    """Differences of states, profiles and times of events of two runs with different cells, by name and relative to the
+    better one; infinite for what only one of them has.
+
+    The initial values are given, and none of the cells'.
+    """
+    expected, found = event_times(better), event_times(worse)
+    count = min(len(better.result.times), len(worse.result.times))
+    times = better.result.times[1:count]
+    other = bool(difference(found, expected)) or better.status != worse.status
+    shared = 1 + np.flatnonzero(np.full(len(times), True) if other else beside_jumps(times, better, worse))
+    exact, values = _curves(better), _curves(worse)
+    names = [name for name in exact if name in values]
+    errors = {name: relative_error(*_on_same(values[name], exact[name], shared), floor(better, name)) for name in names}
+    if other:
+        errors[EVENTS] = math.inf
+    elif found:
+        errors[EVENTS] = event_error(found, expected, better.run.times[-1])
+    return errors
+
+
+def _curves(run: Trajectory) -> dict[str, tuple[Sequence[float], Array]]:
+    """States and profiles of a run over time, with the places of profiles."""
+    system = run.model.system
+    lone = [(s.name, j) for j, s in enumerate(system.states) if s.name not in system.inside]
+    found: dict[str, tuple[Sequence[float], Array]] = {name: ((), run.result.outputs[:, j]) for name, j in lone}
+    return found | {profile.name: (profile.points, profile_values(run, profile)) for profile in system.profiles}
+
+
+def _on_same(
+    ours: tuple[Sequence[float], Array], theirs: tuple[Sequence[float], Array], shared: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Values of two runs at the same times and at the places of the one that has fewer."""
+    (x, first), (other, second) = ours, theirs
+    first, second = first[shared], second[shared]
+    if len(x) > len(other):
+        first = CubicSpline(x, first, axis=1)(other)
+    elif x != other:
+        second = CubicSpline(other, second, axis=1)(x)
+    return first, second
+
+
+def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:
+    """Words for errors that are not known, for an accuracy that the most cells do not reach, or that a given number of
+    cells does not.
+    """
+    if not errors.converged:
+        return (f"{UNKNOWN}. Let outputs begin later after what is sudden, or give more of them",)
+    accuracy, names = wanted(scene), fixed(scene)
+    if accuracy is not None and not errors.largest <= accuracy:
+        most = max(law.cells for _, law in _laws(scene) if law.accuracy is not None)
+        text = (
+            f"the accuracy {accuracy:g} of the cells is not reached with {most} of them: the error is about "
+            f"{errors.largest:.2g}. Ask for less, let outputs begin later, or give the other body more."
+        )
+        return (text,)
+    if not names or found is None or found.asked is None or found.error <= WITHIN * found.asked:
+        return ()
+    text = (
+        f"a tolerance does not reduce the error of cells, whose number is given for {' and '.join(names)}: let "
+        f"`cells: {{accuracy: {found.asked:g}}}` choose it, or give more"
+    )
+    return (text,)

@@ -1,0 +1,189 @@
+"""What comes with the package, as text: the laws by contract and the cases."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from surfacechem.contracts.terms import Law
+from surfacechem.documents.shipped import cases
+from surfacechem.errors import InputError, suggestion
+from surfacechem.laws import FAMILIES, laws
+
+WIDTH = 110
+SIGNS = {
+    "alpha": "α",
+    "beta": "β",
+    "delta": "δ",
+    "Delta": "Δ",
+    "eta": "η",
+    "theta": "θ",
+    "kappa": "κ",
+    "lambda": "λ",
+    "mu": "μ",
+    "nu": "ν",
+    "pi": "π",
+    "Pi": "Π",
+    "rho": "ρ",
+    "sigma": "σ",
+    "Sigma": "Σ",
+    "tau": "τ",
+    "phi": "φ",
+    "psi": "ψ",
+    "Psi": "Ψ",
+    "omega": "ω",
+    "varepsilon": "ε",
+    "epsilon": "ε",
+    "chi": "χ",
+    "gamma": "γ",
+    "xi": "ξ",
+    "ge": "≥",
+    "le": "≤",
+    "cdot": "·",
+    "times": "×",
+    "partial": "∂",
+    "infty": "∞",
+    "pm": "±",
+    "to": "→",
+    "int": "∫",
+    "sum": "Σ",
+    "prod": "Π",
+    "approx": "≈",
+    "simeq": "≃",
+    "propto": "∝",
+    "ll": "≪",
+    "gg": "≫",
+}
+"""LaTeX commands with one character; function names keep their letters."""
+
+
+ONE = r"\s*(?:\{\s*(\w)\s*\}|(\w))"
+"""The argument of an accent: one letter, in braces or not."""
+
+
+def plain(latex: str) -> str:
+    """A LaTeX formula as text.
+
+    >>> plain(chr(92) + "dot" + chr(92) + "phi = -" + chr(92) + "frac{M}{N_c}")
+    'dφ/dt = -M/N_c'
+    """
+    text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!;]|&", " ", latex))
+    text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGNS.get(m[1], m[0]), text)
+    text = re.sub(rf"\\dot{ONE}", r"d\1\2/dt ", text)
+    text = re.sub(rf"\\bar{ONE}", r"\1\2_mean ", text)
+    text = re.sub(rf"\\hat{ONE}", r"\1\2_max ", text)
+    text = re.sub(r"\\(?:text|mathrm|operatorname)\s*\{([^{}]*)\}", r"\1", text)
+    while (reduced := _unnested(text)) != text:
+        text = reduced
+    text = re.sub(r"\\([a-zA-Z]+)", r"\1", text).replace("\\{", "(").replace("\\}", ")")
+    text = re.sub(r"\s+([,)\]])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text.replace("\\ ", " ")))
+    return re.sub(r"([(\[/]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
+
+
+def _unnested(text: str) -> str:
+    """The innermost fractions, roots, powers and subscripts without their braces."""
+    inner = r"\s*\{([^{}\\]*)\}"
+    either = r"\s*(?:\{([^{}\\]*)\}|(\w))"
+    text = re.sub(rf"\\[dt]?frac{either}{either}", lambda m: f"{_atom(m[1] or m[2])}/{_atom(m[3] or m[4])} ", text)
+    text = re.sub(rf"\\sqrt{inner}", r"sqrt(\1)", text)
+    text = re.sub(rf"\^{inner}", lambda m: f"^{_atom(m[1])}", text)
+    return re.sub(rf"_{inner}", r"_\1", text)
+
+
+def _atom(text: str) -> str:
+    return text.strip() if re.fullmatch(r"\s*-?[\w.^]+\s*", text) else f"({text.strip()})"
+
+
+def law_table() -> str:
+    """Every law by contract: what it states, its formula, parameters and source."""
+    parts: list[str] = []
+    for contract in FAMILIES:
+        parts += [heading(contract), *(summary(law) for law in laws(contract).values())]
+    return "\n\n".join(parts)
+
+
+def heading(contract: type[Law]) -> str:
+    """The contract and what a law of it states."""
+    title = contract.contract.upper()
+    return f"{title}: {_first_line(contract)}"
+
+
+def summary(law: type[Law]) -> str:
+    """Name, one line, formula, parameters with units, and source of a law."""
+    lines = [f"  {law.name()}", _filled(_first_line(law)), *(_filled(formula) for formula in formulas(law))]
+    lines += [_filled(text) for text in parameters(law)]
+    return "\n".join([*lines, _filled(f"Source: {source(law)}")])
+
+
+def _filled(text: str) -> str:
+    return textwrap.fill(text, WIDTH, initial_indent=" " * 6, subsequent_indent=" " * 10, break_on_hyphens=False)
+
+
+def _first_line(kind: type) -> str:
+    return " ".join(inspect.getdoc(kind).split("\n\n")[0].split())  # type: ignore[union-attr]
+
+
+def formulas(law: type[Law]) -> list[str]:
+    """The formulas of a law's docstring as text."""
+    doc = inspect.getdoc(law) or ""
+    blocks = re.findall(r"\.\. math::((?:.*\n)(?:[ \t]+.*\n?)*)", doc + "\n")
+    return [plain(" ".join(block.split())) for block in blocks]
+
+
+def parameters(law: type[Law]) -> Iterator[str]:
+    """One line for each parameter and option."""
+    for name, spec in law.specs():
+        allowed = "" if spec.range == "any" else f", {spec.range}"
+        default = next(item.default for item in fields(law) if item.name == name)
+        usual = "" if default in (MISSING, None) else f", {default:g} if not given"
+        yield f"{name} [{spec.unit.replace('[x]', 'x')}]: {spec.text}{allowed}{usual}"
+    for name, text in law.options():
+        yield f"{name}: {text}"
+
+
+def source(law: type[Law]) -> str:
+    """Where a law comes from, as its docstring says."""
+    found = re.search(r"Source: (.*?)(?:\n\n|\Z)", inspect.getdoc(law) or "", re.DOTALL)
+    text = " ".join(found[1].split()) if found else "not stated"
+    return re.sub(r":math:`([^`]*)`", lambda m: plain(m[1]), text)
+
+
+def law_page(name: str) -> str:
+    """Everything about the laws of that name: the docstring, the parameters and their ranges."""
+    every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
+    found = [(contract, law) for contract, law in every if law.name() == name]
+    if not found:
+        raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every})}")
+    return "\n\n".join(_page(contract, law) for contract, law in found)
+
+
+def _page(contract: type[Law], law: type[Law]) -> str:
+    doc = inspect.getdoc(law) or ""
+    lines = [f"  {line}" for line in parameters(law)]
+    listed = "\n".join(lines) if lines else "  none"
+    return f"{law.name()} ({contract.contract})\n\n{textwrap.indent(doc, '  ')}\n\nParameters\n{listed}"
+
+
+def case_table() -> str:
+    """Names and titles of the shipped cases."""
+    titles = {path.stem: title(path) for path in sorted(cases().glob("*.yaml"))}
+    if not titles:
+        return "no cases are installed"
+    width = max(len(name) for name in titles)
+    return "\n".join(f"{name:{width}}  {text}" for name, text in titles.items())
+
+
+def title(path: Path) -> str:
+    """The title of a case file."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        content = YAML(typ="safe").load(path)
+    except (OSError, YAMLError):
+        return "(not readable)"
+    return str(content.get("title", "")) if isinstance(content, dict) else "(not a case)"

@@ -1,0 +1,141 @@
+"""A run again from its own file: the case and the mechanism that the dataset carries, with the recorded solver."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from surfacechem import format as cases
+from surfacechem import solve as solvers
+from surfacechem.errors import InputError, Place
+from surfacechem.results.netcdf import reading
+from surfacechem.results.solution import Solution
+from surfacechem.runs.simulation import Simulation
+from surfacechem.runs.sweep_dataset import SweepSolution, recorded_plan
+
+A = TypeVar("A")
+
+
+DEPARTURES: Mapping[str, tuple[type, ...]] = {
+    "changes": (dict,),
+    "times": (list,),
+    "atol": (float, int, type(None)),
+    "max_steps": (int,),
+    "error": (str,),
+}
+"""What a file may say of how its run was not that of its case."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a file holds: its attributes and every variable."""
+
+    path: Path
+    attributes: Mapping[str, Any]
+    variables: Mapping[str, Any]
+
+    def attribute(self, name: str, kind: type[A]) -> A:
+        """A global attribute of a kind; InputError where the file has none of that name."""
+        if name not in self.attributes:
+            raise self.error(f"has no attribute '{name}'; only datasets written by a run can be run again.")
+        value = self.attributes[name]
+        if isinstance(value, np.generic):
+            value = value.item()
+        if not isinstance(value, kind):
+            raise self.error(f"the attribute '{name}' is no {'text' if kind is str else 'number'}.")
+        return value
+
+    def content(self, name: str) -> Any:
+        """What an attribute says in JSON."""
+        try:
+            return json.loads(self.attribute(name, str))
+        except (ValueError, RecursionError):
+            raise self.error(f"the attribute '{name}' is no JSON.") from None
+
+    @property
+    def place(self) -> Place:
+        """Where the record is from, for messages."""
+        return Place(str(self.path))
+
+    def error(self, message: str) -> InputError:
+        """An input error about this file."""
+        return InputError(message, self.place)
+
+
+def read(path: str | Path) -> Record:
+    """The attributes and variables of a netCDF file."""
+    return reading(Path(path), lambda: _read(Path(path)))
+
+
+def _read(path: Path) -> Record:
+    import netCDF4
+
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_mask(False)
+        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+        variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
+    return Record(path, attributes, variables)
+
+
+def run_again(record: Record) -> Solution | SweepSolution:
+    """The case of a record, run or swept as it was."""
+    mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
+    text = record.attribute("case", str)
+    case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=f"case in {record.path}")
+    departures = _departures(record)
+    solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
+    if solver not in solvers.names:
+        raise record.error(f"no run is made with the solver '{solver}'.")
+    try:
+        run = replace(
+            case.run,
+            solver=solver,
+            rtol=rtol,
+            times=tuple(departures.get("times", case.run.times)),
+            atol=departures.get("atol", case.run.atol),
+            max_steps=departures.get("max_steps", case.run.max_steps),
+            max_seconds=None,
+        )
+    except InputError as error:
+        raise error.at(record.place) from None
+    if "sweep" not in record.attributes:
+        return Simulation(case).run(departures.get("changes"), run, departures.get("error", "auto"))
+    try:
+        plan = recorded_plan(record.attribute("sweep", str))
+    except InputError as error:
+        raise error.at(record.place) from None
+    return Simulation(replace(case, run=run)).sweep_plan(plan, departures.get("changes"))
+
+
+def _departures(record: Record) -> Mapping[str, Any]:
+    """In which way the run was not that of its case."""
+    if "departures" not in record.attributes:
+        return {}
+    found = record.content("departures")
+    if not isinstance(found, dict) or any(not isinstance(found[k], DEPARTURES.get(k, ())) for k in found):
+        raise record.error(f"the attribute 'departures' may hold {', '.join(DEPARTURES)}, each of its kind.")
+    numbers = [*found.get("times", []), *found.get("changes", {}).values(), found.get("max_steps", 1)]
+    if not all(isinstance(value, float | int) and math.isfinite(value) for value in numbers):
+        raise record.error("the attribute 'departures' holds what is no number where one is needed.")
+    return found
+
+
+def differences(record: Record, solution: Solution | SweepSolution) -> list[str]:
+    """Names of the variables that are not bit for bit those of the record, or in one of the two only."""
+    ours = {column.name: np.asarray(column.values) for column in solution.columns}
+    theirs = record.variables
+    return [name for name in dict.fromkeys([*theirs, *ours]) if not _identical(ours.get(name), theirs.get(name))]
+
+
+def _identical(ours: Any, theirs: Any) -> bool:
+    if ours is None or theirs is None or ours.shape != theirs.shape:
+        return False
+    if ours.dtype == object or theirs.dtype == object:
+        return [str(value) for value in ours.flat] == [str(value) for value in theirs.flat]
+    return bool(ours.astype(np.float64).tobytes() == theirs.astype(np.float64).tobytes())

@@ -1,0 +1,332 @@
+"""A case ready to run: read, assembled and compiled once, run with any values of its parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surfacechem import format as cases
+from surfacechem.documents.document import from_plain
+from surfacechem.documents.overrides import parameter_path
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.format import Case
+from surfacechem.model.system import System
+from surfacechem.results import choice, spatial
+from surfacechem.results.accuracy import CellErrors
+from surfacechem.results.achieved import accuracy, check_way, unknown
+from surfacechem.results.event_table import event_times
+from surfacechem.results.solution import Accuracy, Solution
+from surfacechem.scene import Scene
+from surfacechem.solve import AUTO
+from surfacechem.solve.run import Model, Run, Trajectory, values_of
+from surfacechem.units import parse
+
+if TYPE_CHECKING:
+    from surfacechem.format.sweep import Plan
+    from surfacechem.runs.sweep_dataset import SweepSolution
+    from surfacechem.runs.sweeps import Sweep
+
+
+def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
+    """Read a case by file or by the name of a shipped one; ``overrides`` are "path=value" or {path: value}."""
+    return Simulation(cases.load(name, overrides))
+
+
+def run(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Solution:
+    """Read a case and run it."""
+    return load(name, overrides).run()
+
+
+def sweep(
+    name: str | Path,
+    over: Mapping[str, object] | None = None,
+    until: Mapping[str, object] | None = None,
+    overrides: Sequence[str] | Mapping[str, object] = (),
+) -> SweepSolution:
+    """Read a case and run its sweep, or the one given."""
+    return load(name, overrides).sweep(over, until)
+
+
+class Simulation:
+    """A case with its system and machine code, each made when first needed."""
+
+    def __init__(self, case: Case, grids: dict[tuple[object, ...], Simulation] | None = None) -> None:
+        self.case = case
+        self._sweep_models: dict[str, Model] = {}
+        self._freed: dict[frozenset[str], Simulation] = {}
+        self._grids = {} if grids is None else grids
+        """Simulations of the same case by the cells of their bodies."""
+        self._grids.setdefault(spatial.grid(case.scene), self)
+
+    def __repr__(self) -> str:
+        """Title and states in a line."""
+        return f"<Simulation {self.case.title!r}: {', '.join(state.name for state in self.system.states)}>"
+
+    @cached_property
+    def system(self) -> System:
+        """The assembled equations."""
+        return self.case.system()
+
+    @cached_property
+    def model(self) -> Model:
+        """The compiled system."""
+        return Model(self.system)
+
+    def run(
+        self, changes: Mapping[str, float | str] | None = None, run: Run | None = None, error: str = "auto"
+    ) -> Solution:
+        """Run with some parameters or initial values changed, by path; nothing is compiled again.
+
+        ``error`` says where the error of the run is from: "auto", the exact solution of the case if there is one, else
+        a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
+        """
+        check_way(error)
+        settings = run or self.case.run
+        values = self._values(changes or {})
+        if (freed := self._with_freed(values)) is not self:
+            return freed.run(values, settings, error)
+        values = {path: value for path, value in values.items() if path not in self.system.constants}
+        chosen, trajectory, cells = self._as_accurate(settings)._resolved(settings, values)
+        estimate: Accuracy | None = None
+        if settings.solver == AUTO:
+            trajectory, estimate = choice.verified(trajectory)
+        case = chosen.case
+        unused = case.reference.fixed if case.reference and self._departs(values) else case.unused
+        exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
+
+        def cell_errors() -> CellErrors:
+            nonlocal cells
+            cells = cells or chosen._cell_errors(trajectory)
+            return cells
+
+        found = (
+            accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
+            if len(trajectory.result.times)
+            else unknown("the run ended at its start")
+        )
+        if unused and error == "auto":
+            found = replace(found, source=f"{found.source}; {unused}")
+        return Solution(
+            trajectory,
+            title=case.title,
+            source=case.source,
+            case=case.text,
+            mechanism=case.mechanism_text or "",
+            accuracy=found,
+            changes=values,
+            case_run=case.run,
+            error_from=error,
+            notes=spatial.missed(case.scene, cells or CellErrors(), found),
+        )
+
+    def _departs(self, values: Mapping[str, float]) -> bool:
+        """Whether values are other than those of the case."""
+        own = self.model.values()
+        return any(own[path] != value for path, value in values.items())
+
+    def _as_accurate(self, run: Run) -> Simulation:
+        """The same with cells as accurate as the run is asked to be, where an accuracy chooses them."""
+        return self._with(spatial.tightened(self.case.scene, run.accuracy))
+
+    def _with(self, scene: Scene) -> Simulation:
+        """The same with the cells of another scene, assembled and compiled once for each choice of them."""
+        key = spatial.grid(scene)
+        if key not in self._grids:
+            self._grids[key] = Simulation(replace(self.case, scene=scene), self._grids)
+        return self._grids[key]
+
+    def _graded(self, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> Simulation:
+        """The same with cells that resolve what runs with these values look at first, if an accuracy chooses."""
+        if spatial.wanted(self.case.scene) is None:
+            return self
+        return self._with(spatial.suited(self.case.scene, spatial.layers(self.system, points, times)))
+
+    def _resolved(self, settings: Run, values: Mapping[str, float]) -> tuple[Simulation, Trajectory, CellErrors | None]:
+        """With the cells that its accuracy needs: the simulation, its run and, where it asks for an accuracy, the
+        errors of the cells.
+        """
+        chosen = self
+        if spatial.wanted(self.case.scene) is not None:
+            point = values_of(self.system, values)
+            chosen = self._graded([point], [spatial.shortest(self.system, settings, point)])
+        trajectory = chosen._solved(settings, values)
+        if chosen is self:
+            return self, trajectory, None
+        errors = chosen._halved(trajectory, given=False)
+        for _ in range(spatial.TRIALS):
+            finer = spatial.refined(chosen.case.scene, errors, chosen._layers(trajectory))
+            if finer is None:
+                break
+            chosen = self._with(finer)
+            trajectory = chosen._solved(settings, values)
+            errors = chosen._halved(trajectory, given=False)
+        return chosen, trajectory, None if spatial.fixed(self.case.scene) else errors
+
+    def _solved(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        try:
+            return self.model.solve(run, values)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def _layers(self, *runs: Trajectory) -> dict[str, float]:
+        """By body, the least layer that heat has reached when runs, or events in them, are first looked at."""
+        events = [np.concatenate([*event_times(run).values(), []]) for run in runs]
+        pairs = zip(runs, events, strict=True)
+        times = [spatial.shortest(self.system, run.run, run.values, at) for run, at in pairs]
+        return spatial.layers(self.system, [run.values for run in runs], times)
+
+    def _cell_errors(self, trajectory: Trajectory) -> CellErrors:
+        """Errors of the cells, by variable; nothing where no body has any."""
+        scene = self.case.scene
+        if not spatial.divided(scene):
+            return CellErrors()
+        parts = self._layers(trajectory)
+        if not spatial.fixed(scene):
+            return self._halved(trajectory)
+        if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
+            return found
+        other = self._with(spatial.suited(scene, parts, given=True))
+        held_against = other._solved(trajectory.run, self._changes(trajectory))
+        own = other._halved(held_against)
+        found = CellErrors(spatial.differences(held_against, trajectory), source="and one with cells that suit")
+        return own.added_to(found)
+
+    def _halved(self, trajectory: Trajectory, given: bool = True) -> CellErrors:
+        """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
+        chooses only.
+        """
+        runs = [trajectory]
+        for divisor in (2, 4):
+            coarser = self._with(spatial.part(self.case.scene, divisor, given))
+            runs.append(coarser._solved(trajectory.run, self._changes(trajectory)))
+        near, far = (spatial.differences(*pair) for pair in pairwise(runs))
+        return spatial.judged(near, far, trajectory.run.rtol)
+
+    def _changes(self, trajectory: Trajectory) -> dict[str, float]:
+        """The values of a run that another number of cells has, too."""
+        return {path: value for path, value in trajectory.values.items() if path in self._units}
+
+    def sweep(
+        self,
+        over: Mapping[str, object] | None = None,
+        until: Mapping[str, object] | None = None,
+        changes: Mapping[str, float | str] | None = None,
+        threads: int | None = None,
+    ) -> SweepSolution:
+        """Run over values of one or two parameters in one call of the compiled loop; nothing is compiled twice.
+
+        ``over`` maps paths to lists of values or to ranges {from, to, points, spacing}, ``until`` a prescribed ramp to
+        the value at which each run ends; what is not given is that of the section ``sweep`` of the case.
+        """
+        return self.sweep_plan(self._plan(over, until), changes, threads)
+
+    def sweep_plan(
+        self, plan: Plan, changes: Mapping[str, float | str] | None = None, threads: int | None = None
+    ) -> SweepSolution:
+        """Run a plan whose values are in SI."""
+        from surfacechem.runs import sweeping
+
+        constants = self.system.constants
+        values = self._values(changes or {})
+        swept = {axis.path: axis.values for axis in plan.axes if axis.path in constants}
+        others = {path: _besides(constants[path][1], xs) for path, xs in swept.items()}
+        if (freed := self._with_freed({**values, **others})) is not self:
+            return freed.sweep_plan(plan, values, threads)
+        values = {path: value for path, value in values.items() if path not in constants}
+        chosen, done, errors = self._as_accurate(self.case.run)._swept_resolved(plan, values, threads)
+        return sweeping.solution(
+            chosen.case, done, values, threads, lambda: errors or [chosen._cell_errors(run) for run in done]
+        )
+
+    def _swept_resolved(
+        self, plan: Plan, values: Mapping[str, float], threads: int | None
+    ) -> tuple[Simulation, Sweep, list[CellErrors]]:
+        """With cells that are accurate enough for every run, as :meth:`_resolved` has them for one."""
+        from surfacechem.runs import sweeping
+
+        chosen, search = self, spatial.wanted(self.case.scene) is not None
+        if search:
+            points = [values_of(self.system, {**values, **point}) for point in plan.points]
+            runs = sweeping.settings(self.system, plan, self.case.run, points)
+            pairs = zip(runs, points, strict=True)
+            chosen = self._graded(points, [spatial.shortest(self.system, *pair) for pair in pairs])
+        done = chosen._swept(plan, values, threads)
+        errors = [chosen._halved(run, given=False) for run in done] if search else []
+        for _ in range(spatial.TRIALS if search else 0):
+            finer = spatial.refined(chosen.case.scene, spatial.worst(errors), chosen._layers(*done))
+            if finer is None:
+                break
+            chosen = self._with(finer)
+            done = chosen._swept(plan, values, threads)
+            errors = [chosen._halved(run, given=False) for run in done]
+        return chosen, done, [] if spatial.fixed(self.case.scene) else errors
+
+    def _swept(self, plan: Plan, values: Mapping[str, float], threads: int | None) -> Sweep:
+        from surfacechem.runs import sweeping
+
+        key = plan.until[0] if plan.until else ""
+        try:
+            if key not in self._sweep_models:
+                self._sweep_models[key] = Model(sweeping.prepared(self.system, plan)) if key else self.model
+            return sweeping.solve(self._sweep_models[key], plan, self.case.run, values, threads)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
+        from surfacechem.format.sweep import read_sweep, read_until
+
+        section = self.case.sweep
+        given = {"over": {path: _listed(values) for path, values in (over or {}).items()}, "until": dict(until or {})}
+        if over is not None:
+            section = read_sweep(from_plain({"over": given["over"]}, Place(path="sweep")), section)
+        if until is not None and section is not None:
+            section = replace(section, until=read_until(from_plain(given["until"], Place(path="sweep.until"))))
+        if section is None:
+            raise InputError("a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.")
+        return section.plan(self._units)
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
+        """Units of all that a run may change, by path, parameters at their defaults among them."""
+        system = self.system
+        return {**{path: spec.unit for path, (spec, _) in system.constants.items()}, **system.changeable}
+
+    def _with_freed(self, values: Mapping[str, float]) -> Simulation:
+        """The simulation in whose equations stand symbols for the defaults that values depart from: the case with these
+        values, assembled anew; itself where no default is departed from.
+        """
+        constants = self.system.constants
+        departing = {path: x for path, x in values.items() if path in constants and x != constants[path][1]}
+        if not departing:
+            return self
+        paths = frozenset(departing)
+        if paths not in self._freed:
+            case = self.case
+            freed = cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides=departing)
+            self._freed[paths] = Simulation(replace(freed, run=case.run, file=case.file))
+        return self._freed[paths]
+
+    def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:
+        units = self._units
+        changes = {parameter_path(path, units): value for path, value in changes.items()}
+        unknown = next((path for path in changes if path not in units), None)
+        if unknown is not None:
+            raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable)}")
+        return {path: parse(value, units[path], name=path) for path, value in changes.items()}
+
+
+def _besides(default: float, values: Sequence[float]) -> float:
+    """The first value that is not the default, else the next number."""
+    return next((value for value in values if value != default), math.nextafter(default, math.inf))
+
+
+def _listed(values: object) -> object:
+    """Arrays as lists."""
+    return values.tolist() if isinstance(values, np.ndarray) else values

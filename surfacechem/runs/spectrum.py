@@ -1,0 +1,137 @@
+r"""Force spectra: at which value of a growing load bonds break, from the run itself.
+
+Along a run in which a prescribed variable x grows, the survival is :math:`S=\phi/\phi_i` and the density of ruptures
+:math:`-dS/dx`. The median is where S crosses one half, the mode where the density is largest, and both are located as
+events; the mean is :math:`x_0+\int S\,dx`, integrated beside the state.
+
+Source: Evans & Ritchie (1997), Biophys. J. 72, 1541-1555, doi 10.1016/S0006-3495(97)78802-7.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import symengine
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, derivative
+from surfacechem.model.system import Account, Margin, Named, System
+from surfacechem.quantities import Quantity
+from surfacechem.solve.run import Trajectory
+
+BROKEN = 1e-12
+"""Survival below which a run has ruptured and ends."""
+
+INTACT = 1e-6
+"""With more survivors at the end the mean is not known."""
+
+MEDIAN, MODE = "half of the bonds are broken", "the density of ruptures is stationary"
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Mode, median and mean of the load at rupture."""
+
+    mode: float
+    median: float
+    mean: float
+
+
+def history(system: System, variable: str) -> Expression:
+    """A prescribed variable that is a straight line in time, as an expression; InputError for any other."""
+    named = next((item for item in system.named if item.name == variable), None)
+    if named is None:
+        raise InputError(f"no law reads a prescribed {variable}.")
+    expression = system.expand(named.expression)
+    moving = {x for state in system.states for x in (state.symbol, state.dot)}
+    if expression.free_symbols & moving or not _is_line(expression, system.t):
+        raise InputError(f"{variable} is no ramp; give it one under `loading`: {{ramp: {{rate: ...}}}}.")
+    return expression
+
+
+def _is_line(expression: Expression, t: Any) -> bool:
+    slope = derivative(expression, t)
+    return slope != 0 and t not in slope.free_symbols
+
+
+def evolves_bonds(system: System) -> bool:
+    """Whether bonds evolve."""
+    phi = symengine.Symbol("phi")
+    return bool(system.expand(phi).free_symbols & {state.symbol for state in system.states})
+
+
+def breaks_bonds(system: System) -> bool:
+    """Whether bonds evolve that only break, so that each has one force at which it does."""
+    return evolves_bonds(system) and not _forms_bonds(system)
+
+
+def _forms_bonds(system: System) -> bool:
+    """Whether bonds form where there are none: then the loss of bonds is no count of ruptures."""
+    names = {state.symbol for state in system.states if state.name == "phi" or state.name.startswith("theta_")}
+    gone = _total(system, system.expand(symengine.Symbol("phi"))).subs(dict.fromkeys(names, 0))
+    point = {p.symbol: p.at(0.0) for p in system.parameters} | {s.symbol: s.initial for s in system.states}
+    point |= {s.dot: 0 for s in system.states} | {system.t: 0}
+    value = symengine.sympify(gone).subs(point)
+    return bool(names) and not value.free_symbols and float(value) > 0
+
+
+def with_rupture(system: System, variable: str) -> System:
+    """The system that also records where its bonds break as the variable grows, and ends when all are broken."""
+    unit = next(item.quantity.unit for item in system.named if item.name == variable)
+    speed = derivative(history(system, variable), system.t)
+    survival = _survival(system)
+    falling = _total(system, survival)
+    left = Quantity("survival", "1", "bonds that are left, of those at the start")
+    density = Quantity(f"density_{variable}", f"1/{unit}", f"density of ruptures over {variable}")
+    mean = Quantity(f"mean_{variable}", unit, f"integral of the survival over {variable}")
+    return replace(
+        system,
+        named=(*system.named, Named(left, survival), Named(density, -falling / speed)),
+        ledger=(*system.ledger, Account(mean, survival * speed, "statistics")),
+        margins=(
+            *system.margins,
+            Margin("intact", survival - BROKEN, "all bonds broke"),
+            Margin("median", survival - 0.5, MEDIAN, terminal=False),
+            Margin("mode", _total(system, falling), MODE, terminal=False),
+        ),
+    )
+
+
+def _survival(system: System) -> Expression:
+    """Bonding state over its initial value, which is a parameter."""
+    phi = system.expand(symengine.Symbol("phi"))
+    paths = {p.path: p.symbol for p in system.parameters}
+    start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
+    return phi / phi.subs(start)
+
+
+def _total(system: System, expression: Expression) -> Expression:
+    """Time derivative along a run; rates of bonds are put in where they are known, as they are better than slopes."""
+    bonds = {account.law: system.expand(account.rate) for account in system.ledger if account.kind == "bonds"}
+    total = derivative(expression, system.t)
+    for state in system.states:
+        total += derivative(expression, state.symbol) * bonds.get(state.name, state.dot)
+    return total
+
+
+def statistics(trajectory: Trajectory, variable: str) -> Statistics:
+    """Statistics of a run of a system :func:`with_rupture`; not a number where the run does not tell."""
+    model, result = trajectory.model, trajectory.result
+    names = [item.name for item in model.system.outputs]
+    column, density = names.index(variable), names.index(f"density_{variable}")
+    told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.transitions)]
+    reasons = np.array(told)[result.events.index]
+    at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
+    halves, peaks = at[reasons == MEDIAN], np.concatenate([trajectory.outputs[:1], at[reasons == MODE]])
+    end = model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
+    survivors = end[names.index("survival")]
+    accounts = [account.quantity.name for account in model.system.ledger]
+    integral = result.ledger[accounts.index(f"mean_{variable}")]
+    return Statistics(
+        mode=float(peaks[np.argmax(peaks[:, density]), column]),
+        median=float(halves[0, column]) if len(halves) else math.nan,
+        mean=float(trajectory.outputs[0, column] + integral) if survivors < INTACT else math.nan,
+    )

@@ -1,0 +1,207 @@
+"""Cantera's ReactorNet under the contract, and the reactor that holds a system of ours in a network.
+
+Cantera has one absolute tolerance for all variables, so each variable is counted in units of its own tolerance. Values
+inside the last step come from the integrator's own polynomial, whose derivatives it gives at the end of the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Self
+
+import cantera
+import numpy as np
+
+from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.adapters.reduced import Reduced
+from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
+from surfacechem.solve.contract import Array
+
+LONGEST = 0.1
+"""Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
+
+SMALLEST = 1e-290
+"""Absolute tolerances below this count as this."""
+
+CONTENTS = """
+phases:
+- name: interface
+  thermo: ideal-surface
+  kinetics: surface
+  species: [open, {names}]
+  reactions: all
+  site-density: 1.0 kmol/m^2
+species:
+- {{name: open, composition: {{}}, thermo: {{model: constant-cp}}}}
+{species}
+reactions:
+{reactions}
+"""
+
+
+def contents(reactions: Sequence[str] = ("bond",)) -> Any:
+    """A Cantera surface that stands for a scene: one reaction for each of ours, to carry its multiplier."""
+    species = (f"- {{name: {name}, composition: {{}}, thermo: {{model: constant-cp}}}}" for name in reactions)
+    entries = (f"- {{equation: open => {name}, rate-constant: {{A: 0, b: 0, Ea: 0}}}}" for name in reactions)
+    text = CONTENTS.format(names=", ".join(reactions), species="\n".join(species), reactions="\n".join(entries))
+    return cantera.Interface(yaml=text, name="interface")
+
+
+class BackOffError(Exception):
+    """There are no rates here, but a shorter step may end where there are."""
+
+
+class HeldReactor(cantera.ExtensibleReactor):
+    """A reactor whose state and rates are not Cantera's. The only place that knows how Cantera calls its hooks.
+
+    Its variables, their number and their rates are what a subclass states. Once they have raised anything but
+    BackOffError, they raise it for good, since Cantera repeats a failed evaluation with ever smaller steps.
+    """
+
+    surface: Any
+    names: tuple[str, ...]
+    error: Exception | None = None
+    asked: float = 0.0
+    """Time of the last evaluation [s]: after a step of the integrator, its end."""
+
+    def __new__(cls, surface: Any, *_: Any, name: str = "(none)") -> Self:
+        """Keep the surface itself, which Cantera does not: a clone would have lost what Python knows of it."""
+        made = super().__new__(cls, surface, clone=False, name=name)  # type: ignore[call-arg]
+        made.surface = surface
+        return made
+
+    def start(self) -> Array:
+        """Present values of the variables."""
+        raise NotImplementedError
+
+    def put(self, x: Array) -> None:
+        """Take over values of the variables."""
+
+    def rates(self, t: float) -> Array:
+        """Time derivatives of the variables at time t [s], for the values last put."""
+        raise NotImplementedError
+
+    def attempt(self, evaluate: Callable[[], Array]) -> Array:
+        """What Cantera asks for; an error is raised again whenever it asks for more."""
+        if self.error is not None:
+            raise self._failure(self.error)
+        try:
+            return evaluate()
+        except BackOffError:
+            raise
+        except Exception as error:
+            self.error = error
+            raise self._failure(error) from None
+
+    def _failure(self, error: Exception) -> Exception:
+        """What Cantera is told: a new exception each time, whose traceback holds nothing."""
+        return cantera.CanteraError(f"{type(error).__name__}: {error}")
+
+    # -- Cantera 3.2's hooks ---------------------------------------------------------------------------------------
+
+    def replace_initialize(self, _start: float) -> None:
+        self.n_vars = len(self.names)
+
+    def replace_get_state(self, y: Any) -> None:
+        y[:] = self.start()
+
+    def replace_update_state(self, y: Any) -> None:
+        self.put(np.array(y))
+
+    def replace_update_connected(self, _pressure: bool) -> None:
+        """Nothing of the contents is read by others."""
+
+    def replace_eval(self, t: float, lhs: Any, rhs: Any) -> None:
+        lhs[:] = 1.0
+        self.asked = t
+        rhs[:] = self.attempt(lambda: self.rates(t))
+
+    def replace_component_name(self, i: int) -> str:
+        return self.names[i]
+
+    def replace_component_index(self, name: str) -> int:
+        return self.names.index(name)
+
+
+class _SystemReactor(HeldReactor):
+    """The equations of a stretch, in units of their tolerances."""
+
+    def __init__(self, surface: Any, view: View, x: Array) -> None:
+        super().__init__(surface)
+        self.view = view
+        self.evaluation = Evaluation(view.problem.program, view.guess, view.parameters)
+        self.unit = np.maximum(Reduced(view).atol, SMALLEST)
+        self.scaled = x / self.unit
+        self.names = tuple(f"x{i}" for i in range(len(x)))
+
+    def start(self) -> Array:
+        return self.scaled
+
+    def put(self, x: Array) -> None:
+        self.scaled = x
+
+    def rates(self, t: float) -> Array:
+        self.view.residuals += 1
+        if not self.evaluation.put(t, self.scaled * self.unit):
+            raise BackOffError("no consistent state")
+        return np.asarray(self.evaluation.ydot[self.evaluation.free] / self.unit)
+
+
+TINIEST = 1e-15
+"""Part of the end of a run that a step may go beyond it."""
+
+
+class _Stretch(Method):
+    def __init__(self, view: View, t: float, end: float, y: Array) -> None:
+        self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y))
+        self.net = cantera.ReactorNet([self.reactor])
+        self.net.rtol, self.net.atol = view.problem.rtol, 1.0
+        self.net.initial_time = t
+        self.longest = min(LONGEST * (end - t), view.problem.spacing)
+        self.t, self.end = t, end
+        self.polynomial = np.zeros((1, len(self.reactor.names)))
+
+    def advance(self) -> float:
+        try:
+            # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
+            self.net.max_time_step = min(self.longest, max(self.end - self.t, TINIEST * self.end))
+            self.t = float(self.net.step())
+            order = int(self.net.solver_stats["last_order"])
+            factorial = 1.0
+            rows = []
+            for k in range(order + 1):
+                factorial *= max(k, 1)
+                rows.append(np.asarray(self.net.get_derivative(k)) / factorial)
+        except (cantera.CanteraError, ArithmeticError) as error:
+            raise StepError(str(error)) from error
+        self.polynomial = np.array(rows)
+        return self.t
+
+    def at(self, t: float) -> Array:
+        value = np.zeros(self.polynomial.shape[1])
+        for row in self.polynomial[::-1]:
+            value = row + (t - self.t) * value
+        return value * self.reactor.unit
+
+    @property
+    def factorizations(self) -> int:
+        return int(self.net.solver_stats["lin_solve_setups"])
+
+    @property
+    def own_jacobians(self) -> int:
+        return int(self.net.solver_stats["jac_evals"])
+
+    @property
+    def rejected(self) -> int:
+        stats = self.net.solver_stats
+        return int(stats["err_test_fails"] + stats["nonlinear_conv_fails"])
+
+
+class CanteraSolver(SteppingSolver):
+    """BDF of variable order in Cantera's ReactorNet; algebraic variables are eliminated inside the right-hand side."""
+
+    name = "cantera"
+    counts_rejected = True
+
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
+        return _Stretch(view, t, end, y)

@@ -1,0 +1,75 @@
+"""SciPy's LSODA, BDF and Radau under the contract."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from scipy.integrate import BDF, LSODA, OdeSolver, Radau
+
+from surfacechem.solve.adapters.reduced import Reduced
+from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
+from surfacechem.solve.contract import Array
+
+SMALLEST_RTOL = 100 * np.finfo(float).eps
+"""SciPy raises smaller tolerances to this with a warning."""
+
+
+class _Stretch(Method):
+    def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
+        system = Reduced(view)
+        options: dict[str, Any] = {
+            "rtol": max(view.problem.rtol, SMALLEST_RTOL),
+            "atol": system.atol,
+            "jac": system.jacobian,
+            "max_step": view.problem.spacing,
+        }
+        try:
+            self.solver = kind(system.rates, t, system.start(y), end, **options)
+        except (ValueError, ArithmeticError) as error:
+            raise StepError(str(error)) from error
+        self.dense: Any = None
+
+    def advance(self) -> float:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            try:
+                message = self.solver.step()
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+                raise StepError(str(error)) from error
+        if self.solver.status == "failed":
+            raise StepError(str(message))
+        self.dense = self.solver.dense_output()
+        return float(self.solver.t)
+
+    def at(self, t: float) -> Array:
+        return np.asarray(self.solver.y if t == self.solver.t else self.dense(t))
+
+    @property
+    def factorizations(self) -> int:
+        return int(self.solver.nlu)
+
+
+class SciPySolver(SteppingSolver):
+    """One method of ``scipy.integrate``; algebraic variables are eliminated inside the right-hand side."""
+
+    def __init__(self, name: str, kind: type[OdeSolver]) -> None:
+        self.name = name
+        self.kind = kind
+
+    def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
+        return _Stretch(self.kind, view, t, end, y)
+
+
+def lsoda() -> SciPySolver:
+    """Adams and BDF with switching, from ODEPACK."""
+    return SciPySolver("lsoda", LSODA)
+
+
+def bdf() -> SciPySolver:
+    """BDF of variable order."""
+    return SciPySolver("bdf", BDF)
+
+
+def radau() -> SciPySolver:
+    """Radau IIA of order 5."""
+    return SciPySolver("scipy-radau", Radau)

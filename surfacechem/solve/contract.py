@@ -1,0 +1,249 @@
+"""What a solver is given and what it hands back.
+
+A problem is a fully implicit system of index one, G(t, y, ydot; p) = 0, linear in ydot, over segments with their own
+parameters. Time breakpoints end a step; margins that cross zero stop the run or end a step; a ledger of quadratures
+is integrated beside the state, outside the error norm. A result always carries a status and its reason in words.
+"""
+
+import copy
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile.program import Program
+
+Array = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    FINISHED = 0
+    EVENT = 1
+    STEP_UNDERFLOW = 2
+    MAX_STEPS = 3
+    NOT_FINITE = 4
+    NO_CONSISTENT_STATE = 5
+    SINGULAR = 6
+    STOPPED = 7
+    FAILED = 8
+
+    @property
+    def success(self) -> bool:
+        return self in (Status.FINISHED, Status.EVENT)
+
+
+REASONS = {
+    Status.FINISHED: "reached the end",
+    Status.EVENT: "a terminal margin reached zero",
+    Status.STEP_UNDERFLOW: "the step size fell to rounding level; the solution may end here",
+    Status.MAX_STEPS: "the number of steps allowed was used up",
+    Status.NOT_FINITE: "the equations or their derivatives are not finite here",
+    Status.NO_CONSISTENT_STATE: "no values of the algebraic variables satisfy the equations here",
+    Status.SINGULAR: "the equations do not determine the derivatives and algebraic variables here (singular matrix)",
+    Status.STOPPED: "the time allowed for the run was used up",
+    Status.FAILED: "the library failed",
+}
+
+
+@dataclass(frozen=True)
+class Margin:
+    """What happens where a margin crosses zero; direction -1 is falling, +1 rising, 0 both.
+
+    A margin that has just fired fires again only after it has left zero. A limit, terminal and falling, that is zero
+    or below at a start fires at once where it falls, with the state of the start, and not where it rises; one that
+    touches zero without crossing it has reached it.
+    """
+
+    terminal: bool
+    direction: int = -1
+    smooth: bool = False
+    """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
+    to_pass: bool = False
+    """Whether it has to be passed: touched, or passed for a moment by less than the tolerance, it holds."""
+
+    @classmethod
+    def stop(cls) -> "Margin":
+        """The run ends where the margin falls to zero."""
+        return cls(terminal=True)
+
+    @classmethod
+    def bear(cls) -> "Margin":
+        """The run ends where the margin falls below zero."""
+        return cls(terminal=True, to_pass=True)
+
+    @classmethod
+    def restart(cls, direction: int = 0) -> "Margin":
+        """A kink: a step ends there and the run goes on."""
+        return cls(terminal=False, direction=direction)
+
+    @classmethod
+    def peak(cls) -> "Margin":
+        """A narrow peak: a step ends there that is short enough to have seen it."""
+        return cls(terminal=False, direction=0, smooth=True)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One initial value problem; algebraic entries of y0 are first guesses."""
+
+    program: Program
+    y0: Array
+    times: Array
+    """Output times, strictly increasing, within the segments; may be empty."""
+    segments: Array
+    """Breakpoints t_0 < ... < t_end."""
+    parameters: Array
+    """One parameter vector a segment."""
+    rtol: float
+    atol: Array
+    margins: tuple[Margin, ...] = ()
+    max_steps: int = 100_000
+    max_seconds: float | None = None
+    record_steps: bool = False
+    exchanged: Array | None = None
+    """What each quadrature amounted to at most before, where the problem continues another."""
+    seen: Array | None = None
+    """How large each margin was at most before, where the problem continues another."""
+    spacing: float = np.inf
+    """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
+    goes_on: bool = False
+    """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
+
+    def __post_init__(self) -> None:
+        n, segments = self.program.n, len(self.segments) - 1
+        require = self._require
+        require(self.y0.shape == (n,), "y0 has shape {0.y0.shape}; the program has {0.program.n} states.")
+        require(
+            self.atol.shape == (n,),
+            "atol has shape {0.atol.shape}; it needs one entry for each of {0.program.n} states.",
+        )
+        require(segments >= 1 and _increase(self.segments), "segments must be increasing breakpoints, at least two.")
+        require(
+            self.parameters.shape == (segments, self.program.n_parameters),
+            "parameters have shape {0.parameters.shape}; one vector of {0.program.n_parameters} a segment is needed.",
+        )
+        require(_increase(self.times), "output times must increase strictly.")
+        inside = len(self.times) == 0 or (self.times[0] >= self.segments[0] and self.times[-1] <= self.segments[-1])
+        require(inside, "output times must lie within the segments.")
+        require(len(self.margins) == self.program.n_margins, "{0.program.n_margins} margins need as many kinds.")
+        require(
+            0.0 < self.rtol < 1.0 and bool((self.atol >= 0.0).all()),
+            "rtol must lie in (0, 1) and atol must not be negative.",
+        )
+
+    def with_program(self, program: Program | None) -> "Problem":
+        """The same with other machine code; without any it is no more than data, as a pickle needs it."""
+        other = copy.copy(self)
+        object.__setattr__(other, "program", program)
+        return other
+
+    def _require(self, condition: bool, message: str) -> None:
+        """Raise ValueError; the message is made up only then, as a run may be brief."""
+        if not condition:
+            raise ValueError(message.format(self))
+
+
+def _increase(times: Array) -> bool:
+    """Whether each is beyond the one before."""
+    return len(times) < 2 or bool((times[1:] > times[:-1]).all())
+
+
+class Counters(NamedTuple):
+    """What a run cost."""
+
+    steps: int = 0
+    rejected: int = 0
+    residuals: int = 0
+    jacobians: int = 0
+    factorizations: int = 0
+    iterations: int = 0
+
+
+@dataclass(frozen=True)
+class Points:
+    """States at a row of times: steps or events."""
+
+    t: Array
+    y: Array
+    ydot: Array
+    ledger: Array
+    segment: NDArray[np.int64] | None = field(default=None, kw_only=True)
+    """Segment of each, where several lie so close that their times do not tell."""
+
+
+@dataclass(frozen=True)
+class Events(Points):
+    """Events in order of time; ``index`` is the margin that crossed zero. Coincident ones have a row each."""
+
+    index: NDArray[np.int64] = field(kw_only=True)
+
+
+@dataclass(slots=True)
+class Result:
+    """A trajectory up to where it ended. Outputs beyond the stop are absent."""
+
+    problem: Problem
+    status: Status
+    t: float
+    """The time reached: the end, the terminal event, or the last good state."""
+    y: Array
+    ydot: Array
+    ledger: Array
+    margins: Array
+    """Margins at the end; where a run stalls, the one nearest zero is a hint at the reason."""
+    times: Array
+    outputs: Array
+    ledger_outputs: Array
+    events: Events
+    counters: Counters
+    steps: Points | None = None
+    note: str = ""
+    """What a library said of its failure."""
+    stepping: float = float("nan")
+    """Time inside a library's own steps [s], without outputs and events; NaN for a method that does them itself."""
+    segment: NDArray[np.int64] | None = None
+    """Segment of each output, where their times do not tell."""
+
+    def segments_at(self, t: Array, known: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+        """Segment of each time; a breakpoint belongs to the one that it ends."""
+        return np.searchsorted(self.problem.segments[1:-1], t, side="left") if known is None else known
+
+    @property
+    def success(self) -> bool:
+        return self.status.success
+
+    @property
+    def message(self) -> str:
+        """The status in words, with the time and the margin concerned; an adapter adds what its library says."""
+        text = f"{REASONS[self.status]} (t = {self.t:.9g})"
+        if self.note:
+            return f"{text}: {self.note}"
+        if self.status is Status.EVENT:
+            margins = self.problem.margins
+            return f"{text}: margin {next(int(i) for i in reversed(self.events.index) if margins[i].terminal)}"
+        if not self.success and len(self.margins) and np.all(np.isfinite(self.margins)):
+            nearest = int(np.argmin(np.abs(self.margins)))
+            return f"{text}; nearest margin: {nearest} = {self.margins[nearest]:.3g}"
+        return text
+
+
+class Solver(ABC):
+    """A method for problems; stateless, hence shared between threads."""
+
+    name: str
+    counts_rejected = True
+    """Whether it is known how many steps the method has rejected."""
+
+    def prepare(self) -> None:  # noqa: B027 - most methods need nothing
+        """Load what the first solve needs, so that it does not count as run time."""
+
+    @abstractmethod
+    def solve(self, problem: Problem) -> Result:
+        """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong
+        number.
+        """

@@ -1,0 +1,111 @@
+"""Why a run could not go on: which margin closes there, or which state runs away."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile.program import Program
+from surfacechem.model.system import STABLE, Margin, State, System
+from surfacechem.solve.contract import REASONS, Points, Result, Status
+from surfacechem.solve.pacing import too_fast
+
+Array = NDArray[np.float64]
+
+STALLED = 1e-3
+"""A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
+left to close, explains why a run cannot go on."""
+
+GONE = 1e-30
+"""A margin that has shrunk to this part of its largest value is closed for all that can be told, at any speed."""
+
+RESOLVED = 1e-14
+"""Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
+
+RUNAWAY = 1e-9
+"""Part of the time that has passed within which a state that runs away would change by itself."""
+
+BOUNDLESS = 1e12
+"""Size of a state that runs away, in units of its scale."""
+
+SMALL = 1e-6
+"""Size of a state that is none, in units of its scale."""
+
+
+def cause(
+    system: System, program: Program, margins: Sequence[Margin], result: Result, values: Mapping[str, float]
+) -> tuple[str, str]:
+    """Status of a run that could not go on, and why, in words."""
+    where = f"t = {result.t:.9g} s"
+    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
+    inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
+    shrunk = closest_margin(program, margins, result)
+    if shrunk is not None:
+        return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
+    algebraic = [state for state in system.states if state.algebraic]
+    if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
+        names = " and ".join(state.at_start[0].name for state in algebraic)
+        reason = f"no {names} satisfies the balances that have no inertia or capacity"
+        if all(state.quantity.unit == "K" for state in algebraic):
+            stable = next(margin for margin in system.margins if margin.name == f"{STABLE}{algebraic[0].name}")
+            reason = system.reason(stable, np.nan_to_num(inputs))
+        elif any(state.quantity.unit == "K" for state in algebraic):
+            reason += ": ignition, or sliding that nothing steadies"
+        return "stopped", f"{reason} at {where}"
+    if (fast := runaway(system.states, result)) is not None:
+        return "stopped", f"{fast} near {where}"
+    return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
+
+
+def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
+    """The margin that is closed, or all but closed and goes on closing, where a run could not go on."""
+    if program.margins is None or not margins:
+        return None
+    count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
+    terminal = np.array([margin.terminal for margin in margins])
+    last = _values(program, result, end, side="right")[0, :count]
+    if np.any(closed := terminal & (last <= 0)):
+        return margins[int(np.argmax(closed))]
+    if result.steps is None or len(result.steps.t) < 2:
+        return None
+    seen, t = _values(program, result, result.steps)[:, :count], result.steps.t
+    before = max(int(np.searchsorted(t, t[-1] * (1 - RESOLVED))) - 1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shrink = seen[-1] / np.max(np.abs(seen), axis=0)
+        left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
+    closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < GONE))
+    nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
+    return margins[nearest] if closing[nearest] and shrink[nearest] < STALLED else None
+
+
+def _values(program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:
+    """Margins at all steps, shape (steps, margins); at a breakpoint those of the piece on one side of it."""
+    assert program.margins is not None
+    segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
+    inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]
+    return np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
+
+
+def runaway(states: Sequence[State], result: Result) -> str | None:
+    """The state that changes so fast that time cannot resolve it, where a run could not go on."""
+    if result.status not in (Status.STEP_UNDERFLOW, Status.NOT_FINITE, Status.SINGULAR):
+        return None
+    scales = np.array([state.scale for state in states])
+    beyond = np.abs(result.y) / scales
+    if np.max(beyond) > BOUNDLESS:
+        j = int(np.argmax(beyond))
+        return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
+    with np.errstate(over="ignore", invalid="ignore"):
+        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
+    j = int(np.argmax(speed))
+    if not speed[j] * result.t > 1 / RUNAWAY:
+        return None
+    if states[j].given is not None:
+        # A velocity without inertia takes the age of the contact with it.
+        names = [state.at_start[0].name for state in states if state.given and (state.algebraic or state is states[j])]
+        return f"{names[0]} runs away, faster and faster"
+    unit = states[j].quantity.unit
+    return f"{states[j].name} runs away: it changes by {result.ydot[j]:.3g} {unit}/s, faster and faster"

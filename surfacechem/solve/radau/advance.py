@@ -1,0 +1,227 @@
+"""One accepted step: trial steps with error control, and the bookkeeping of accepting one."""
+
+from typing import Any
+
+from surfacechem.solve.contract import Status
+from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
+from surfacechem.solve.radau.dense import integrate_ledger, keep_correction
+from surfacechem.solve.radau.newton import (
+    CONVERGED,
+    NOT_FINITE,
+    differentiate_system,
+    divide,
+    end_of_step,
+    factor_newton,
+    predict,
+    solve_stages,
+    stage_count,
+)
+from surfacechem.solve.radau.step import (
+    TINIEST,
+    choose_member,
+    convergent_size,
+    estimate_again,
+    estimate_error,
+    next_size,
+    preferred_member,
+    set_weights,
+)
+from surfacechem.solve.radau.work import (
+    BASE,
+    CALM,
+    CONTRACTION,
+    FRESH,
+    H_FACTORED,
+    H_JACOBIAN,
+    H_LAST,
+    LAST_MEMBER,
+    LEDGER,
+    MEMBER,
+    OFFSET,
+    PIVOT,
+    REFUSED,
+    REJECTED,
+    RTOL,
+    SCALE,
+    STEPS,
+    TAU,
+    THETA,
+    TRIAL,
+    TRIAL_DOT,
+    YDOT,
+    Q,
+    Y,
+    compiled,
+    copy,
+    evaluate,
+    set_inputs,
+)
+
+INVALID, OLD, CURRENT = range(3)
+"""Whether the Jacobian in the workspace was taken nowhere, at an earlier state, or at the current one."""
+
+SLOW, SLOW_REJECTED = 0.8, 0.3
+"""Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
+
+LASTS = 10.0
+"""Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
+corrections are small whatever is left to correct.
+"""
+
+GOOD = -1
+STEP_UNDERFLOW = int(Status.STEP_UNDERFLOW)
+MAX_STEPS = int(Status.MAX_STEPS)
+NONFINITE = int(Status.NOT_FINITE)
+NO_CONSISTENT = int(Status.NO_CONSISTENT_STATE)
+SINGULAR = int(Status.SINGULAR)
+STOPPED = int(Status.STOPPED)
+
+
+@compiled
+def restart(w: Any) -> int:
+    """Make the state consistent and forget the past; time starts from zero."""
+    n = w.algebraic.shape[0]
+    w.clock[BASE] += w.clock[TAU]
+    w.clock[TAU] = w.clock[H_LAST] = w.clock[H_FACTORED] = 0.0
+    w.clock[CONTRACTION] = 1.0
+    w.count[CALM] = 0
+    w.count[REFUSED] = min(w.count[REFUSED], w.count[STEPS] // 2)
+    w.count[FRESH] = INVALID
+    w.count[MEMBER] = preferred_member(w.clock[RTOL])
+    for j in range(n):
+        w.vector[TRIAL, j] = w.vector[Y, j]
+        w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
+    w.inputs[0] = w.clock[BASE]
+    outcome = find_consistent(w)
+    if outcome != CONSISTENT:
+        return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
+    for j in range(n):
+        w.vector[Y, j] = w.vector[TRIAL, j]
+        w.vector[YDOT, j] = w.vector[TRIAL_DOT, j]
+    if w.ledger.shape[1] > 0:
+        set_inputs(w, w.vector[Y], w.vector[YDOT])
+        evaluate(w, LEDGER, w.rates[7].ctypes.data)
+    set_weights(w)
+    return GOOD
+
+
+@compiled
+def _prepare(w: Any, h: float, foresee: bool) -> int:
+    """Newton matrices for this step size, kept where they still serve."""
+    if w.clock[H_FACTORED] == h:
+        return GOOD
+    outgrown = w.clock[THETA] >= 1e-3 or h > LASTS * w.clock[H_JACOBIAN]
+    if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and outgrown):
+        if not differentiate_system(w, h, foresee):
+            return NONFINITE
+        w.count[FRESH] = CURRENT
+        w.clock[H_JACOBIAN] = h
+    w.clock[H_FACTORED] = 0.0
+    copy(w.vector[SCALE], w.vector[PIVOT])
+    if not factor_newton(w, h):
+        return SINGULAR
+    w.clock[H_FACTORED] = h
+    return GOOD
+
+
+@compiled
+def too_small(w: Any, h: float) -> bool:
+    """Whether the step no longer moves time."""
+    return not (h > TINIEST and h > 4e-16 * w.clock[TAU])
+
+
+@compiled
+def advance(
+    w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
+) -> tuple[int, float, float, float]:
+    """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
+    repeated = w.clock[H_LAST] == 0.0
+    singular, failed = 0, False
+    while True:
+        if too_small(w, h):
+            return STEP_UNDERFLOW, h, 0.0, h
+        if w.count[STEPS] + w.count[REJECTED] >= max_steps:
+            return MAX_STEPS, h, 0.0, h
+        if stop[0] != 0:
+            return STOPPED, h, 0.0, h
+        predict(w, h)
+        outcome = _prepare(w, h, not failed)
+        if outcome == NONFINITE:
+            return outcome, h, 0.0, h
+        if outcome == SINGULAR:
+            singular += 1
+            if singular > 12:
+                return SINGULAR, h, 0.0, h
+            w.count[FRESH] = INVALID
+            failed = True
+            h *= 0.37
+            continue
+        outcome = solve_stages(w, h)
+        if outcome == CONVERGED:
+            norm = estimate_error(w, h)
+            if norm >= 1.0 and repeated:
+                norm = min(norm, estimate_again(w))
+            if norm < 1.0:
+                proposed = next_size(w, h, norm, size_last, norm_last)
+                return GOOD, h, norm, min(h, proposed) if failed else proposed
+            smaller = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
+        else:
+            smaller = h * (0.1 if outcome == NOT_FINITE else 0.4)
+            failed = True
+        w.count[REJECTED] += 1
+        if outcome != CONVERGED and w.count[FRESH] == OLD:
+            w.count[FRESH] = INVALID
+            w.clock[H_FACTORED] = 0.0
+            continue
+        if outcome != CONVERGED:
+            w.count[FRESH] = INVALID
+        choose_member(w, SLOW_REJECTED)
+        w.clock[H_FACTORED] = 0.0
+        repeated = True
+        h = smaller
+
+
+@compiled
+def finish_step(w: Any, h: float) -> None:
+    """What interpolation inside the step needs beyond the stages."""
+    keep_correction(w)
+    if w.ledger.shape[1] > 0:
+        integrate_ledger(w, h)
+
+
+@compiled
+def store_polynomial(w: Any, h: float, offset: float) -> None:
+    """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
+    k = w.count[MEMBER]
+    for i in range(stage_count(k)):
+        copy(w.z[i], w.z_last[i])
+    for m in range(w.algebraic.shape[0]):
+        divide(k, w.z, m, w.z_polynomial[m])
+    w.clock[H_LAST] = h
+    w.clock[OFFSET] = offset
+    w.count[LAST_MEMBER] = w.count[MEMBER]
+
+
+@compiled
+def accept(w: Any, h: float) -> None:
+    """Move to the end of the step."""
+    last = stage_count(w.count[MEMBER]) - 1
+    end_of_step(w, h, Y, YDOT, Q)
+    copy(w.rates[last], w.rates[7])
+    w.clock[TAU] += h
+    w.count[STEPS] += 1
+    w.count[FRESH] = min(w.count[FRESH], OLD)
+    set_weights(w)
+
+
+@compiled
+def keep_matrices(w: Any, h: float, proposed: float) -> float:
+    """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
+    proposed = min(proposed, convergent_size(w, h))
+    if choose_member(w, SLOW):
+        w.clock[H_FACTORED] = 0.0
+    elif w.clock[THETA] < 1e-3 and h <= proposed <= 1.2 * h:
+        return h
+    if w.clock[THETA] >= 1e-3:
+        w.clock[H_FACTORED] = 0.0
+    return proposed

@@ -1,0 +1,173 @@
+"""Consistent states: the derivatives of the differential variables and the values of the algebraic ones from G(t, y,
+ydot) = 0.
+
+The unknowns enter one damped Newton iteration whose matrix has the column of G_ydot for a differential variable and
+that of G_y for an algebraic one; it is regular exactly when the system has index one.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solve.radau.chains import fold_chains, solve_real
+from surfacechem.solve.radau.lu import factor
+from surfacechem.solve.radau.roundoff import spread_noise
+from surfacechem.solve.radau.work import (
+    COLUMNS,
+    DELTA,
+    ERROR,
+    JACOBIAN,
+    NOISE,
+    RESIDUAL,
+    RHS,
+    TRIAL,
+    TRIAL_DOT,
+    compiled,
+    evaluate,
+    finite,
+    set_inputs,
+)
+
+CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
+LIMIT = 100
+ROUNDED = 8
+"""Corrections after which one that rounding explains is believed to be nothing else."""
+SMALLEST_PIVOT = 1e-15
+
+
+@compiled
+def _residual(w: Any) -> bool:
+    """Residual at the trial state into RHS."""
+    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
+    evaluate(w, RESIDUAL, w.vector[RHS].ctypes.data)
+    return bool(finite(w.vector[RHS]))
+
+
+@compiled
+def _chain_matrix(w: Any) -> None:
+    """Derivatives by the unknowns where chains are concerned; of a chain the rates are."""
+    core = w.real.shape[0]
+    for c in range(w.chains.shape[0]):
+        anchor = w.chains[c, 2]
+        for i in range(core):
+            w.real_border[i, c] = w.border_derivatives[1, i, c]
+        for i in range(w.chains[c, 0] - core, w.chains[c, 1] - core):
+            for side in range(3):
+                w.real_bands[i, side] = w.band_derivatives[1, i, side]
+            w.vector[COLUMNS, core + i] = 1.0
+        if anchor >= 0 and w.algebraic[anchor]:
+            w.real_bands[w.chains[c, 0] - core, 0] = w.band_derivatives[0, w.chains[c, 0] - core, 0]
+
+
+@compiled
+def _factor(w: Any) -> bool:
+    n = w.real.shape[0]
+    evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
+    for j in range(n):
+        largest = 0.0
+        for i in range(n):
+            w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
+        for i in range(n):
+            row = 0.0
+            for m in range(n):
+                row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]))
+            largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
+        w.vector[COLUMNS, j] = 1.0 / largest if largest > 0.0 else 1.0
+    if w.chains.shape[0] > 0:
+        _chain_matrix(w)
+        if not fold_chains(w.real, w.real_border, w.real_bands, w.chains):
+            return False
+    return bool(factor(w.real, w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT))
+
+
+@compiled
+def _correction(w: Any, delta: Any) -> float:
+    """Newton correction for the residual in RHS; returns its size in the algebraic variables."""
+    norm = 0.0
+    for j in range(delta.shape[0]):
+        delta[j] = -w.vector[RHS, j]
+    solve_real(w, delta)
+    for j in range(delta.shape[0]):
+        if w.algebraic[j]:
+            norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290))
+    return norm
+
+
+@compiled
+def _shift(w: Any, delta: Any, fraction: float) -> None:
+    for j in range(delta.shape[0]):
+        w.vector[TRIAL if w.algebraic[j] else TRIAL_DOT, j] += fraction * delta[j]
+
+
+@compiled
+def _size(w: Any, delta: Any, unit: Any) -> float:
+    """Size of a correction of the algebraic variables in these units; not a number where it is none."""
+    norm = 0.0
+    for j in range(delta.shape[0]):
+        if w.algebraic[j] and not abs(delta[j]) / unit[j] <= norm:
+            norm = abs(delta[j]) / unit[j]
+    return norm
+
+
+@compiled
+def _damped(w: Any, delta: Any) -> bool:
+    """Move as far along the correction as lets the next one by the same matrix be no larger; False if there is no such
+    move.
+
+    Residuals are no measure: those of rates are as large as what they divide by is small, and linear anyway.
+    Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural monotonicity test.
+    """
+    following, unit = w.g[1], w.vector[ERROR]
+    for j in range(delta.shape[0]):
+        unit[j] = abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290
+    before = _size(w, delta, unit)
+    fraction = 1.0
+    _shift(w, delta, 1.0)
+    for _halving in range(40):
+        if _residual(w):
+            _correction(w, following)
+            if _size(w, following, unit) <= before:
+                return True
+        fraction *= 0.5
+        _shift(w, delta, -fraction)
+    return False
+
+
+@compiled
+def _rounds(w: Any, delta: Any) -> bool:
+    """Whether a correction is no larger than what rounding of the equations makes of it."""
+    spread_noise(w, TRIAL, TRIAL_DOT)
+    largest = 0.0
+    for j in range(delta.shape[0]):
+        if w.algebraic[j]:
+            largest = max(largest, abs(delta[j]) - 2.0 * w.vector[NOISE, j])
+    return largest <= 0.0
+
+
+@compiled
+def find_consistent(w: Any) -> int:
+    """Make the trial state consistent at the time in the inputs."""
+    if not _residual(w):
+        return NOT_FINITE_STATE
+    delta = w.g[0]
+    nonlinear = False
+    for flag in w.algebraic:
+        nonlinear = nonlinear or flag
+    norm_last = np.inf
+    for iteration in range(LIMIT):
+        if not _factor(w):
+            return SINGULAR_STATE
+        norm = _correction(w, delta)
+        if not finite(delta):
+            return SINGULAR_STATE
+        # The system is linear in the derivatives: without algebraic variables one correction is exact.
+        if not nonlinear or norm <= 1e-15 or norm_last <= 1e-11:
+            _shift(w, delta, 1.0)
+            return CONSISTENT if _residual(w) else NOT_FINITE_STATE
+        if iteration >= ROUNDED and _rounds(w, delta):
+            return CONSISTENT
+        if not _damped(w, delta):
+            # At rounding level the corrections cannot fall any more.
+            return CONSISTENT if norm <= 1e-9 else NO_STATE
+        norm_last = norm
+    return NO_STATE

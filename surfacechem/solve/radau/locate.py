@@ -1,0 +1,343 @@
+"""Events: zeros of margins inside a step.
+
+Margins are examined at interior points of the step, since a high order steps over double crossings; a lowest point
+between them is looked for where it may reach zero. The first zero is bracketed on the corrected polynomial, then the
+step is repeated onto it with the full order of the method.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from surfacechem.solve.radau.advance import finish_step, store_polynomial
+from surfacechem.solve.radau.dense import interpolate_rate, keep_polynomial, put_scanned, scan_step
+from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
+from surfacechem.solve.radau.sides import crosses, falls_from_start, is_limit, kink_at, noise, passed_by, update_sides
+from surfacechem.solve.radau.step import estimate_error
+from surfacechem.solve.radau.tables import EDGE, SCANNED
+from surfacechem.solve.radau.work import (
+    BASE,
+    H_FACTORED,
+    M_BEFORE,
+    M_EARLIER,
+    M_HIGH,
+    M_LOW,
+    M_NOW,
+    M_PROBE,
+    M_SIDE,
+    M_SLOPE,
+    MARGINS,
+    MEMBER,
+    TAU,
+    TRIAL,
+    TRIAL_DOT,
+    any_true,
+    compiled,
+    copy,
+    evaluate,
+    set_inputs,
+)
+
+ALIKE = 1e3
+"""Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
+
+AT_START = -1.0
+
+
+@compiled
+def _margin_inside(w: Any, h: float, x: float, row: int) -> None:
+    """Margins at the fraction x of the step, from the polynomial."""
+    interpolate_rate(w, h, x)
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
+    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
+    evaluate(w, MARGINS, w.margin[row].ctypes.data)
+
+
+@compiled
+def _probe(w: Any, h: float, m: int, x: float) -> float:
+    _margin_inside(w, h, x, M_PROBE)
+    return float(w.margin[M_PROBE, m])
+
+
+@compiled
+def _may_reach(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> bool:
+    """Whether a smooth function of these values has a lowest point in between that may be zero."""
+    steepest = max((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
+    return at_b < at_a and at_b < at_c and at_b <= steepest * (c - a)
+
+
+@compiled
+def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> float:
+    """Lowest point of the parabola, or a point in the larger part where that is no progress."""
+    left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+    x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+    if a < x < c and abs(x - b) > 1e-2 * (c - a):
+        return x
+    return b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+
+
+@compiled
+def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bool, least: float) -> float:
+    """Where a margin is across zero by so much, or touches it, around a lowest point near b; -1 where it is not."""
+    side = w.margin[M_SIDE, m]
+    at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
+    for _iteration in range(80):
+        if at_b <= -least:
+            return b
+        if c - a <= 1e-8 * c or not _may_reach(a, b, c, at_a, at_b, at_c):
+            break
+        x = _vertex(a, b, c, at_a, at_b, at_c)
+        at_x = side * _probe(w, h, m, x)
+        if at_x < at_b and x > b:
+            a, at_a, b, at_b = b, at_b, x, at_x
+        elif at_x < at_b:
+            c, at_c, b, at_b = b, at_b, x, at_x
+        elif x > b:
+            c, at_c = x, at_x
+        else:
+            a, at_a = x, at_x
+    return b if touches and at_b <= noise(w, m) else -1.0
+
+
+@compiled
+def _dips(w: Any, h: float, kinds: Any, m: int, a: float, b: float, c: float) -> bool:
+    """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
+    side = w.margin[M_SIDE, m]
+    if not ((side == 1.0 and kinds[m, 1] <= 0) or (side == -1.0 and kinds[m, 1] >= 0)):
+        return False
+    values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
+    if not _may_reach(a, b, c, values[0], values[1], values[2]):
+        return False
+    keep_polynomial(w)
+    x = _reaches(w, h, m, a, b, c, is_limit(kinds, m) and kinds[m, 3] == 0, passed_by(w, kinds, m))
+    w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
+    return x > 0.0
+
+
+@compiled
+def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float) -> float:
+    """Mark the margins that reach zero up to x with their brackets; x if there are any, AT_START where a limit is
+    passed there, else 0.
+    """
+    found = 0.0
+    for m in range(kinds.shape[0]):
+        w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
+        falls = falls_from_start(w, m)
+        if falls and before <= EDGE:
+            found = AT_START
+        elif falls:
+            w.margin[M_HIGH, m] = before
+        marked = falls or crosses(w, kinds, m) or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
+        w.fired[m] = marked
+        if marked and found == 0.0:
+            found = x
+    return found
+
+
+@compiled
+def _mark_dips(w: Any, h: float, kinds: Any, before: float, x: float) -> None:
+    """Mark the margins whose lowest point lies in an interval at whose end others are across zero."""
+    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+    copy(w.margin[M_NOW], w.margin[M_BEFORE])
+    _margin_inside(w, h, x + EDGE, M_NOW)
+    for m in range(kinds.shape[0]):
+        if w.fired[m] == 0:
+            w.fired[m] = _dips(w, h, kinds, m, before, x, x + EDGE)
+
+
+@compiled
+def _scan(w: Any, h: float, kinds: Any) -> float:
+    """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
+    there.
+    """
+    scan_step(w)
+    earlier, before = 0.0, 0.0
+    for i in range(4 * w.count[MEMBER] + 9):
+        x = SCANNED[w.count[MEMBER], i]
+        put_scanned(w, h, i)
+        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+        found = _mark(w, h, kinds, earlier, before, x)
+        if found > 0.0:
+            keep_polynomial(w)
+            _mark_dips(w, h, kinds, before, x)
+        if found != 0.0:
+            return found
+        update_sides(w, kinds)
+        earlier, before = before, x
+    return 0.0
+
+
+@compiled
+def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
+    """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method)."""
+    side = w.margin[M_SIDE, m]
+    value_high, value_low = _probe(w, h, m, high), _probe(w, h, m, low)
+    if value_high * side > 0.0:
+        # It touches zero there.
+        return high
+    kept = 0
+    for iteration in range(100):
+        if high - low <= 1e-13 * high or value_high == 0.0:
+            break
+        x = low + (high - low) * (value_low / (value_low - value_high))
+        if not low < x < high or iteration % 8 == 7:
+            x = 0.5 * (low + high)
+        value = _probe(w, h, m, x)
+        if value * side <= 0.0:
+            high, value_high = x, value
+            value_low *= 0.5 if kept == 1 else 1.0
+            kept = 1
+        else:
+            low, value_low = x, value
+            value_high *= 0.5 if kept == -1 else 1.0
+            kept = -1
+    return high
+
+
+@compiled
+def _slope(w: Any, h: float, m: int, x: float) -> float:
+    """Change of a margin per step, from the polynomial around x."""
+    width = 1e-4 * x
+    return float((_probe(w, h, m, x + width) - _probe(w, h, m, x - width)) / (2.0 * width))
+
+
+@compiled
+def _step_onto(w: Any, size: float) -> float:
+    """Repeat the step with another size, with the full order of the method; returns the norm of its error."""
+    w.clock[H_FACTORED] = 0.0
+    if not factor_newton(w, size):
+        return np.inf
+    predict(w, size)
+    if solve_stages(w, size) != CONVERGED:
+        return np.inf
+    store_polynomial(w, size, 0.0)
+    norm = estimate_error(w, size)
+    finish_step(w, size)
+    return norm
+
+
+@compiled
+def _margins_at_end(w: Any, size: float) -> None:
+    set_stage(w, stage_count(w.count[MEMBER]) - 1, size)
+    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+
+
+@compiled
+def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> float:
+    """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
+    step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
+    that all but touches it none to be trusted.
+    """
+    side = w.margin[M_SIDE, m]
+    size = best = x * h
+    closest = np.inf
+    store_polynomial(w, h, 0.0)
+    resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    nudge = 0.0
+    for attempt in range(12):
+        if not _step_onto(w, size) < worst:
+            return 0.0
+        _margins_at_end(w, size)
+        value = w.margin[M_NOW, m]
+        change = -value / slope * h if slope != 0.0 else 0.0
+        crossed = value * side <= 0.0 or slope == 0.0
+        # What is left after a few attempts is the rounding of the margin itself.
+        still = abs(change) <= resolution * (1 + attempt)
+        if crossed and (still or value == 0.0 or nudge > 0.0 or attempt >= 6):
+            return size
+        if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
+            # Where it came closest it is zero, or the polynomial was too coarse to tell.
+            touches = closest <= ALIKE * noise(w, m) and _step_onto(w, best) < worst
+            return best if touches else 0.0
+        if abs(value) < closest:
+            best, closest = size, abs(value)
+        # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
+        nudge = max(2.0 * nudge, resolution) if not crossed and abs(change) <= resolution else 0.0
+        change = nudge if nudge > 0.0 else change
+        size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
+    return size
+
+
+@compiled
+def _short_of(w: Any, h: float, m: int, size: float) -> float:
+    """A step that ends just short of a kink, where it counts as zero or time knows nothing nearer: beyond it the last
+    stage would feel what begins there.
+    """
+    side = w.margin[M_SIDE, m]
+    slope = max(abs(w.margin[M_SLOPE, m]) / h, abs(w.margin[M_BEFORE, m]) / size)
+    resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    for attempt in range(40):
+        shorter = size - resolution * 2.0**attempt
+        if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
+            break
+        _margins_at_end(w, shorter)
+        nearest = 2.0 * slope * (size - shorter)
+        if 0.0 < w.margin[M_NOW, m] * side <= max(nearest, noise(w, m)):
+            return shorter
+    _step_onto(w, size)
+    return size
+
+
+@compiled
+def _resolved(w: Any, size: float) -> float:
+    """Difference of two times that are one for all that can be told."""
+    return float(1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size))
+
+
+@compiled
+def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
+    """Keep as fired the margins that are across zero too, or within rounding of it in time."""
+    _margins_at_end(w, size)
+    near = _resolved(w, size)
+    for m in range(kinds.shape[0]):
+        value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
+        across = crosses(w, kinds, m)
+        close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
+        w.fired[m] = across or (w.fired[m] != 0 and close)
+
+
+@compiled
+def _has_reached(w: Any, h: float, size: float, m: int) -> bool:
+    """Whether the margin that a step went for is zero at its end; else the polynomial has seen what is not there."""
+    left = w.margin[M_NOW, m] * w.margin[M_SIDE, m]
+    return bool(left <= ALIKE * noise(w, m) + abs(w.margin[M_SLOPE, m]) * _resolved(w, size) / h)
+
+
+@compiled
+def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
+    """The marked margin that reaches zero first, and where; the slopes of all."""
+    first, earliest = -1, 2.0
+    for m in range(kinds.shape[0]):
+        w.margin[M_SLOPE, m] = 0.0
+        if w.fired[m] != 0:
+            x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
+            touches = _probe(w, h, m, x) * w.margin[M_SIDE, m] > 0.0
+            w.margin[M_SLOPE, m] = 0.0 if touches else _slope(w, h, m, max(x, 1e-12))
+            if x < earliest:
+                first, earliest = m, x
+    return first, earliest
+
+
+@compiled
+def find_event(w: Any, h: float, kinds: Any) -> float:
+    """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
+    none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
+    """
+    end = _scan(w, h, kinds)
+    if end <= 0.0:
+        return h if end == 0.0 else AT_START
+    first, earliest = _first(w, h, kinds)
+    worst = 1.0 if kinds[first, 2] == 1 else np.inf
+    size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
+    if size == 0.0:
+        return 0.0
+    _mark_coincident(w, h, size, kinds)
+    kink = kink_at(w, kinds, first)
+    if kink >= 0:
+        size = _short_of(w, h, kink, size)
+        _mark_coincident(w, h, size, kinds)
+        w.fired[kink] = 1
+    w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
+    if w.fired[first] == 0 and not any_true(w.fired):
+        update_sides(w, kinds)
+    return size

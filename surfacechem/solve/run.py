@@ -1,0 +1,399 @@
+"""A system in time: compiled once, run with any values of its parameters."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.program import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
+from surfacechem.contracts.terms import Spec
+from surfacechem.errors import InputError, suggestion
+from surfacechem.model.system import System
+from surfacechem.model.validity import check_start
+from surfacechem.solve import ASKING, AUTO, solver
+from surfacechem.solve import segments as pieces
+from surfacechem.solve.adapters.rates import output_rates
+from surfacechem.solve.contract import Problem, Result, Solver, Status
+from surfacechem.solve.diagnose import cause
+from surfacechem.solve.equilibria import Equilibria, Point
+from surfacechem.solve.hybrid import Hybrid
+from surfacechem.solve.jumps import Jump, Jumper
+from surfacechem.solve.passing import Passing
+from surfacechem.solve.stalls import solve
+from surfacechem.solve.start import stable_start
+from surfacechem.solve.watching import awaited, watched
+
+Array = NDArray[np.float64]
+
+GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
+"""Accounts whose quadratures are measured together."""
+
+DEFAULT_RTOL = 1e-11
+"""Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
+
+SAMPLES, CLOSER = 60.0, 7.3
+"""Looks at the equations in a run, and how many times more in the second one, which must not share its blindness."""
+
+OWN = "radau"
+"""The method of this package."""
+
+ABSOLUTE = 1e-6
+"""Default absolute tolerance of a state, relative to rtol times its scale."""
+
+STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
+"""Initial values need only be finite here, and have a logarithm where that is the state; margins say the rest."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a scene is run: output times [s], tolerances, method, budgets."""
+
+    times: Sequence[float]
+    rtol: float = DEFAULT_RTOL
+    atol: float | None = None
+    solver: str = OWN
+    max_steps: int = 100_000
+    max_seconds: float | None = None
+    accuracy: float | None = None
+    """Relative accuracy that was asked for, if no tolerances were given."""
+    samples: float = SAMPLES
+    """Parts of the run in each of which its steps are held against the equations at least once."""
+
+    def __post_init__(self) -> None:
+        """Output times start at zero, where the initial values hold, and increase; tolerances have a meaning."""
+        if len(self.times) < 2 or self.times[0] != 0 or any(b <= a for a, b in pairwise(self.times)):
+            raise InputError("output times must start at 0 and increase from each to the next, at least two.")
+        if not (0 < self.rtol < 1 and 0 <= (self.atol or 0.0) < np.inf):
+            raise InputError(
+                f"rtol must lie in (0, 1), and atol must be finite and not negative: {self.rtol:g}, {self.atol}."
+            )
+
+    def second(self, rtol: float) -> Run:
+        """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
+        looks at the equations, elsewhere.
+        """
+        atol = None if self.atol is None else self.atol * rtol / self.rtol
+        return replace(self, rtol=rtol, atol=atol, samples=CLOSER * self.samples)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A solved run: the solver's result, the values it ran with, its end in words and its run time [s]."""
+
+    model: Model
+    run: Run
+    result: Result
+    values: Mapping[str, float]
+    status: str
+    reason: str
+    seconds: float
+    jumps: tuple[Jump, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but machine code, which is made again from the system."""
+        return {**vars(self), "result": replace(self.result, problem=self.result.problem.with_program(None))}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Give the problem the machine code that the model has made anew."""
+        problem = state["result"].problem.with_program(state["model"].program)
+        vars(self).update(state, result=replace(state["result"], problem=problem))
+
+    @cached_property
+    def rates(self) -> Array:
+        """Time derivatives of the states at the output times, shape (times, states)."""
+        return output_rates(self.result)
+
+    @cached_property
+    def roundings(self) -> dict[str, float]:
+        """By how much the last bit of a state changes each named quantity at most."""
+        result = self.result
+        worst = np.zeros(self.outputs.shape[1])
+        for j, state in enumerate(self.model.system.states):
+            if state.name in self.model.system.inside:
+                continue  # no flux reads one of them alone but the first, and those are not named
+            nudged = result.outputs.copy()
+            nudged[:, j] *= 1 + np.finfo(float).eps
+            values = self.model.evaluate(result, result.times, nudged, self.rates)
+            with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
+                worst = np.fmax(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
+        names = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, worst, strict=True))
+
+    @cached_property
+    def everywhere(self) -> dict[str, Array]:
+        """States and named quantities at the output times and at every step."""
+        result, steps = self.result, self.result.steps
+        states, named = result.outputs, self.outputs
+        if steps is not None and len(steps.t):
+            states = np.concatenate([states, steps.y])
+            named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)])
+        names = [state.name for state in self.model.system.states]
+        outputs = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, states.T, strict=True)) | dict(zip(outputs, named.T, strict=True))
+
+    @cached_property
+    def within_bounds(self) -> dict[str, Array]:
+        """Named quantities at the output times and at every step, where rounding has carried no bonds below none."""
+        result, steps = self.result, self.result.steps
+        bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
+        columns = np.array([state.name in bonds for state in self.model.system.states])
+        points: list[tuple[Array, Array, Array, NDArray[np.int64] | None]]
+        points = [(result.times, result.outputs, self.rates, None)]
+        points += [(steps.t, steps.y, steps.ydot, steps.segment)] if steps else []
+        if all(np.all(y[:, columns] >= 0) for _, y, _, _ in points):
+            return self.everywhere
+        within = [(t, np.where(columns, np.maximum(y, 0), y), rates, segment) for t, y, rates, segment in points]
+        clipped = [self.model.evaluate(result, *point) for point in within]
+        names = [item.name for item in self.model.system.outputs]
+        return dict(zip(names, np.concatenate(clipped).T, strict=True))
+
+    @cached_property
+    def outputs(self) -> Array:
+        """Named quantities at the output times, shape (times, outputs)."""
+        return self.model.evaluate(self.result, self.result.times, self.result.outputs, self.rates)
+
+
+def values_of(system: System, changes: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Every parameter and initial value by path, with some of them changed."""
+    values = {parameter.path: parameter.at(0.0) for parameter in system.parameters}
+    values |= {state.path: state.at_start[1] for state in system.states}
+    specs = {s.path: POSITIVE if s.given and not s.given.state else STATE for s in system.states}
+    specs |= {parameter.path: parameter.spec for parameter in system.parameters}
+    known = system.changeable if changes else {}
+    for path, value in (changes or {}).items():
+        if path not in known:
+            raise InputError(f"no parameter '{path}' to change.{suggestion(path, known)}")
+        specs[path].check(path, float(value))
+        values[path] = float(value)
+    return values
+
+
+class Model:
+    """A system with its machine code, made when it is built."""
+
+    def __init__(self, system: System) -> None:
+        start = time.perf_counter()
+        n, inputs = len(system.states), system.inputs
+        self.system = system
+        self._others: dict[frozenset[int], Model] = {system.holding.sides: self} if system.holding else {}
+        """Models of the same scene by the bounds at which its bonding state is held."""
+        self.margins = system.moving_margins()
+        """The margins that can close on the way; the rest is checked at the start only."""
+        self.program: Program = compile_program(
+            system.t,
+            inputs[1 : n + 1],
+            inputs[n + 1 : 2 * n + 1],
+            inputs[2 * n + 1 :],
+            system.local(list(system.rows.values())),
+            system.local([account.rate for account in system.ledger]),
+            system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
+            filler=self._filler(inputs),
+            chains=[Chain(*chain) for chain in system.chains],
+            groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
+        )
+        self.jumper = Jumper(system, self.program) if system.in_stretches else None
+        outputs = [system.expand(item.expression) for item in system.outputs]
+        self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
+        self.compile_seconds = time.perf_counter() - start
+        """Time to compile the equations, and the code of jumps once one has happened."""
+
+    def __reduce__(self) -> tuple[type[Model], tuple[System]]:
+        """Machine code is not pickled but made again from the system."""
+        return type(self), (self.system,)
+
+    def _filler(self, inputs: list[Any]) -> Filler | None:
+        outside = self.system.outside
+        if outside is None:
+            return None
+        first = 1 + 2 * len(self.system.states)
+        paths = [parameter.path for parameter in self.system.parameters]
+        positions = np.array([first + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
+        reads = compile_function(inputs, [self.system.expand(expression) for expression in outside.reads])
+        return Filler(reads, positions, outside.engine)
+
+    def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Every parameter and initial value by path, with some of them changed."""
+        return values_of(self.system, changes)
+
+    def _segments(self, end: float, values: Mapping[str, float]) -> Array:
+        return pieces.segments(self.system, end, values)
+
+    @cached_property
+    def passing(self) -> Passing:
+        """What tells when given variables pass what is narrow."""
+        return Passing(self.system)
+
+    def problem(self, run: Run, values: Mapping[str, float], *, passing: bool = True, nudged: bool = False) -> Problem:
+        """The initial value problem; InputError where the initial state is not admissible.
+
+        ``passing`` ends pieces where given variables pass what is narrow, too; ``nudged`` loads differ in their last
+        digit.
+        """
+        system = self.system
+        initial = {state.name: state.from_given(values) for state in system.states}
+        end = run.times[-1]
+        segments = self._segments(end, values)
+        scales = np.array([state.finest or state.scale for state in system.states])
+        parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
+        if passing:
+            fastest = max((values[path] for path in system.cycles), default=0.0)
+            segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
+        pieces.start_modes(system, parameters, values)
+        self._check_start(values, parameters[0], initial)
+        if nudged:
+            pieces.nudge(system, parameters)
+        start = self._start(np.array(list(initial.values())), parameters)
+        if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
+            self._check_start(values, parameters[0], dict(zip(initial, start.tolist(), strict=True)))
+        return Problem(
+            program=self.program,
+            y0=start,
+            times=np.asarray(run.times, dtype=float),
+            segments=segments,
+            parameters=parameters,
+            rtol=run.rtol,
+            atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
+            margins=tuple(map(watched, self.margins)) + tuple(map(awaited, system.transitions)),
+            max_steps=run.max_steps,
+            max_seconds=run.max_seconds,
+            record_steps=True,
+            spacing=end / run.samples,
+        )
+
+    def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:
+        """Refuse an initial state outside the range of a law, in the modes that hold there."""
+        paths = [parameter.path for parameter in self.system.parameters]
+        check_start(self.system, {**values, **dict(zip(paths, parameters.tolist(), strict=True))}, initial)
+
+    def _start(self, y: Array, table: Array) -> Array:
+        """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
+        if self.system.equilibria:
+            parameters = table[0].copy()
+            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
+            settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
+            if settled is None:
+                raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
+            y = settled.y
+            table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
+        return stable_start(self.system, self.program, y, table[0])
+
+    def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
+        """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
+        values = self.values(changes)
+        model = self.suited([values])
+        return model.solve_values(run, values if model is self else model.adopted(values))
+
+    def suited(self, points: Sequence[Mapping[str, float]]) -> Model:
+        """The model of the same scene with the bounds of the bonding state that values need; as a rule this one."""
+        holding = self.system.holding
+        if holding is None:
+            return self
+        sides = holding.needed_by(points)
+        if sides not in self._others:
+            self._others[sides] = Model(holding.again(sides))
+            self._others[sides]._others = self._others
+        return self._others[sides]
+
+    def adopted(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of a model with other bounds as those of this one."""
+        return {path: values.get(path, own) for path, own in self.values().items()}
+
+    def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
+        """The same run at another tolerance, looked at elsewhere and more often.
+
+        Its loads differ in the last digit: where a result depends on that, two runs of the same numbers would agree.
+        """
+        return self.solve_values(trajectory.run.second(rtol), trajectory.values, nudged=True)
+
+    def chosen(self, run: Run) -> Run:
+        """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""
+        if run.solver != AUTO:
+            return run
+        return replace(run, solver=ASKING[0] if self.program.filler is not None else OWN)
+
+    def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
+        """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
+        wished.
+        """
+        run = self.chosen(run)
+        method = solver(run.solver)
+        if self.program.filler is not None and run.solver not in ASKING:
+            raise InputError(
+                f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
+                f"`solver: {ASKING[0]}` under `run`."
+            )
+        fit = self.system.fit
+        values = fit.started(values) if fit else values
+        problem = self.problem(run, values, nudged=nudged)
+        method.prepare()
+        start, prepared = time.perf_counter(), PREPARING.seconds
+        result, jumps, ended = self._integrate(method, problem)
+        while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
+            values = wider
+            result, jumps, ended = self._integrate(method, self.problem(run, values, nudged=nudged))
+        prepared = PREPARING.seconds - prepared
+        self.compile_seconds += prepared
+        seconds = time.perf_counter() - start - prepared
+        status, reason = ended or self.verdict(result, values)
+        return Trajectory(self, run, result, values, status, reason, seconds, jumps)
+
+    def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
+        """The result, its jumps, and how the run ended where a jump ended it."""
+        if self.jumper is None:
+            return solve(method, problem, self.system.sliding), (), None
+        hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
+        result = hybrid.run()
+        word = "failed" if hybrid.status is Status.FAILED else "stopped"
+        ended = (word, f"{hybrid.reason} at t = {result.t:.9g} s") if hybrid.reason else None
+        return result, tuple(hybrid.jumps), ended
+
+    def _visited(self, result: Result, temperature: str) -> Array:
+        """A temperature at all steps and at the end."""
+        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
+        if (steps := result.steps) is not None:  # a run may end at its start
+            t, y, ydot = np.append(steps.t, t), np.vstack([steps.y, y]), np.vstack([steps.ydot, ydot])
+        names = [state.name for state in self.system.states]
+        if temperature in names:
+            return y[:, names.index(temperature)]
+        outputs = [item.name for item in self.system.outputs]
+        return self.evaluate(result, t, y, ydot)[:, outputs.index(temperature)]
+
+    def verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
+        """How a run ended, and why, in words."""
+        where = f"t = {result.t:.9g} s"
+        if result.status is Status.FINISHED:
+            return "finished", f"reached the end at {where}"
+        if result.status is Status.EVENT:
+            margin, fit = self.margins[int(result.events.index[-1])], self.system.fit
+            fitted = fit is not None and margin.name == fit.margin
+            if fit and fitted:
+                why = fit.reason(values, self._visited(result, fit.temperature)[-1])
+            else:
+                at = np.array([result.t])
+                why = self.system.reason(margin, self.inputs(result, at, result.y[None], result.ydot[None])[0])
+            return "stopped", f"{why} at {where}"
+        return cause(self.system, self.program, self.margins, result, values)
+
+    def evaluate(
+        self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
+    ) -> Array:
+        """Named quantities along a trajectory, shape (len(t), outputs); times tell the segments that are not given."""
+        inputs = self.inputs(result, t, y, ydot, segment)
+        return (
+            self.output_function(self.program.filled(inputs)) if len(t) else np.empty((0, self.output_function.n_out))
+        )
+
+    def inputs(
+        self, result: Result, t: Array, y: Array, ydot: Array, segment: NDArray[np.int64] | None = None
+    ) -> Array:
+        """Arguments of compiled functions along a trajectory."""
+        parameters = result.problem.parameters[result.segments_at(t, segment)]
+        return np.concatenate([t[:, None], y, ydot, parameters], axis=1)

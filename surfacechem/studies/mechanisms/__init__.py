@@ -1,0 +1,1 @@
+"""A mechanism by itself: equilibria, rates over temperature and force, cycles."""

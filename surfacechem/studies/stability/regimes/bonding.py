@@ -1,0 +1,165 @@
+"""Bonding at the edge of what a heat capacity, an affinity or a time scale bears."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
+from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
+from surfacechem.references.bonding import Bonding
+from surfacechem.references.cooling_to_zero import CoolingToZero
+from surfacechem.references.endothermic_bonding import EndothermicBonding
+from surfacechem.references.exothermic_bonding import ExothermicBonding
+from surfacechem.references.exponential_affinity import ExponentialAffinity
+from surfacechem.studies.stability.regime import Array, Exact, Problem, Refused, Regime, Stops
+
+LOST = "heat capacity at T was lost"
+N_C = 1e18
+
+
+def decades(first: float, last: float, points: int) -> list[float]:
+    """Times on a logarithmic axis."""
+    return [float(t) for t in np.geomspace(first, last, points)]
+
+
+class Endothermic(Regime):
+    r"""Bonds take all heat but :math:`1-\kappa`: bodies of 256 K end at :math:`256\sqrt{1-\kappa}` after a layer
+    :math:`\tau(1-\kappa)/2`. With kappa = 1 nothing is left and the input is refused.
+    """
+
+    name = "endothermic"
+    title = "Endothermic bonding, kappa to 1"
+    symbol = "1 - kappa"
+    values = (*(2.0**-n for n in (1, 10, 20, 30, 40, 46, 50, 52)), 0.0)
+
+    def problem(self, value: float) -> Problem:
+        K_2 = 512.0 * (1.0 - value)
+        rate = {"value": N_C / K_2, "times": [{"power": {"exponent": -2}}]}
+        changes = {
+            "T_0": 256,
+            "initial.T": 256,
+            "interface.potential.bond-energy.K_2": K_2,
+            "interface.bonding.linear-affinity.c_r": rate,
+        }
+        if value == 0.0:
+            return Problem("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
+        exact = EndothermicBonding(C_1=1.0, C_2=1.0, T_0=256.0, K_2=K_2, tau=1.0)
+        return Problem("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact.of(exact), changes)
+
+    def label(self, value: float) -> str:
+        return f"2^{math.log2(value):.0f}" if value else "0"
+
+
+class ScaleRatio(Regime):
+    """Bonds form within a part of the second while friction heats the bodies for a million seconds."""
+
+    name = "scale-ratio"
+    title = "Bonding within a part of the sliding time"
+    symbol = "sliding time / bonding time"
+    values = (1e0, 1e3, 1e6, 1e9, 1e12, 1e15, 1e18)
+    space: ClassVar = {"tau": (-15.0, 6.0), "C_1": (-6.0, 6.0), "K_0": (-6.0, 6.0), "D": (-9.0, 3.0), "T_i": (0.0, 4.0)}
+
+    def problem(self, value: float) -> Problem:
+        return self.corner({"tau": 1e6 / value, "C_1": 1.5, "K_0": 120.0, "D": 1e-3, "T_i": 320.0})
+
+    def corner(self, point: Mapping[str, float]) -> Problem:
+        """Capacities, energies, heating and times of any size; the interface takes as much heat as it may."""
+        tau, C, K, D, T = (point[name] for name in ("tau", "C_1", "K_0", "D", "T_i"))
+        exact = Bonding(C_1=C, C_2=0.7, C_c=0.3, T_0=300.0, T_i=T, phi_i=0.1, K_0=K, K_1=60.0, K_2=240.0, tau=tau, D=D)
+        changes = {
+            "bodies.lower.C": C,
+            "interface.potential.bond-energy.K_0": K,
+            "interface.bonding.relaxation.tau": tau,
+            "interface.friction.coulomb.mu": 1.0,
+            "loading.p": D,
+            "loading.v": 1.0,
+            "initial.T": T,
+        }
+        return Problem("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact.of(exact), changes)
+
+
+class Seconds(Regime):
+    """The same reaction from attoseconds to the age of the Earth."""
+
+    name = "seconds"
+    title = "Exothermic bonding in 1e-15 to 1e15 s"
+    symbol = "tau [s]"
+    values = tuple(10.0**k for k in (-15, -10, -5, 0, 5, 10, 15))
+
+    def problem(self, value: float) -> Problem:
+        exact = ExothermicBonding(C_1=1.0, C_2=1.0, T_0=300.0, K_0=300.0, tau=value)
+        changes = {"interface.bonding.linear-affinity.c_r": N_C / 300.0 / value}
+        return Problem("exothermic", [value * k / 4 for k in range(1, 21)], Exact.of(exact), changes)
+
+
+class Affinity(Regime):
+    r"""The exponential law from equilibrium to an affinity of a million :math:`k_BT`, where its rate overflows."""
+
+    name = "affinity"
+    title = "Exponential law far from equilibrium"
+    symbol = "|mu| / (k_B T)"
+    values = (1e-6, 1e-3, 1.0, 30.0, 700.0, 1e3, 1e4, 1e6)
+    space: ClassVar = {"a": (-8.0, 6.0), "T": (0.0, 4.0), "lambda": (-12.0, 12.0)}
+
+    def problem(self, value: float) -> Problem:
+        return self.corner({"a": value, "T": 310.0, "lambda": 1.0})
+
+    def corner(self, point: Mapping[str, float]) -> Problem:
+        """Affinity, temperature and rate of any size."""
+        n, T, rate = 5e17, point["T"], point["lambda"]
+        K = point["a"] * n * BOLTZMANN * T
+        exact = ExponentialAffinity(n_c=n, C_r=rate * n * n / K, K_c=K, T=T)
+        changes = {
+            "bodies.lower.temperature": T,
+            "bodies.upper.temperature": T,
+            "interface.temperature": T,
+            "interface.potential.bond-energy.K_0": K,
+            "interface.bonding.exponential-affinity.C_r": rate * n * n / K,
+        }
+        return Problem("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact.of(exact), changes)
+
+
+class Runaway(Regime):
+    """Self-heating that explodes: the higher the activation, the later and the steeper, and the less is it known."""
+
+    name = "runaway"
+    title = "Thermal runaway of an activated reaction"
+    symbol = "E_a / (R_g T)"
+    values = (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0)
+
+    def problem(self, value: float) -> Problem:
+        E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
+        exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
+        changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
+        phi = np.array([0.01, 0.1, 0.3, 0.5, 0.7, 0.9])
+        times = exact.time(phi)
+        speeds = (1 - phi) * np.exp(value - E_a / (GAS_CONSTANT * (300.0 + 80.0 * phi)))
+
+        def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
+            """Bonds for other data, to first order, from when as many are reached, which needs no root of a runaway."""
+            other = AdiabaticArrhenius(**data)
+            bonds = phi + speeds * (t - other.time(phi))
+            return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
+
+        data = {"A": A, "E_a": E_a, "T_i": 300.0, "delta_T": 80.0}
+        return Problem("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
+
+
+class ColdBodies(Regime):
+    """Heat is drawn at a constant rate until the temperature is this part of its start; at zero the run stops."""
+
+    name = "cold"
+    title = "Cooling towards T = 0"
+    symbol = "T / T_0"
+    values = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
+
+    def problem(self, value: float) -> Problem:
+        exact = CoolingToZero(C=100.0, T_0=300.0, T_i=300.0, Q=50.0)
+        if value == 0.0:
+            return Problem("cooling-to-zero", [2 * exact.end_time], Stops.of("the temperature T reached zero", exact))
+        last = exact.end_time * (1.0 - value**2)
+        return Problem("cooling-to-zero", [last / 2, last], Exact.of(exact))

@@ -1,0 +1,163 @@
+"""Heat exchange where capacities vanish, conductances become contact, and temperatures lose their balance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from surfacechem.references.semenov_fold import SemenovFold
+from surfacechem.references.three_temperatures import ThreeTemperatures
+from surfacechem.studies.stability.regime import Exact, Problem, Refused, Regime, Stops
+
+BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
+
+
+def three_temperatures(parameters: Mapping[str, float]) -> Problem:
+    """Two bodies and a medium, from its layer to the end."""
+    p = {**BODIES, **parameters}
+    exact = ThreeTemperatures(T_1=290.0, T_2=350.0, T_c=300.0, **p)
+    changes = {
+        "bodies.lower.C": p["C_1"],
+        "bodies.upper.C": p["C_2"],
+        "interface.potential.constant-interface-capacity.C_c": p["C_c"],
+        "heat": [
+            {"conductance": {"between": ["lower", "interface"], "h": p["h_1"]}},
+            {"conductance": {"between": ["upper", "interface"], "h": p["h_2"]}},
+        ],
+        "loading.Q_c": p["D_0"],
+    }
+    layer = p["C_c"] / (p["h_1"] + p["h_2"])
+    times = [float(t) for t in np.geomspace(min(layer, 1.0), 10.0, 25)]
+    return Problem("three-temperatures", times, Exact.of(exact), changes)
+
+
+class Capacity(Regime):
+    """A medium whose capacity vanishes: it follows the bodies after a layer as short as its capacity is small."""
+
+    name = "capacity"
+    title = "Capacity of the interface to nothing"
+    symbol = "C_c [J/(m^2 K)]"
+    values = (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18)
+
+    def problem(self, value: float) -> Problem:
+        return three_temperatures({"C_c": value})
+
+
+class Conductance(Regime):
+    """Conductances until the two bodies are in perfect contact."""
+
+    name = "conductance"
+    title = "Conductances to perfect contact"
+    symbol = "h [W/(m^2 K)]"
+    values = (1e0, 1e4, 1e8, 1e12, 1e16, 1e20)
+
+    def problem(self, value: float) -> Problem:
+        return three_temperatures({"h_1": value, "h_2": value})
+
+
+class Stiffness(Regime):
+    """One body light and well connected, the other heavy and insulated: a range of rates in a linear system."""
+
+    name = "stiffness"
+    title = "Range of the rates of heat exchange"
+    symbol = "fastest rate / slowest rate"
+    values = (1e2, 1e5, 1e10, 1e15, 1e20, 1e25)
+    space: ClassVar = {
+        "C_1": (-9.0, 9.0),
+        "C_2": (-9.0, 9.0),
+        "C_c": (-18.0, 6.0),
+        "h_1": (-9.0, 15.0),
+        "h_2": (-9.0, 15.0),
+        "D_0": (-6.0, 6.0),
+    }
+
+    def problem(self, value: float) -> Problem:
+        spread = math.sqrt(value)
+        return three_temperatures({"C_1": spread, "C_2": 1.0, "C_c": 1.0 / spread, "h_1": 1.0, "h_2": 1.0, "D_0": 1e-3})
+
+    def corner(self, point: Mapping[str, float]) -> Problem:
+        return three_temperatures(point)
+
+
+BETWEEN_RESERVOIRS = """\
+T_0: 300 K
+bodies:
+  lower: {temperature: 300 K}
+  upper: {temperature: 300 K}
+interface:
+  temperature: T_c
+"""
+
+MEDIUM = (
+    BETWEEN_RESERVOIRS
+    + """\
+  potential:
+    - bond-energy: {K_2: 240 J/m^2}
+    - interface-capacity: {C_c: 1 J/m^2/K}
+heat:
+  - conductance: {between: [lower, interface], h: 500 W/m^2/K}
+  - conductance: {between: [upper, interface], h: 300 W/m^2/K}
+loading: {phi: 0}
+initial: {T_c: 301 K}
+run: {until: 1 s}
+"""
+)
+
+
+class LostCapacity(Regime):
+    """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
+
+    name = "lost-capacity"
+    title = "Capacity that bonds leave to the interface"
+    symbol = "C_eff [J/(m^2 K)]"
+    values = (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1)
+
+    def problem(self, value: float) -> Problem:
+        changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
+        if value < 0:
+            return Problem(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
+        settled = Exact(
+            lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
+            data={"T_1": 300.0, "T_2": 300.0},
+            again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
+        )
+        return Problem(MEDIUM, [1.0], settled, changes)
+
+
+FILM = (
+    BETWEEN_RESERVOIRS
+    + """\
+  friction:
+    - viscous: {eta: {value: 1 Pa s, times: [exponential: {beta: -0.05}]}}
+heat:
+  - conductance: {between: [lower, interface], h: 25 W/m^2/K}
+  - conductance: {between: [upper, interface], h: 25 W/m^2/K}
+loading: {g_n: 1 um, v: 0.1 m/s}
+run: {until: 1 s}
+"""
+)
+
+
+class Ignition(Regime):
+    r"""Heat of a medium without capacity that grows exponentially with its temperature: one half before the fold at
+    :math:`H/(e\beta)`, where the temperature is known to the root of rounding, and none beyond.
+    """
+
+    name = "ignition"
+    title = "Ignition of an algebraic temperature"
+    symbol = "1 - D_0 / D_crit"
+    values = (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1)
+    CRITICAL = 50.0 / (math.e * 0.05)
+
+    def problem(self, value: float) -> Problem:
+        heat = (1.0 - value) * self.CRITICAL
+        changes = {
+            "interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}
+        }
+        if value < 0:
+            return Problem(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
+        exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
+        return Problem(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)

@@ -1,0 +1,168 @@
+"""The command as a process: what it imports, how it ends, how it is interrupted."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.around
+
+HEAVY = ("xarray", "matplotlib", "CoolProp", "cantera", "sympy", "pandas", "dask", "sksundae")
+LONG = """\
+title: Rubbing for a very long time
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 1 MJ/m^2/K}
+  upper: {temperature: T, C: 1 MJ/m^2/K}
+interface:
+  friction:
+    - coulomb: {mu: 0.3}
+loading:
+  p: 1 kPa
+  v: {harmonic: {amplitude: 1 mm/s, frequency: 100 1/s}}
+initial: {T: 280 K}
+run: {until: 100000 s, outputs: 2, max-steps: 1000000000}
+"""
+
+SOLVING = """\
+from surfacechem.cli import app
+from surfacechem.solve.run import Model
+
+solve = Model.solve
+
+def told(*arguments, **named):
+    print("solving", flush=True)
+    return solve(*arguments, **named)
+
+Model.solve = told
+app(["run", "long.yaml"], prog_name="surfacechem")
+"""
+"""The command line, saying when it has come to the solver."""
+
+
+def surfacechem(*arguments, folder):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+
+
+def imported(code, folder):
+    """Modules after some code, as a process of its own sees them."""
+    guarded = f"try:\n    {code}\nexcept SystemExit as end:\n    assert not end.code, end.code"
+    script = f"import sys\n{guarded}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_run_imports_only_what_it_needs(tmp_path):
+    surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
+    found = imported("from surfacechem.cli.main import app; app(['run', 'sliding-dry', '-q'])", tmp_path)
+    assert (tmp_path / "sliding-dry.nc").exists()
+    assert {"netCDF4", "symengine"} <= found
+    assert not found & {"numba", *HEAVY}
+
+
+def test_the_command_line_itself_imports_little(tmp_path):
+    found = imported("import surfacechem.cli.main", tmp_path)
+    assert not found & {"numpy", "symengine", "numba", "netCDF4", "pint", "pydantic", "rich", "ruamel.yaml", *HEAVY}
+
+
+def test_run_as_a_process(tmp_path):
+    done = surfacechem("run", "exothermic", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "exact solution exothermic-bonding" in done.stdout
+    assert done.stderr == "" or done.stderr.startswith("compiling the stepper")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["run", "nothing"], 2),
+        (["run", "exothermic", "--set", "initial.T=0 K"], 2),
+        (["run"], 2),
+        (["nonsense"], 2),
+        (["run", "cooling-to-zero", "-q"], 3),
+        (["run", "exothermic", "-q", "--set", "run.max-steps=1"], 4),
+    ],
+)
+def test_exit_codes_come_without_traceback(tmp_path, arguments, code):
+    done = surfacechem(*arguments, folder=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
+@pytest.mark.parametrize(
+    ("number", "words"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")], ids=["int", "term"]
+)
+def test_a_signal_ends_a_long_run_at_once_and_nothing_is_written(tmp_path, number, words):
+    (tmp_path / "long.yaml").write_text(LONG)
+    surfacechem("run", "exothermic", "-q", folder=tmp_path)  # so that the stepper is compiled
+    command = [sys.executable, "-c", SOLVING]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "solving\n", process.communicate()
+        time.sleep(1.0)  # well inside the compiled loop
+        assert process.poll() is None, process.communicate()
+        process.send_signal(number)
+        out, error = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert (process.returncode, out) == (128 + number, "")
+    assert f"surfacechem: {words}; nothing was written.\n" in error
+    assert "Traceback" not in error
+    assert {path.name for path in tmp_path.iterdir()} == {"long.yaml", "exothermic.nc"}
+
+
+WRITING = """\
+import time
+from surfacechem.results import netcdf
+from surfacechem.cli import app
+
+def slow(path, columns, attributes):
+    path.write_bytes(b"half")
+    print("writing", flush=True)
+    time.sleep(60)
+
+netcdf.write_netcdf = slow
+app(["run", "exothermic", "-q"], prog_name="surfacechem")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals to one process")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_while_writing_leaves_no_file_behind(tmp_path, number):
+    command = [sys.executable, "-c", WRITING]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "writing\n", process.communicate()
+        process.send_signal(number)
+        process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 128 + number
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize("arguments", [("laws",), ("run", "exothermic"), ("schema",)])
+def test_a_full_standard_output_is_one_message(tmp_path, arguments):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 5
+    assert done.stderr.splitlines()[-1] == "surfacechem: standard output: cannot be written: No space left on device."
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+@pytest.mark.parametrize(("arguments", "code"), [(("laws",), 5), (("run", "nowhere"), 2)])
+def test_where_nothing_can_be_said_the_exit_code_stays(tmp_path, arguments, code):
+    command = [sys.executable, "-m", "surfacechem", *arguments]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=tmp_path, stdout=full, stderr=full, check=False)
+    assert done.returncode == code

@@ -1,0 +1,197 @@
+"""The mechanism command: Cantera's own numbers, verdicts in words, a figure."""
+
+import math
+import re
+
+import cantera as ct
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from mechanisms import KMOL, SHIPPED, cantera_of, load, mechanism_texts, pulled, species_of
+from surfacechem.cli.main import app
+from surfacechem.errors import InputError
+from surfacechem.mechanism import load_mechanism
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.studies.mechanisms import figure as rateplots
+from surfacechem.studies.mechanisms.rate_tables import Curves
+from surfacechem.studies.mechanisms.sheet import Span, power_of_ten, remarks, sheet, span, verdict
+
+pytestmark = pytest.mark.around
+
+NONE = np.zeros(1)
+T, F = Span(280.0, 360.0), Span(0.0, 1e-10)
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(app, ["mechanism", *map(str, arguments)])
+
+
+def full(surface, law):
+    """Amounts [1/m^2] of the species of a reaction at coverages of one."""
+    sizes = {s.name: s.size for s in surface.species()}
+    return {item.variable: surface.site_density / sizes[item.name] * KMOL for item in law.species}
+
+
+def compare(mechanism, temperature):
+    surface, curves = cantera_of(mechanism), Curves(mechanism)
+    surface.TP = temperature, ct.one_atm
+    surface.coverages = np.ones(surface.n_species)
+    thermo = curves.thermo(temperature)
+    size = ct.gas_constant * temperature
+    for j, name in enumerate(surface.species_names):
+        h, s = (float(column[j]) for column in (surface.standard_enthalpies_RT, surface.standard_entropies_R))
+        assert thermo[name].h == pytest.approx(h * size / 1e3, rel=1e-10, abs=1e-7)
+        assert thermo[name].s == pytest.approx(s * ct.gas_constant / 1e3, rel=1e-10, abs=1e-9)
+        assert thermo[name].g == pytest.approx((h - s) * size / 1e3, rel=1e-10, abs=1e-7)
+    for i, (label, law) in enumerate(curves.laws.items()):
+        amounts = full(surface, law)
+        log_K = sum(nu * math.log(KMOL / amounts[x]) for x, nu in law.change.items())
+        log_K += math.log(surface.equilibrium_constants[i])
+        (got,) = curves.log_equilibrium(label, np.array([temperature]), NONE)
+        assert got == pytest.approx(log_K, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_numbers_are_cantera_s(name):
+    compare(load(name), 311.0)
+
+
+def at_force(mechanism, force):
+    """The load at which the first elastic bond, or every bond, carries a force."""
+    spring = next((item.spring for item in species_of(mechanism) if item.spring), None)
+    return {"gap": spring.rest_length + force / spring.stiffness if spring else 0.0, "force": force}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("force", [0.0, 15e-12, 60e-12])
+def test_numbers_under_force_are_cantera_s(name, force):
+    """Rates per possible bond at coverages of one, and the constant that the elastic energy shifts."""
+    mechanism = load(name)
+    surface, curves = pulled(mechanism, 311.0, **at_force(mechanism, force)), Curves(mechanism)
+    surface.set_unnormalized_coverages(np.ones(surface.n_species))
+    at = np.array([311.0]), np.array([force])
+    for i, (label, law) in enumerate(curves.laws.items()):
+        bond = min(full(surface, law).values())
+        for curve, rates in (
+            (curves.log_forward, surface.forward_rates_of_progress),
+            (curves.log_reverse, surface.reverse_rates_of_progress),
+        ):
+            got = curve(label, *at)
+            assert rates[i] == 0 if got is None else got == pytest.approx(math.log(rates[i] * KMOL / bond), rel=1e-10)
+        log_K = sum(nu * math.log(KMOL / full(surface, law)[x]) for x, nu in law.change.items())
+        log_K += math.log(surface.equilibrium_constants[i])
+        for pair in curves.pairs:  # which a prescribed force works on, along the difference of their distances
+            forward, backward = (next(iter(laws.values())) for laws in (pair.forward, pair.backward))
+            sign = {**dict.fromkeys(pair.forward, 1), **dict.fromkeys(pair.backward, -1)}.get(label, 0)
+            log_K += sign * force * (forward.x_beta - backward.x_beta) / (BOLTZMANN * 311.0)
+        assert curves.log_equilibrium(label, *at) == pytest.approx(log_K, rel=1e-9, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
+
+
+@given(text=mechanism_texts(), temperature=st.floats(300.0, 1200.0))
+@settings(max_examples=25, deadline=None)
+def test_numbers_of_random_mechanisms_are_cantera_s(file, text, temperature):
+    ct.suppress_thermo_warnings(True)
+    file.write_text(text, encoding="utf-8")
+    mechanism = load_mechanism(file)
+    compare(mechanism, temperature)
+    printed = sheet(Curves(mechanism), Span(300.0, 1200.0), F)
+    assert not re.search(r"\b(nan|inf)\b", printed)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_forward_over_reverse_is_the_constant(name):
+    curves = Curves(load(name))
+    temperatures = T.values(7)
+    for label, law in curves.laws.items():
+        reverse = curves.log_reverse(label, temperatures, NONE)
+        if not law.reversible:
+            assert reverse is None
+            paired = any(label in pair.labels for pair in curves.pairs)
+            assert verdict(curves, label, T, F).startswith("pair with" if paired else "runs one way only")
+            continue
+        ratio = curves.log_forward(label, temperatures, NONE) - reverse
+        np.testing.assert_allclose(ratio, curves.log_equilibrium(label, temperatures, NONE), rtol=1e-12)
+        assert verdict(curves, label, T, F).startswith("consistent by construction")
+
+
+def test_prints_the_measured_rates(call):
+    done = call("selectin", "-T", "298.15 K")
+    assert done.exit_code == 0, done.stderr
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["reverse", "[1/s]", "1.408"] in lines
+    assert ["R1", "K", "[1]", "207.6"] in lines
+    assert "consistent by construction" in done.stdout
+    assert re.search(r"R1  L\(s\) \+ P\(s\) <=> PL\(s\)  \(interface-Arrhenius, .*selectin\.yaml:\d+\)", done.stdout)
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_plots(call, kind, tmp_path):
+    done = call("dna-film", "-o", f"rates.{kind}")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.endswith(f"written to rates.{kind}\n")
+    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
+    assert (tmp_path / f"rates.{kind}").read_bytes().startswith(start)
+
+
+def test_the_figure_shows_every_reaction_once():
+    figure = rateplots.figure(Curves(load("dna-film.yaml")), T, F)
+    rates, constants = figure.axes
+    assert [line.get_label() for line in rates.lines] == ["R1: A(s) + B(s) <=> AB(s)", "R1, reverse"]
+    assert len(constants.lines) == 1
+    assert rates.get_ylabel() == "log$_{10}$ Rate per bond [1/s]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("selectins",), "no mechanism file selectins.yaml. Did you mean 'selectin.yaml'?"),
+        (("selectin", "--phase", "contatc"), "has no phase 'contatc'. Did you mean 'contact'?"),
+        (("selectin", "-T", "360..280 K"), "--temperature: '360..280 K' is no range upwards"),
+        (("selectin", "-T", "0 K"), "--temperature: '0 K' is no range upwards"),
+        (("selectin", "-T", "3 m"), "--temperature"),
+        (("selectin", "--force", "3 K"), "--force"),
+        (("selectin", "-o", "x.jpg"), "no format 'jpg'"),
+    ],
+)
+def test_bad_input_is_refused(call, arguments, words):
+    done = call(*arguments)
+    assert done.exit_code == 2
+    assert words in done.stderr
+    assert not done.stdout
+
+
+def test_ranges_have_units_at_either_end():
+    assert span("280 K..360 K", "K", "-T") == span("280..360 K", "K", "-T") == Span(280.0, 360.0)
+    assert span("0..100 pN", "N", "--force").high == pytest.approx(1e-10)
+    assert span("20 degC", "K", "-T").values().tolist() == pytest.approx([293.15])
+    with pytest.raises(InputError, match="-T"):
+        span("..300 K", "K", "-T")
+
+
+@pytest.mark.parametrize(
+    ("exponent", "text"), [(1e6, "e+434294"), (-1e6, "e-434295"), (math.inf, "inf"), (1.0, "2.718")]
+)
+def test_numbers_of_any_size_are_shown(exponent, text):
+    assert power_of_ten(exponent).endswith(text)
+
+
+def test_what_is_odd_is_remarked(tmp_path):
+    text = load("dna-film.yaml").text.replace("A(s) + B(s) <=> AB(s)", "2 A(s) => AB(s)")
+    (tmp_path / "odd.yaml").write_text(
+        text.replace("  rate-constant: {A: 5.13e8 m^2/mol/s", "  orders: {A(s): 0}\n  rate-constant: {A: 1 mol/m^2/s")
+    )
+    curves = Curves(load_mechanism(tmp_path / "odd.yaml"))
+    first, second = remarks(curves)
+    assert "goes on where nothing is left to react" in first
+    assert second == "B(s) takes part in no reaction: its coverage stays as it is."
+    assert verdict(curves, "R1", T, F).startswith("runs one way only")

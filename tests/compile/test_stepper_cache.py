@@ -1,0 +1,273 @@
+"""The cache of the compiled stepper: found, absent, damaged, shared. The kernels here are tiny; the mechanism is the
+same."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from surfacechem.compile import cache as kernelcache
+from surfacechem.compile import objectcode
+from surfacechem.compile.cache import is_filled, unsealed
+from surfacechem.solve.radau import stepper
+
+pytestmark = pytest.mark.around
+
+KERNEL = """
+import numpy as np
+
+
+def kernel(x):
+    x[0] = 42.0
+"""
+COMMAND = """
+import sys
+from surfacechem.cli import app
+app(["run", "exothermic", "-q", "-o", sys.argv[1]], standalone_mode=False)
+"""
+USE = """
+import sys, warnings
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from tiny_kernel import kernel
+from numba import float64, void
+import numpy as np
+from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
+folder = kernel_folder([Path({here!r}) / "tiny_kernel.py"])
+x = np.zeros(1)
+compiled = compile_kernel(kernel, void(float64[::1]), folder)
+compiled(x)
+assert x[0] == 42.0
+print("hits", sum(compiled.stats.cache_hits.values()), "filled", is_filled(folder))
+"""
+
+
+@pytest.fixture
+def start(tmp_path: Path):
+    (tmp_path / "tiny_kernel.py").write_text(KERNEL)
+
+    def run(cache: Path, first: str = "", here: Path = tmp_path) -> subprocess.Popen[str]:
+        environment = {**os.environ, "SURFACECHEM_CACHE": str(cache)}
+        code = first + USE.format(here=str(here))
+        pipe = subprocess.PIPE
+        return subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdin=pipe, stdout=pipe, stderr=pipe, text=True
+        )
+
+    return run
+
+
+STEPS = ["tempfile.mkstemp", "os.fsync", "os.replace"]
+BY_STEPS = f"""
+import os, tempfile
+from numba.core import dispatcher
+def pausing(usual):
+    def step(*arguments, **options):
+        print("paused", flush=True)
+        input()
+        return usual(*arguments, **options)
+    return step
+def compile(*arguments):
+    for step in {STEPS}:
+        exec(f"{{step}} = pausing({{step}})")
+    return usual(*arguments)
+usual = dispatcher._FunctionCompiler.compile
+dispatcher._FunctionCompiler.compile = pausing(compile)
+"""
+"""A process that has found nothing waits before it compiles, then before each step of keeping what it has compiled."""
+
+
+def pauses(process: subprocess.Popen[str]) -> Iterator[int]:
+    """Count the steps of a process, which goes on with the next as the loop does."""
+    for step in count():
+        if process.stdout.readline() != "paused\n":
+            return
+        yield step
+        process.stdin.write("go on\n")
+        process.stdin.flush()
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[str, str]:
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    return out.strip(), err
+
+
+def test_second_process_loads(start, tmp_path: Path) -> None:
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_two_processes_at_once(start, tmp_path: Path) -> None:
+    both = [start(tmp_path / "cache") for _ in range(2)]
+    assert all(finish(process)[0].endswith("filled True") for process in both)
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_a_filled_cache_stays_filled_while_another_process_writes_to_it(start, tmp_path: Path, monkeypatch) -> None:
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(cache))
+    late = start(cache, BY_STEPS)
+    for step in pauses(late):
+        if step == 0:
+            assert finish(start(cache))[0] == "hits 0 filled True"
+            (folder,) = cache.iterdir()
+        assert is_filled(folder)
+    assert step >= len(STEPS)
+    finish(late)
+    assert is_filled(folder)
+
+
+@pytest.mark.parametrize("last", range(len(STEPS) + 1))
+def test_what_a_killed_process_leaves_is_in_nobodys_way(start, tmp_path: Path, last: int) -> None:
+    killed = start(tmp_path / "cache", BY_STEPS)
+    for step in pauses(killed):
+        if step == last:
+            killed.kill()
+            break
+    killed.communicate()
+    assert killed.returncode < 0
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_folder_that_cannot_be_written(start, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    out, err = finish(start(tmp_path / "file" / "cache"))
+    assert out == "hits 0 filled False"
+    assert err.count("cannot be kept") == 1
+
+
+def test_disk_that_is_full(start, tmp_path: Path) -> None:
+    """No file may grow beyond nothing: every write fails as on a full disk."""
+    out, err = finish(start(tmp_path / "cache", "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"))
+    assert out.startswith("hits 0")
+    assert err.count("cannot be kept") == 1
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+
+
+def test_a_damaged_file_is_replaced(start, tmp_path: Path) -> None:
+    finish(start(tmp_path / "cache"))
+    (file,) = (tmp_path / "cache").glob("*/*")
+    file.write_bytes(b"damaged")
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_code_is_found_wherever_its_sources_are(start, tmp_path: Path) -> None:
+    """The same sources at two places are one kernel; what is kept does not depend on who compiled it first."""
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "tiny_kernel.py").rename(tmp_path / "elsewhere" / "tiny_kernel.py")
+    assert finish(start(tmp_path / "cache", here=tmp_path / "elsewhere"))[0] == "hits 1 filled True"
+    assert len(list((tmp_path / "cache").glob("*/*"))) == 1
+
+
+def test_code_for_another_processor_is_not_loaded(start, tmp_path: Path) -> None:
+    assert finish(start(tmp_path / "cache", "import os; os.environ['NUMBA_CPU_NAME'] = 'generic'"))[0].startswith(
+        "hits 0"
+    )
+    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A folder of the stepper of this machine: its own code and Numba's."""
+    stepper.compile_stepper()
+    folder = tmp_path_factory.mktemp("cache") / stepper._folder().name
+    shutil.copytree(stepper._folder(), folder)
+    return folder
+
+
+def test_a_flipped_bit_is_never_loaded(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    random = Random(1)
+    files = [path.name for path in kept.glob("kernel.*")]
+    assert kernelcache.FILE in files
+    for file in files:
+        content = (kept / file).read_bytes()
+        for bit in (0, 8 * len(content) - 1, *(random.randrange(8 * len(content)) for _ in range(20))):
+            folder = tmp_path / kept.name
+            shutil.copytree(kept, folder)
+            damaged = bytearray(content)
+            damaged[bit // 8] ^= 1 << bit % 8
+            (folder / file).write_bytes(damaged)
+            assert file != objectcode.FILE or objectcode.load(folder) is None
+            assert not is_filled(folder)  # so that the next process makes all of it anew
+            shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"damaged", b"kernel\ncode"])
+def test_what_is_no_code_is_not_loaded(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "folder").mkdir(mode=0o755)
+    (tmp_path / "folder" / objectcode.FILE).write_bytes(content)
+    assert objectcode.load(tmp_path / "folder") is None
+
+
+def test_a_command_runs_where_the_cache_is_damaged(kept: Path, tmp_path: Path) -> None:
+    """Code that is cut off is not called but made anew; the run is that of every other day."""
+    folder = tmp_path / "cache" / kept.name
+    shutil.copytree(kept, folder)
+    with (folder / objectcode.FILE).open("r+b") as file:
+        file.truncate(1000)
+    done = subprocess.run(
+        [sys.executable, "-c", COMMAND, str(tmp_path / "run.nc")],
+        env={**os.environ, "SURFACECHEM_CACHE": str(folder.parent), "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert is_sound_object(folder / objectcode.FILE)
+
+
+def is_sound_object(path: Path) -> bool:
+    return unsealed(path.read_bytes()) is not None
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="permissions of POSIX")
+@pytest.mark.parametrize("which", ["root", "folder", "file", "link"])
+def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path, which: str) -> None:
+    cache = tmp_path / "cache"
+    assert finish(start(cache))[0] == "hits 0 filled True"
+    (folder,) = cache.iterdir()
+    if which == "link":
+        folder.rename(tmp_path / "elsewhere")
+        folder.symlink_to(tmp_path / "elsewhere")
+    else:
+        path = {"root": cache, "folder": folder, "file": folder / kernelcache.FILE}[which]
+        path.chmod(path.stat().st_mode | 0o020)
+    out, err = finish(start(cache))
+    assert out == "hits 0 filled False"
+    assert err.count("can be written by other users") == 1
+
+
+def test_what_is_kept_is_writable_to_oneself_alone(start, tmp_path: Path) -> None:
+    assert finish(start(tmp_path / "cache", "import os; os.umask(0o002)"))[0] == "hits 0 filled True"
+    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
+
+
+def test_a_folder_that_another_process_removes_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "kernel" / "part").mkdir(parents=True)
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(tmp_path))
+    scandir = os.scandir
+
+    def gone(path):
+        if Path(path).name == "part":
+            raise FileNotFoundError(path)
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", gone)
+    assert kernelcache.untrusted(tmp_path / "kernel") is None
+
+
+def test_importing_solvers_is_light() -> None:
+    code = "import surfacechem.solve.radau.solver, sys; assert not {'numba', 'scipy', 'sksundae'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,274 @@
+"""Every mistake in a case file is one clear error with file, line, what is allowed and the nearest guess."""
+
+import os
+
+import pytest
+
+from surfacechem.documents import document
+from surfacechem.errors import InputError
+from surfacechem.format import load, load_text
+
+GOOD = """\
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 1 kJ/m^2/K}
+  upper: {temperature: T, C: 1 kJ/m^2/K}
+interface:
+  temperature: T
+  sites: 1e18 1/m^2
+  potential:
+    - bond-energy: {K_0: 300 J/m^2}
+  friction:
+    - coulomb: {mu: {value: 0.3, times: [power: {exponent: -2}]}}
+  bonding:
+    - relaxation: {tau: 0.5 s}
+heat:
+  - conductance: {between: [lower, surroundings], h: 12 W/m^2/K}
+surroundings: {temperature: 300 K}
+loading: {v: 0.1 m/s, p: 1 kPa}
+initial: {phi: 0, T: 300 K}
+run: {until: 5 s}
+reference: bonding
+"""
+
+BODY_KEYS = "Known: C, E, H, capacity, conduction, stiffness, temperature."
+RUN_KEYS = "Known: accuracy, atol, first, max-seconds, max-steps, outputs, rtol, solver, spacing, times, until."
+
+MISTAKES = [
+    # what to replace, by what, the message
+    (
+        "lower: {temperature: T, C:",
+        "lower: {temperature: T, Cc:",
+        f"3: bodies.lower: unknown key 'Cc'. Did you mean 'C'? {BODY_KEYS}",
+    ),
+    ("lower: {temperature: T,", "lower: {temperatur: T,", "3: bodies.lower: unknown key 'temperatur'. Did you mean 't"),
+    ("1 kJ/m^2/K}\n  up", "1 kJ/m^2}\n  up", "3: bodies.lower.C: 1 kJ/m^2 is an energy per area; C needs a heat"),
+    ("C: 1 kJ/m^2/K}\n  up", "C: -1}\n  up", "3: bodies.lower.C: C = -1 is outside its range: > 0."),
+    ("C: 1 kJ/m^2/K}\n  up", "C: .nan}\n  up", "3: bodies.lower.C: C must be finite, got 'nan'."),
+    ("C: 1 kJ/m^2/K}\n  up", "capacity: cubic}\n  up", "3: bodies.lower.capacity: no capacity 'cubic'. Known: const"),
+    ("C: 1 kJ/m^2/K}\n  up", "capacity: constant}\n  up", "3: bodies.lower: constant needs `C`: heat capacity per"),
+    ("  upper:", "  lower:", "4: the key 'lower' is given twice, first in line 3."),
+    ("  upper:", "  interface:", "4: bodies.interface: 'interface' cannot name a body"),
+    ("  upper: {temperature: T, C: 1 kJ/m^2/K}\n", "", "2: bodies: exactly two bodies are needed, not 1"),
+    ("upper: {temperature: T,", "upper: {", "4: bodies.upper: upper needs `temperature`: a name such as T, or a val"),
+    ("upper: {temperature: T,", "upper: {temperature: -5,", "4: bodies.upper.temperature: -5 K is not an absolute t"),
+    ("upper: {temperature: T,", "upper: {temperature: 25 C,", "4: bodies.upper.temperature: 25 C is an electric char"),
+    ("upper: {temperature: T,", "upper: {temperature: mu,", "4: bodies.upper.temperature: 'mu' cannot name a temper"),
+    ("upper: {temperature: T,", "upper: {temperature: T_1,", "4: bodies.upper.temperature: 'T_1' is temperature of"),
+    ("bodies:", "bodys:", "2: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
+    ("T_0: 300 K", "T_0: 3 s", "1: T_0: 3 s is a time; T_0 needs a temperature [K]."),
+    ("T_0: 300 K", "T_0: 0", "1: T_0: T_0 = 0 is outside its range: > 0."),
+    (
+        "potential:",
+        "potentials:",
+        "8: interface: unknown key 'potentials'. Did you mean 'potential'? Known: bonding, f",
+    ),
+    ("- bond-energy: {K_0", "- bond-enrgy: {K_0", "9: interface.potential.bond-enrgy: no potential law 'bond-enrgy'. "),
+    (
+        "- bond-energy: {K_0",
+        "- bond-energy: {k_0",
+        "9: interface.potential.bond-energy: unknown key 'k_0'. Did you mea",
+    ),
+    ("- bond-energy: {K_0: 300 J/m^2}", "- []", "9: interface.potential[1]: a law is `name: {parameters}`, not a list"),
+    ("- bond-energy: {K_0", "bond-energy: {K_0", "8: interface.potential: this must be a list"),
+    ("{tau: 0.5 s}", "{tau: 0 s}", "13: interface.bonding.relaxation.tau: tau = 0 is outside its range: > 0."),
+    ("{tau: 0.5 s}", "{}", "13: interface.bonding.relaxation: relaxation needs `tau`: relaxation time [s]."),
+    ("relaxation: {tau: 0.5 s}", "relaxation", "13: interface.bonding.relaxation: relaxation needs `tau`"),
+    ("times: [power", "times: [powr", "11: interface.friction.coulomb.mu.times.powr: no factor law 'powr'. Did you"),
+    ("times: [power: {e", "time: [power: {e", "11: interface.friction.coulomb.mu: unknown key 'time'. Did you mean"),
+    ("[power: {exponent: -2}]", "[power: {exponent: -2, of: w}]", "11: interface.friction.coulomb.mu.times.power.of:"),
+    ("exponent: -2", "exponent: {value: 1}", "power.exponent: exponent cannot vary; give it a value."),
+    ("sites: 1e18 1/m^2", "sites: {lower: 1e18}", "7: interface.sites: the sites of upper are missing"),
+    ("sites: 1e18 1/m^2", "sites: -1", "7: interface.sites: sites = -1 is outside its range: > 0."),
+    ("  sites:", "  partition: 0.5\n  sites:", "7: interface.partition: an interface with a temperature divides it"),
+    ("[lower, surroundings]", "[lowr, surroundings]", "15: heat.conductance.between: no end 'lowr'. Did you mean 'l"),
+    ("[lower, surroundings]", "[lower, lower]", "15: heat.conductance.between: a heat path needs two different ends"),
+    ("[lower, surroundings]", "[lower]", "15: heat.conductance.between: between needs 2 entries, got 1."),
+    ("[lower, surroundings]", "lower", "15: heat.conductance.between: this must be a list, not 'lower'."),
+    ("surroundings: {temperature: 300 K}\n", "", "15: heat.conductance.between: the surroundings have no temperature."),
+    ("{temperature: 300 K}", "{temperature: 0 K}", "16: surroundings.temperature: 0 K is not an absolute temperature"),
+    (
+        "loading: {v:",
+        "loading: {w:",
+        "17: loading: unknown key 'w'. Known: F_n, F_t, F_t2, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v,",
+    ),
+    ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
+    ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),
+    ("v: 0.1 m/s", "v: {rampe: {rate: 1}}", "17: loading.v: no loading law 'rampe'. Did you mean 'ramp'?"),
+    ("v: 0.1 m/s", "v: {ramp: {rate: 1 m/s}}", "17: loading.v.ramp.rate: 1 m/s is a velocity; rate needs an accele"),
+    ("v: 0.1 m/s", "v: {table: {times: [0, 1], values: [0]}}", "17: loading.v.table: a table needs as many times (2)"),
+    ("v: 0.1 m/s", "v: {table: {times: [0, 1 m], values: [0]}}", "17: loading.v.table.times[2]: 1 m is a length; time"),
+    ("v: 0.1 m/s", "v: 0.1 m/s, T: 3 K", "18: initial.T: T is prescribed under `loading`, so it has no initial value"),
+    ("phi: 0,", "phi: 2,", "18: initial.phi: phi = 2 is outside its range: >= 0 and <= 1."),
+    (
+        "phi: 0,",
+        "psi: 0,",
+        "18: initial.psi: nothing that evolves is called 'psi'. Did you mean 'phi'? Known: T, ln_phi, phi.",
+    ),
+    ("T: 300 K}\nrun", "T: -1 K}\nrun", "18: initial.T: T = -1 is outside its range: > 0."),
+    ("{until: 5 s}", "{until: -5 s}", "19: run.until: until = -5 is outside its range: > 0."),
+    ("{until: 5 s}", "{untill: 5 s}", f"19: run: unknown key 'untill'. Did you mean 'until'? {RUN_KEYS}"),
+    ("{until: 5 s}", "{outputs: 5}", "19: run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
+    ("{until: 5 s}", "{until: 5 s, outputs: 1}", "19: run.outputs: outputs = 1 is outside its range: >= 2"),
+    ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),
+    ("{until: 5 s}", "{until: 5 s, outputs: 1e99}", "19: run.outputs: outputs = 1e+99 is outside its range: >= 2 an"),
+    ("{until: 5 s}", "{until: 5 s, spacing: log}", "19: run.spacing: no spacing 'log'. Known: linear, logarithmic."),
+    ("{until: 5 s}", "{until: 5 s, spacing: logarithmic}", "19: run.spacing: logarithmic spacing needs `first`"),
+    ("{until: 5 s}", "{until: 5 s, first: 1}", "19: run.first: `first` belongs to `spacing: logarithmic`."),
+    ("{until: 5 s}", "{until: 5 s, times: [1]}", "19: run.until: the output times have two roles: give `times` or `u"),
+    ("{until: 5 s}", "{times: [2, 1]}", "19: run.times: output times must increase from each to the next."),
+    ("{until: 5 s}", "{times: []}", "19: run.times: at least one time after 0 is needed."),
+    ("{until: 5 s}", "{until: 5, accuracy: 1e-8, rtol: 1e-8}", "19: run.accuracy: the tolerance has two roles: give `"),
+    ("{until: 5 s}", "{until: 5, solver: radua}", "19: run.solver: no solver 'radua'. Did you mean 'radau'? Known: "),
+    ("{until: 5 s}", "5 s", "19: run: this must be a mapping with the keys until, outputs,"),
+    ("reference: bonding", "reference: bondin", "20: reference: no exact solution 'bondin'. Did you mean 'bonding'?"),
+    (
+        "reference: bonding",
+        "reference: {name: bonding, tao: 1}",
+        "20: reference: unknown key 'tao'. Did you mean 'tau'?",
+    ),
+    ("reference: bonding", "reference: {tau: 1}", "20: reference: the exact solution needs a `name`."),
+    ("  bonding:", "  mechanism: nothing\n  bonding:", "12: interface.mechanism: no mechanism nothing.yaml beside"),
+    (
+        "run: {",
+        "\trun: {",
+        "19: not YAML: while scanning for the next token, found character '\\t' that cannot start any",
+    ),
+    ("run: {until: 5 s}", "run: {until: 5 s", "20: not YAML: while parsing a flow mapping, expected ',' or '}', bu"),
+    ("run: {until: 5 s}\n", "", "1: the case needs `run`, for example `run: {until: 5 s}`."),
+    ("run: {", "run: !!python/name:os.system {", "19: a tag (tag:yaml.org,2002:python/name:os.system), which is not"),
+    ("T_0: 300 K", "T_0: &a [*a]", "1: the alias *a has no anchor before it."),
+    ("T_0: 300 K", "--- 1\n---", "2: more than one document."),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[f"{new!r:.40}" for _, new, _ in MISTAKES])
+def test_message(old, new, message):
+    assert old in GOOD
+    with pytest.raises(InputError) as error:
+        load_text(GOOD.replace(old, new, 1), file="a.yaml")
+    shown = str(error.value)
+    assert message in shown
+    assert shown.startswith("a.yaml:")
+    assert "\n" not in shown
+
+
+def test_the_good_case_is_good():
+    assert load_text(GOOD).system().warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        (
+            "bodies.lower.Cc=2",
+            f"override: bodies.lower: unknown key 'Cc'. Did you mean 'C'? {BODY_KEYS}",
+        ),
+        ("bodys.lower.C=2", "override: unknown key 'bodys'. Did you mean 'bodies'? Known: T_0, bodies,"),
+        (
+            "bodies.lower.C=3 nm",
+            "override: bodies.lower.C: 3 nm is a length; C needs a heat capacity per area [J/(m^2 K",
+        ),
+        ("interface.potential.bond-enrgy.K_0=1", "nothing is called 'bond-enrgy' in interface.potential. Did you mean"),
+        ("interface.potential.bond-energy[2].K_0=1", "nothing is called 'bond-energy[2]' in interface.potential. Did"),
+        ("run.until.now=3", "override: run.until.now: run.until is a value, not a mapping."),
+        ("run.until=", "run: the run needs an end. Add `until: 1 s`, or a list of `times`."),
+        ("run.outputs=", "override: run.outputs: there is no 'outputs' to remove. Known: until."),
+        ("initial.t=null", "override: initial.t: there is no 't' to remove. Did you mean 'T'? Known: T, phi."),
+        ("loading.v.level=", "override: loading.v.level: loading.v is a value, not a mapping."),
+        ("interface.friction.coulom=", "nothing is called 'coulom' in interface.friction. Did you mean 'coulomb'?"),
+        ("run.until={", "override: run.until: not YAML: while parsing a flow"),
+        ("run.until", "override: 'run.until' is not of the form path=value, for example `run.until=5 s`."),
+        ("=", "override: '=' is not of the form path=value"),
+    ],
+)
+def test_message_of_an_override(override, message):
+    with pytest.raises(InputError) as error:
+        load_text(GOOD, overrides=[override])
+    assert message in str(error.value)
+
+
+BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"{chr(98 + i)}: &{chr(98 + i)} [{', '.join([f'*{chr(97 + i)}'] * 9)}]\n" for i in range(12)
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "{}: the file is empty."),
+        (b"# only a comment\n", "{}: the file is empty."),
+        (b"- 1\n- 2\n", "{}:1: this must be a mapping with the keys title, source,"),
+        (b"just text", "{}:1: this must be a mapping with the keys title, source,"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "{}: no text in UTF-8; a case is a YAML file"),
+        (b"title: a\x00b\n", "{}:1: a control character, which YAML does not allow."),
+        (b"x" * (document.CASE.largest + 1), "{}: larger than 1000000 bytes."),
+        (b"[" * 100_000, "{}:1: nested deeper than 24 levels."),
+        (b"a: [" + b"1, " * (document.CASE.most + 1) + b"]", "{}:1: more than 20000 values."),
+        (BOMB.encode(), "aliases repeat more than 20000 values."),
+        (b"%YAML 1.9\n---\na: 1", "{}: not YAML: version minor part"),
+    ],
+)
+def test_files_that_are_no_cases(tmp_path, content, message):
+    path = tmp_path / "bad.yaml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as error:
+        load(path)
+    assert message.format(path) in str(error.value)
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path):
+    path = tmp_path / "good.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
+    assert load(path).run.t_end == 5.0
+
+
+def test_a_missing_case():
+    with pytest.raises(
+        InputError, match=r"^no file and no case 'endotermic'\. Did you mean 'endothermic'\? `surfacechem cases` lists"
+    ):
+        load("endotermic")
+    with pytest.raises(InputError, match=r"^no file and no case 'x/endotermic.yaml'\. Did you mean 'endothermic'\?"):
+        load("x/endotermic.yaml")
+    with pytest.raises(InputError, match=r"^no file and no case"):
+        load("a\0b")
+    with pytest.raises(InputError, match=r"^no file and no case"):
+        load("a" * 5000)
+
+
+def test_a_file_beside_is_the_nearest_guess(tmp_path):
+    (tmp_path / "pulled.yaml").write_text(GOOD)
+    with pytest.raises(InputError, match=r"pull\.yaml'\. Did you mean 'pulled\.yaml'\?"):
+        load(tmp_path / "pull.yaml")
+    with pytest.raises(InputError, match=r"exotermic\.yaml'\. Did you mean 'exothermic'\?"):
+        load(tmp_path / "exotermic.yaml")
+
+
+def test_a_folder_is_no_case(tmp_path):
+    with pytest.raises(InputError, match="this is a folder; a YAML file is needed"):
+        load(tmp_path)
+
+
+def test_a_pipe_is_no_case(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="this is no ordinary file; a YAML file is needed"):
+        load(tmp_path / "pipe")
+
+
+def test_an_unreadable_file(tmp_path, monkeypatch):
+    path = tmp_path / "locked.yaml"
+    path.write_text(GOOD)
+
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.open", refuse)
+    with pytest.raises(InputError, match=r"locked\.yaml: cannot be read: Permission denied\."):
+        load(path)
+
+
+def test_a_binary_mechanism(tmp_path):
+    (tmp_path / "case.yaml").write_text(GOOD.replace("  sites: 1e18 1/m^2", "  mechanism: m"))
+    (tmp_path / "m.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"m\.yaml: no text in UTF-8"):
+        load(tmp_path / "case.yaml")

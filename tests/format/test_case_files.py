@@ -1,0 +1,82 @@
+"""Every shipped case is valid by its schema, loads, assembles and says where it comes from."""
+
+import json
+
+import jsonschema
+import pytest
+
+from surfacechem import references
+from surfacechem.documents import document
+from surfacechem.documents import shipped as data
+from surfacechem.format import load, names, schema
+
+VALIDATOR = jsonschema.Draft202012Validator(schema.schema())
+
+
+def plain(name):
+    return document.parse(document.read(data.cases() / f"{name}.yaml")).plain()
+
+
+def test_the_schema_is_one():
+    jsonschema.Draft202012Validator.check_schema(json.loads(schema.text()))
+
+
+def test_every_law_has_its_entry():
+    from surfacechem.laws import laws
+
+    definitions = schema.schema()["$defs"]
+    for contract in schema.CONTRACTS:
+        for name, law in laws(contract).items():
+            entry = definitions[f"{contract.contract}.{name}"]
+            assert set(entry["properties"]) == set(dict(law.specs())) | set(dict(law.options()))
+            assert entry["description"]
+
+
+@pytest.mark.parametrize("name", names())
+def test_case(name):
+    case = load(name)
+    assert case.title != name
+    assert case.source
+    assert case.system().warnings == ()
+    assert case.reference is None or case.reference.name in references.names()
+    assert [error.message for error in VALIDATOR.iter_errors(plain(name))] == []
+
+
+@pytest.mark.parametrize("name", names())
+def test_misspelt_keys_do_not_validate(name):
+    for changed in misspelt(plain(name)):
+        assert not VALIDATOR.is_valid(changed), changed
+
+
+FREE = ("lower", "upper", "body", "reservoir", "cold", "hot", "coverages", "loading", "initial", "over")
+
+
+def misspelt(value, key=""):
+    """The document with one key misspelt, for each key that is not a free name."""
+    if isinstance(value, dict):
+        for name, child in value.items():
+            if name not in FREE and key not in (*FREE, "bodies", "reference", "programme", "until"):
+                yield {f"{name}x" if k == name else k: v for k, v in value.items()}
+            if key != "coverages":
+                yield from ({**value, name: changed} for changed in misspelt(child, name))
+    if isinstance(value, list):
+        for i, child in enumerate(value):
+            yield from ([*value[:i], changed, *value[i + 1 :]] for changed in misspelt(child, key))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"bodies": {"lower": {"temperature": "T", "c": 1}, "upper": {"temperature": "T"}}},
+        {"bodies": {"lower": {"temperature": "T"}}},
+        {"interface": {"friction": [{"coulomb": {"mu": -1}}]}},
+        {"interface": {"friction": [{"colomb": {"mu": 1}}]}},
+        {"interface": {"friction": [{"coulomb": {"mu": 1}, "viscous": {"eta": 1}}]}},
+        {"loading": {"w": 1}},
+        {"run": {"outputs": 3}},
+        {"run": {"until": "five seconds"}},
+        {"reference": "slidin"},
+    ],
+)
+def test_wrong_values_do_not_validate(changed):
+    assert not VALIDATOR.is_valid({**plain("sliding-dry"), **changed})

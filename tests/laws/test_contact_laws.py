@@ -1,0 +1,402 @@
+"""What the potentials of contact, cohesion and long range do, and what follows from them by differentiation."""
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import symengine
+from scipy.integrate import quad
+from test_laws import example
+from thermodynamics import number
+
+from surfacechem.contracts.terms import Potential, reads
+from surfacechem.expressions import EXPONENT_CAP, derivative
+from surfacechem.format.schema import schema
+from surfacechem.laws import laws
+from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bulk import Quadratic
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.contact import BondStiffness, Penalty
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.loading import Hold
+from surfacechem.laws.longrange import (
+    WALL,
+    ElectrostaticFlatFlat,
+    ElectrostaticSpherePlane,
+    LennardJonesDerjaguin,
+    LennardJonesFlatFlat,
+    LennardJonesSpherePlane,
+    VanDerWaalsFlatFlat,
+    VanDerWaalsSpherePlane,
+)
+from surfacechem.model.assemble import assemble
+from surfacechem.runs.listing import law_table
+from surfacechem.scene import Body, Interface, Scene, Sites
+from surfacechem.solve.run import Model, Run
+
+FOLDER = Path(__file__).parents[1] / "references"
+GAPS = [law for law in laws(Potential).values() if {"g_n", "g_t"} & set(reads(law.energy))]
+each_gap_law = pytest.mark.parametrize("law", GAPS, ids=lambda law: law.name())
+g, g_t, phi, bonded, T, T_0 = symengine.symbols("g_n g_t phi bonded T_c T_0")
+SITES = {"n_1": 2e19, "n_2": 3e19, "psi_0": 4e-21, "g_0": 3e-10}
+
+
+def symbolic(law: Potential):
+    return symengine.sympify(law.energy(**{name: symengine.Symbol(name) for name in reads(law.energy)}))
+
+
+def at(expression, **values: float) -> float:
+    """To 60 digits, so that what is compared is the formula and not rounding."""
+    point = {symengine.Symbol(name): mpmath.mpf(value) for name, value in values.items()}
+    return float(number(expression, point))
+
+
+def compiled(expression, **values: float) -> float:
+    """In double precision, as a run evaluates it."""
+    function = symengine.Lambdify([symengine.Symbol(name) for name in values], [expression], backend="llvm")
+    return float(function(list(values.values()))[0])
+
+
+def read(name: str) -> tuple[list[str], np.ndarray, dict[str, float]]:
+    data = json.loads((FOLDER / f"{name}.json").read_text())
+    rows = np.array([[float(entry) for entry in row] for row in data["rows"]])
+    return data["columns"], rows, {key: float(value) for key, value in data["expect"].items()}
+
+
+@each_gap_law
+def test_finite_everywhere(law):
+    """Value, traction and tangent at gaps over 600 decades and of both signs, as compiled."""
+    energy = symbolic(example(law, 1))
+    names = sorted(str(symbol) for symbol in energy.free_symbols)
+    sizes = [0.0, *(sign * 10.0**e for e in (-300, -30, -9, -3, 0, 3, 9, 30) for sign in (1, -1))]
+    gaps = [name for name in names if name in ("g_n", "g_t")]
+    order = [energy, *(derivative(energy, symengine.Symbol(x)) for x in gaps)]
+    order += [derivative(derivative(energy, symengine.Symbol(x)), symengine.Symbol(y)) for x in gaps for y in names]
+    function = symengine.Lambdify([symengine.Symbol(name) for name in names], order, backend="llvm")
+    for size in sizes:
+        for tangential in sizes:
+            values = {"g_n": size, "g_t": tangential, "phi": 0.5, "bonded": 1.0, "N_c": 1e15}
+            assert np.isfinite(function([values[name] for name in names])).all(), values
+
+
+@each_gap_law
+def test_traction_is_the_slope_of_the_energy(law):
+    """Difference quotients with 60 digits, also across the joints of pieces, where the energy is smooth."""
+    given = example(law, 2)
+    parameters = {symengine.Symbol(name): mpmath.mpf(getattr(given, name)) for name, _ in law.specs()}
+    energy = symbolic(given.bind({str(symbol): symbol for symbol in parameters}))
+    point = {g: mpmath.mpf("0.3"), g_t: mpmath.mpf("0.2"), phi: mpmath.mpf("0.5"), bonded: mpmath.mpf(1)} | parameters
+    point[symengine.Symbol("N_c")] = mpmath.mpf(3)
+    step = mpmath.mpf(10) ** -25
+    for x in {g, g_t, phi} & energy.free_symbols:
+        slope = derivative(energy, x)
+        for value in map(mpmath.mpf, (0, 0.3, -0.3, 0.7)):
+            above, below = (number(energy, point | {x: value + side * step}) for side in (1, -1))
+            exact, difference = number(slope, point | {x: value}), (above - below) / (2 * step)
+            assert abs(exact - difference) <= 1e-14 * (1 + abs(exact)), "constants are doubles"
+
+
+def test_penalty_bears_pressure_only():
+    energy = symbolic(Penalty(E_n=1e12))
+    traction = derivative(energy, g)
+    assert [at(traction, g_n=x) for x in (-1e-6, 0.0, 1e-6)] == [-1e6, 0.0, 0.0]
+    assert [at(derivative(traction, g), g_n=x) for x in (-1e-6, 1e-6)] == [1e12, 0.0]
+
+
+def test_bonds_weaken_in_tension_and_not_in_compression():
+    energy = symbolic(BondStiffness(E_b=1e12, E_n=3e12))
+    traction, affinity = derivative(energy, g), derivative(energy, phi)
+    assert at(traction, g_n=1e-6, phi=0.25) == 2.5e5
+    assert at(traction, g_n=-1e-6, phi=0.25) == -3e6
+    assert (at(affinity, g_n=1e-6, phi=0.25), at(affinity, g_n=-1e-6, phi=0.25)) == pytest.approx((0.5, 0.0))
+
+
+def test_bond_springs_in_chemical_equilibrium():
+    """Against the exact table; the traction along equilibrium has its peak at sqrt(2K/3E) and does the work K/2."""
+    columns, rows, expect = read("h_damage_equilibrium")
+    E, K = 1e16, 0.2
+    energy = symbolic(BondStiffness(E_b=E, E_n=E)) + BondEnergy(K_0=K).energy(phi=phi, T_c=T, T_0=T_0)
+    for x, bonds, t in rows:
+        if bonds > 0:
+            assert at(derivative(energy, phi), g_n=x, phi=bonds, T_c=300, T_0=300) == pytest.approx(0, abs=1e-15)
+        assert at(derivative(energy, g), g_n=x, phi=bonds) == pytest.approx(t, rel=1e-14)
+    assert columns == ["g", "phi", "t_n"]
+    assert expect["g_peak"] == pytest.approx(math.sqrt(2 * K / (3 * E)), rel=1e-15)
+
+
+def test_cohesive_strength_and_work():
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
+    for energy in (symbolic(zone), symengine.sympify(zone.energy(g_n=g))):
+        traction = derivative(energy, g)
+        assert at(traction, g_n=1e-8, g_t=0.0) == pytest.approx(1e6, rel=1e-15)
+        assert at(derivative(traction, g), g_n=1e-8, g_t=0.0) == pytest.approx(0.0, abs=1e-15 * 1e6 / 1e-8)
+        assert at(traction, g_n=-1e-8, g_t=0.0) == -1e7
+        small = compiled(traction, g_n=1e-300, g_t=0.0)
+        assert small == pytest.approx(math.e * 1e6 / 1e-8 * 1e-300, rel=1e-14), "no cancellation"
+    assert zone.energy(g_n=1.0) - zone.energy(g_n=0.0) == pytest.approx(math.e * 1e6 * 1e-8, rel=1e-15)
+    for law in (zone, XuNeedleman(Phi_n=1.0, g_0=1e-8, g_t0=1e-8)):
+        slope = derivative(symbolic(law), g)
+        assert compiled(slope, g_n=1e-18, g_t=0.0) == pytest.approx(at(slope, g_n=1e-18, g_t=0.0), rel=1e-14)
+
+
+def test_a_cohesive_zone_is_as_strong_in_shear_as_in_tension():
+    """The traction is along the gap, whatever its direction, and pressure adds to it without softening."""
+    t_max, g_0, E_n = 1e6, 1e-8, 1e15
+    energy = symbolic(ExponentialCohesiveZone(t_max=t_max, g_0=g_0, E_n=E_n))
+    normal, shear = derivative(energy, g), derivative(energy, g_t)
+    for size in (1e-3, 1.0, 4.0):
+        t = t_max * size * math.exp(1 - size)
+        for angle in (0.0, 0.4, -0.4, math.pi / 2):
+            c, s = math.cos(angle), math.sin(angle)
+            gap = {"g_n": size * g_0 * c, "g_t": size * g_0 * s}
+            found = at(normal, **gap), at(shear, **gap)
+            assert found == pytest.approx((t * c, t * s), rel=1e-14, abs=1e-14 * t)
+        pressed = at(normal, g_n=-1e-9, g_t=size * g_0), at(shear, g_n=-1e-9, g_t=size * g_0)
+        assert pressed == pytest.approx((-E_n * 1e-9, t), rel=1e-14)
+    closed = compiled(derivative(shear, g_t), g_n=0.0, g_t=0.0), compiled(derivative(normal, g), g_n=0.0, g_t=1e-30)
+    assert closed == pytest.approx((math.e * t_max / g_0, E_n), rel=1e-14), "stiffness of a closed zone"
+
+
+def test_xu_needleman_without_shear_is_the_exponential_zone():
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=0.0)
+    for q, r in ((1.0, 0.0), (0.4, 0.0), (0.4, 0.3)):
+        coupled = XuNeedleman(Phi_n=math.e * 1e6 * 1e-8, g_0=1e-8, g_t0=2e-8, q=q, r=r)
+        for x in (0.0, 3e-9, 1e-8, 5e-8, 1e-7):
+            assert coupled.energy(g_n=x, g_t=0.0) == pytest.approx(zone.energy(g_n=x), rel=1e-14)
+
+
+def test_xu_needleman_in_shear():
+    """Work q Phi_n, strength at g_t0 / sqrt(2), and no normal traction at the gap r g_0 after complete shear."""
+    law = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.6, r=0.3)
+    assert law.energy(g_n=0.0, g_t=1.0) - law.energy(g_n=0.0, g_t=0.0) == pytest.approx(0.06, rel=1e-14)
+    energy = symbolic(law)
+    shear = derivative(energy, g_t)
+    peak = 2e-8 / math.sqrt(2)
+    assert at(shear, g_n=0.0, g_t=peak) == pytest.approx(0.6 * 0.1 * math.sqrt(2 / math.e) / 2e-8, rel=1e-14)
+    assert at(derivative(shear, g_t), g_n=0.0, g_t=peak) == pytest.approx(0.0, abs=1.0)
+    assert at(derivative(energy, g), g_n=0.3e-8, g_t=1.0) == pytest.approx(0.0, abs=1e-6)
+    mixed = derivative(derivative(energy, g), g_t) - derivative(derivative(energy, g_t), g)
+    assert at(mixed, g_n=1e-8, g_t=1e-8) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_strength_that_varies_gives_entropy_affinity_and_capacity():
+    """t_max(T, phi): S = t_T Y, M = -t_phi Y, C_eff = T t_TT Y, all with Y = (g + g_0) exp(1 - g/g_0)."""
+    t_0, g_0 = 5e7, 1e-8
+    strength = t_0 * phi * T_0 / T
+    energy = ExponentialCohesiveZone(t_max=1.0, g_0=g_0, E_n=0.0).bind({"t_max": strength}).energy(g_n=g)
+    S, M = -derivative(energy, T), derivative(energy, phi)
+    capacity = T * derivative(S, T)
+    for x in (0.0, 4e-9, 3e-8):
+        here = {"g_n": x, "phi": 0.7, "T_c": 320.0, "T_0": 300.0}
+        Y = (x + g_0) * math.exp(1 - x / g_0)
+        assert at(S, **here) == pytest.approx(-t_0 * 0.7 * 300 / 320**2 * Y, rel=1e-14)
+        assert at(M, **here) == pytest.approx(-t_0 * 300 / 320 * Y, rel=1e-14)
+        assert at(capacity, **here) == pytest.approx(2 * t_0 * 0.7 * 300 / 320**2 * Y, rel=1e-14)
+        assert at(energy + T * S, **here) == pytest.approx(2 * at(energy, **here), rel=1e-14)
+    elastic = derivative(derivative(energy, T), g)
+    assert at(elastic, **here) == pytest.approx(-t_0 * 0.7 * 300 / 320**2 * 3 * math.exp(-2), rel=1e-14)
+
+
+def test_range_that_varies_gives_the_complete_terms():
+    """g_0(T) too: mixed derivatives agree, and the energy of touching surfaces carries its own entropy."""
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15).bind({"g_0": 1e-8 * T / T_0})
+    energy = zone.energy(g_n=g)
+    for x in (-1e-8, 4e-9):
+        here = {"g_n": x, "T_c": 320.0, "T_0": 300.0}
+        left, right = derivative(derivative(energy, T), g), derivative(derivative(energy, g), T)
+        assert at(left, **here) == pytest.approx(at(right, **here), rel=1e-14, abs=1e-12)
+    assert at(-derivative(energy, T), g_n=-1e-8, T_c=320.0, T_0=300.0) == pytest.approx(math.e * 1e-2 / 300, rel=1e-14)
+
+
+def test_adhesion_breaks_where_the_elastic_energy_exceeds_it():
+    law = AdhesionIntensity(C_N=1e12, C_T=2e12, w=0.5, E_n=1e14)
+    M = derivative(symbolic(law), phi)
+    threshold = math.sqrt(0.5 / 0.8 / 1e12)
+    assert at(M, g_n=threshold, g_t=0.0, phi=0.8) == pytest.approx(0.0, abs=1e-15)
+    assert at(M, g_n=-1e-6, g_t=1e-6, phi=0.8) == pytest.approx(2e12 * 1e-12 * 0.8 - 0.5, rel=1e-14)
+    rate = AdhesionLoss(b=3.0)
+    for x, expected in ((0.9 * threshold, 0.0), (2 * threshold, -(4 - 1) * 0.5 / 3)):
+        mu = at(M, g_n=x, g_t=0.0, phi=0.8) / 1e18
+        assert rate.rate(mu=mu, n_c=1e18, N_c=1e18) / 1e18 == pytest.approx(expected, rel=1e-13)
+
+
+def test_lennard_jones_between_flats():
+    _, rows, expect = read("i_lj_flat_flat")
+    law = LennardJonesFlatFlat(**SITES)
+    traction = derivative(symbolic(law), g)
+    for x, W, t in rows:
+        assert law.energy(g_n=float(x)) == pytest.approx(W, rel=1e-14)
+        assert at(traction, g_n=x) == pytest.approx(t, rel=1e-13)
+        assert compiled(traction, g_n=x) == pytest.approx(t, rel=1e-13)
+    assert at(traction, g_n=expect["g_peak"]) == pytest.approx(expect["t_peak"], rel=1e-14)
+    assert law.energy(g_n=expect["g_zero"]) == pytest.approx(-expect["W_adh"], rel=1e-14)
+    assert law.stiffness == pytest.approx(expect["A"], rel=1e-15)
+
+
+def test_lennard_jones_between_sphere_and_plane():
+    _, rows, expect = read("i_lj_sphere_plane")
+    sphere = {**SITES, "R": 5e-8, "area": 2e-16}
+    exact, approximate = (
+        derivative(symbolic(law(**sphere)), g) for law in (LennardJonesSpherePlane, LennardJonesDerjaguin)
+    )
+    for x, F, F_derjaguin, _ in rows:
+        assert 2e-16 * at(exact, g_n=x) == pytest.approx(F, rel=1e-12)
+        assert 2e-16 * at(approximate, g_n=x) == pytest.approx(F_derjaguin, rel=1e-13)
+    assert 2e-16 * at(exact, g_n=expect["g_pulloff"]) == pytest.approx(expect["F_pulloff"], rel=1e-13)
+    assert at(derivative(exact, g), g_n=expect["g_pulloff"]) == pytest.approx(0.0, abs=1e-12 * 1e9 / 1e-10)
+
+
+@pytest.mark.parametrize("gap", [1.5e-10, 3e-10, 2e-9, 4e-8])
+def test_sphere_plane_is_the_sum_over_all_pairs(gap):
+    """Force of every site of the plane on every site of the sphere, by quadrature over plane and polar angle."""
+    n_1, n_2, psi_0, g_0, R, area = *SITES.values(), 5e-8, 1e-16
+    force = -derivative(psi_0 * ((g_0 / g) ** 10 / 45 - (g_0 / g) ** 4 / 3), g)
+    pair = symengine.Lambdify([g], [force])
+
+    def of_plane(z: float) -> float:
+        """On one site at height z: distance r, normal component z/r; s = (r - z) / z."""
+        value, _ = quad(
+            lambda s: float(pair([z * (1 + s)])[0]) * z * z, 0.0, np.inf, epsabs=0.0, epsrel=1e-11, limit=400
+        )
+        return 2 * math.pi * n_1 * value
+
+    def of_ring(angle: float) -> float:
+        height = gap + 2 * R * math.sin(angle / 2) ** 2
+        return 2 * math.pi * R**2 * n_2 * math.sin(angle) * of_plane(height)
+
+    edges = [0.0, *np.geomspace(1e-3, math.pi, 12)]
+    repulsion = sum(quad(of_ring, a, b, epsabs=0.0, epsrel=1e-10)[0] for a, b in pairwise(edges))
+    law = LennardJonesSpherePlane(**SITES, R=R, area=area)
+    assert area * at(derivative(symbolic(law), g), g_n=gap) == pytest.approx(-repulsion, rel=1e-8)
+
+
+def test_derjaguin_is_the_limit_of_a_large_sphere():
+    ratio = []
+    for R in (1e-8, 1e-7, 1e-6):
+        sphere = {**SITES, "R": R, "area": 1.0}
+        exact, approximate = (
+            at(derivative(symbolic(law(**sphere)), g), g_n=1e-9)
+            for law in (LennardJonesSpherePlane, LennardJonesDerjaguin)
+        )
+        ratio.append(1 - exact / approximate)
+    assert ratio == pytest.approx([(1e-9 / (2 * R + 1e-9)) ** 2 for R in (1e-8, 1e-7, 1e-6)], rel=1e-3)
+
+
+def test_van_der_waals():
+    flats = VanDerWaalsFlatFlat(A_H=6.5e-20)
+    traction = derivative(symbolic(flats), g)
+    assert at(traction, g_n=1e-9) == pytest.approx(6.5e-20 / (6 * math.pi * (1.165e-9) ** 3), rel=1e-14)
+    assert at(traction, g_n=-1e-9) == pytest.approx(6.5e-20 / (6 * math.pi * (0.165e-9) ** 3), rel=1e-14)
+    sphere = VanDerWaalsSpherePlane(A_H=6.5e-20, R=1e-5, area=1e-12)
+    force = derivative(symbolic(sphere), g)
+    for x in (0.0, 1e-9):
+        h = x + 1.65e-10
+        assert 1e-12 * at(force, g_n=x) == pytest.approx(6.5e-20 * 1e-5 / (6 * h**2), rel=2.1 * h / 2e-5)
+        assert 1e-12 * at(force, g_n=x) == pytest.approx(2 * 6.5e-20 * 1e-15 / (3 * h**2 * (h + 2e-5) ** 2), rel=1e-13)
+
+
+def test_van_der_waals_sphere_is_the_sum_of_its_shells():
+    """A ball in front of a half-space: slices of the ball at their distance, each attracted as by A_H / (6 pi z^3)."""
+    R, h = 5e-8, 2e-9
+    slices, _ = quad(
+        lambda s: math.pi * s * (2 * R - s) / (h + s) ** 4, 0.0, 2 * R, epsabs=0.0, epsrel=1e-12, limit=200
+    )
+    law = VanDerWaalsSpherePlane(A_H=6.5e-20, R=R, area=1e-16)
+    force = 1e-16 * at(derivative(symbolic(law), g), g_n=h - 1.65e-10)
+    assert force == pytest.approx(6.5e-20 / (2 * math.pi) * slices, rel=1e-10)
+
+
+def test_charged_surfaces():
+    flats, sphere = (
+        ElectrostaticFlatFlat(s_1=1e-4, s_2=2e-4),
+        ElectrostaticSpherePlane(s_1=1e-4, s_2=2e-4, R=1e-6, area=1.0),
+    )
+    repulsion = [at(derivative(symbolic(law), g), g_n=1e-7) for law in (flats, sphere)]
+    assert repulsion == pytest.approx([-2e-8 / 2 / 8.8541878128e-12, -4 * math.pi * 1e-12 * 1e-8 / 8.8541878128e-12])
+
+
+def test_friction_at_rest_and_sliding():
+    assert Coulomb(mu=0.4).limit(p=1e5) == Coulomb(mu=0.4).traction(p=1e5, direction=1.0)
+    assert Coulomb(mu=0.4, mu_s=0.6).limit(p=1e5) == 6e4
+    adhesive = MohrCoulomb(mu=0.5, t_n_max=2e4, c=1e3, mu_s=0.7)
+    found = [adhesive.traction(p=-2e4, direction=-1.0), adhesive.traction(p=-9e4, direction=1.0)]
+    assert found == [-1e3, 1e3]
+    assert adhesive.limit(p=1e4) == pytest.approx(0.7 * 3e4 + 1e3)
+    for same in (MohrCoulomb(mu=0.5, c=1e4), MohrCoulomb(mu=0.5, t_n_max=2e4)):
+        assert same.traction(p=1e5, direction=1.0) == 6e4
+    bonded = BondedCoulomb(mu=0.4, mu_b=0.7, mu_ub=0.4)
+    assert bonded.breaks_bonds
+    assert bonded.limit(p=1e5, phi=0.0, T_c=300.0, T_0=300.0) == 4e4
+    assert bonded.limit(p=1e5, phi=1.0, T_c=600.0, T_0=300.0) == 3.5e4
+
+
+@pytest.mark.parametrize("delta", [0.5, 1.0, 2.0])
+def test_stribeck_goes_from_static_to_sliding(delta):
+    law = Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, delta=delta)
+    assert law.limit(p=1e5) == 6e4
+    for direction in (1.0, -1.0):
+        speeds = (0.0, 1e-300, 1e-3, 1e6)
+        found = [direction * law.traction(p=1e5, v=direction * v, direction=direction) for v in speeds]
+        assert found == pytest.approx([6e4, 6e4, 4e4 + 2e4 / math.e, 4e4], rel=1e-14)
+    viscous = Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, delta=delta, c_v=1e3)
+    assert viscous.traction(p=1e5, v=100.0, direction=1.0) == pytest.approx(1.4e5, rel=1e-14)
+    v = symengine.Symbol("v")
+    slope = derivative(law.traction(p=1e5, v=v, direction=1.0), v)
+    assert all(math.isfinite(compiled(slope, v=x)) for x in (0.0, 1e-300, -1e-9, 1.0, 1e9))
+    assert law.traction(p=1e5, v=symengine.Integer(0), direction=symengine.Integer(1)) == 6e4
+
+
+def test_adhesion_is_lost_down_to_its_equilibrium():
+    """At a held gap b phi' = -(C g^2 phi - w): an exponential to w / (C g^2); from below nothing heals."""
+    potential, reaction = AdhesionIntensity(C_N=1e12, C_T=1e12, w=0.4, E_n=1e14), AdhesionLoss(b=2.0)
+    for start, end in ((1.0, 0.4), (0.3, 0.3)):
+        pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+        interface = Interface(Hold(level=300.0), [potential], (), [reaction], Sites(1e18, 1e18))
+        loading = {"g_n": Hold(level=8e-7), "g_t": Hold(level=6e-7)}
+        scene = Scene(pair, interface, (), loading, None, 300.0, {"phi": start})
+        run = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 6.0, 7)))
+        exact = end + (start - end) * np.exp(-run.result.times / 2.0)
+        assert run.result.outputs[:, 0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_a_coefficient_may_be_left_out_of_a_scene():
+    """What is not given is no parameter of the scene, and listed so."""
+    pair = Body("lower", "T", Quadratic(C=1.0)), Body("upper", "T", Quadratic(C=1.0))
+    loading = {"v": Hold(level=0.1), "p": Hold(level=1e5)}
+    for law, found in ((Coulomb(mu=0.3), ["mu_coulomb"]), (Coulomb(mu=0.3, mu_s=0.5), ["mu_coulomb", "mu_s"])):
+        scene = Scene(pair, Interface("T", (), [law]), (), loading, None, 300.0, {"T": 300.0})
+        names = [str(parameter.symbol) for parameter in assemble(scene).parameters]
+        assert [name for name in names if name.startswith("mu")] == found
+    assert "mu_s [1]: static friction coefficient; mu if not given, >= 0\n" in law_table()
+    definition = schema()["$defs"]["friction.coulomb"]
+    assert definition["required"] == ["mu"]
+    assert "default" not in definition["properties"]["mu_s"]
+
+
+def test_cohesion_that_is_pressed_hard_goes_on_along_its_tangent():
+    law = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.6, r=0.3)
+    g, cap = symengine.Symbol("g"), mpmath.mpf(EXPONENT_CAP) * mpmath.mpf(1e-8)
+    energy = law.energy(g_n=g, g_t=1e-8)
+    value, slope = (lambda x, e=e: number(e, {g: x}) for e in (energy, derivative(energy, g)))
+    before, beyond = -cap * (1 - mpmath.mpf(10) ** -30), -cap * (1 + mpmath.mpf(10) ** -30)
+    assert value(beyond) == pytest.approx(value(before), rel=1e-13)
+    assert slope(beyond) == pytest.approx(slope(before), rel=1e-13)
+    assert value(-3 * cap) == pytest.approx(value(before) - 2 * cap * slope(before), rel=1e-13)
+
+
+def test_repulsion_of_overlapping_atoms_goes_on_along_its_parabola():
+    law = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
+    g, wall = symengine.Symbol("g"), mpmath.mpf(WALL) * mpmath.mpf(3e-10)
+    value = law.energy(g_n=g)
+    slope = derivative(value, g)
+    curvature = derivative(slope, g)
+    third = derivative(curvature, g)
+    at = {side: {g: wall * (1 + side * mpmath.mpf(10) ** -12)} for side in (-1, 1)}
+    for each in (value, slope, curvature):
+        assert number(each, at[-1]) == pytest.approx(number(each, at[1]), rel=1e-9)
+    assert number(third, at[-1]) == 0 != number(third, at[1])

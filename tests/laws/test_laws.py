@@ -1,0 +1,167 @@
+"""What holds for every law without naming one: documented, sourced, with units, the same for floats and symbols."""
+
+import dataclasses
+import inspect
+import json
+import math
+import random
+
+import law_values
+import pytest
+import symengine
+
+from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Load, RateLaw, Varying, reads
+from surfacechem.errors import InputError
+from surfacechem.laws import FAMILIES, find, laws
+from surfacechem.quantities import VARIABLES
+
+EVERY = [law for contract in FAMILIES for law in laws(contract).values()]
+POINTS = dict.fromkeys(("times", "pressures", "gaps"), (0.0, 1.0, 3.0))
+VALUES = dict.fromkeys(("values", "conductances"), (1.0, 2.0, 0.5))
+NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
+OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
+OPTIONS |= {"shear": "parallel", "pressure": "net"}
+READABLE = {*VARIABLES, "x", "T", "N_c", "M"}
+SAMPLES = 20
+APPROVED = json.loads(law_values.TABLE.read_text())
+
+each_law = pytest.mark.parametrize("law", EVERY, ids=lambda law: f"{law.contract}-{law.name()}")
+
+
+def example(law: type[Law], seed: int) -> Law:
+    """An instance with random admissible parameters."""
+    draw = random.Random(f"{law.name()}{seed}")
+    values = {name: draw.uniform(0.1, 0.9) for name, _ in law.specs()}
+    return law(**values, **{name: OPTIONS[name] for name, _ in law.options()})
+
+
+def point(law: Law, seed: int) -> dict[str, float]:
+    draw = random.Random(seed)
+    return {name: draw.uniform(0.1, 0.9) for name in reads(law.statement)}
+
+
+@pytest.mark.parametrize("name", law_values.every())
+def test_every_formula_keeps_its_approved_values(name):
+    """A new law gets its values by `python tests/law_values.py`."""
+    found = law_values.computed(law_values.every()[name])
+    assert found.keys() == APPROVED[name].keys()
+    for formula, values in found.items():
+        assert values == pytest.approx(APPROVED[name][formula], rel=1e-11, abs=0), formula
+
+
+@each_law
+def test_documented_with_formula_source_and_worked_number(law):
+    text = inspect.getdoc(law)
+    assert ".. math::" in text
+    assert "Source:" in text
+    assert ">>> " in text
+
+
+@each_law
+def test_every_parameter_has_unit_meaning_and_range(law):
+    for name, spec in law.specs():
+        assert spec.unit, name
+        assert spec.text, name
+        assert not (math.isfinite(spec.above) and spec.at_least > -math.inf), "one lower bound is enough"
+
+
+@each_law
+def test_reads_only_quantities_of_the_table(law):
+    assert set(reads(example(law, 0).statement)) <= READABLE
+
+
+@each_law
+def test_floats_and_symbols_agree(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        if isinstance(instance, Load):
+            instance = instance.bind(instance.piece(0.5))
+        values = point(instance, seed)
+        symbols = {name: symengine.Symbol(name) for name in values}
+        symbolic = symengine.sympify(instance.statement(**symbols))
+        number = instance.statement(**values)
+        substituted = symbolic.subs({symbols[name]: value for name, value in values.items()})
+        assert float(substituted) == pytest.approx(number, rel=1e-12, abs=1e-16)
+
+
+@pytest.mark.parametrize("law", laws(Friction).values(), ids=lambda law: law.name())
+def test_friction_never_drives(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        values = point(instance, seed)
+        for v in (0.7, -0.7, 0.0):
+            own = {"v": v, "direction": math.copysign(1.0, v) if v else 0.0}
+            assert instance.traction(**{name: own.get(name, value) for name, value in values.items()}) * v >= 0
+
+
+def limited() -> list[type[Friction]]:
+    return [law for law in laws(Friction).values() if hasattr(law, "limit")]
+
+
+@pytest.mark.parametrize("law", limited(), ids=lambda law: law.name())
+def test_sticking_bears_a_traction_at_rest(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        draw = random.Random(seed)
+        values = {name: draw.uniform(0.1, 0.9) for name in reads(instance.limit)}
+        assert "v" not in values
+        assert set(values) <= READABLE
+        number = instance.limit(**values)
+        assert number >= 0
+        symbols = {name: symengine.Symbol(name) for name in values}
+        symbolic = instance.limit(**symbols).subs({symbols[name]: value for name, value in values.items()})
+        assert float(symbolic) == pytest.approx(number, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", laws(RateLaw).values(), ids=lambda law: law.name())
+def test_reaction_runs_downhill(law):
+    """Laws that read the affinity are admissible for any sign of it; others form bonds, or run to a balance of both."""
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        values = point(instance, seed)
+        if "softening" in values:
+            assert instance.rate(**values) < 0 == instance.rate(**values | {"overshoot": 0.0})
+        elif "mu" in values:
+            dissipated = [-mu * instance.rate(**values | {"mu": mu}) for mu in (1e-20, -1e-20)]
+            assert min(dissipated) >= 0 < max(dissipated)
+        else:
+            full = min(values.get("n_1", math.inf), values.get("n_2", math.inf), values["n_c"]) / values["n_c"]
+            assert instance.rate(**values | {"phi": 0.0}) >= 0 >= instance.rate(**values | {"phi": full})
+
+
+@pytest.mark.parametrize("law", laws(HeatTransfer).values(), ids=lambda law: law.name())
+def test_heat_flows_from_hot_to_cold(law):
+    for seed in range(SAMPLES):
+        instance = example(law, seed)
+        assert instance.conductance(**point(instance, seed)) >= 0
+
+
+@each_law
+def test_refuses_what_is_not_finite_or_out_of_range(law):
+    good = example(law, 0)
+    fields = {item.name: getattr(good, item.name) for item in dataclasses.fields(good) if item.name != "place"}
+    for name, spec in law.specs():
+        bad = [math.nan, math.inf]
+        bad += [spec.above] * math.isfinite(spec.above) + [spec.at_least - 1] * math.isfinite(spec.at_least)
+        for value in bad:
+            with pytest.raises(InputError, match=name):
+                law(**fields | {name: value})
+
+
+def test_a_law_is_found_by_name_and_an_unknown_one_is_answered_with_the_nearest():
+    assert find(Friction, "coulomb").name() == "coulomb"
+    with pytest.raises(InputError, match=r"no friction law 'colomb'\. Did you mean 'coulomb'\? Known: "):
+        find(Friction, "colomb")
+
+
+def test_a_table_of_time_holds_its_ends():
+    table = find(Load, "table")(times=(0.0, 1.0, 3.0), values=(1.0, 2.0, 5.0))
+    found = [table.bind(table.piece(t)).value(t) for t in (-1.0, 0.5, 2.0, 3.0, 9.0)]
+    assert found == [1.0, 1.5, 3.5, 5.0, 5.0]
+
+
+def test_a_parameter_that_varies_is_its_value_times_factors():
+    factor = find(Factor, "linear")(of="phi", slope=0.5)
+    law = find(Friction, "coulomb")(mu=Varying(0.3, (factor,)))
+    assert law.mu.value == 0.3
+    assert law.mu.factors[0].factor(x=1.0) == 1.5

@@ -1,0 +1,288 @@
+"""What a mechanism file may not hold is refused with file, line and a way out; Cantera would ignore most of it."""
+
+import re
+
+import pytest
+
+from surfacechem.documents.shipped import mechanisms
+from surfacechem.errors import InputError, Place
+from surfacechem.mechanism import load_mechanism
+
+TEXT = (mechanisms() / "dna-film.yaml").read_text(encoding="utf-8")
+
+REACTION = TEXT[TEXT.index("- equation") :]
+BARE = TEXT.replace("units: {length: m, quantity: mol, activation-energy: kJ/mol}", "units: {length: m}")
+
+# What to replace in the file by what, the line of the error ("+n" after the replaced one) and its words.
+REFUSED = {
+    "a key of the phase": ("site-density: 1.0e-4", "site-densty: 1.0e-4", "Did you mean 'site-density'?"),
+    "a key of the rate": ("b: 0, Ea: 0", "b: 0, E: 0", "unknown key 'E'"),
+    "a key of the species": ("  sites: 2", "  site: 2", "Did you mean 'sites'?"),
+    "a key of the thermo": ("s0: -515", "S: -515", "unknown key 'S'"),
+    "a key of the state": ("state: {T: 298.15 K, cov", "state: {T: 298.15 K, Cov", "Did you mean 'coverages'?"),
+    "a key of the reaction": ("  rate-constant:", "  rate-constants:", "Did you mean 'rate-constant'?"),
+    "a key of the file": ("units: {length: m", "unit: {length: m", "Did you mean 'units'?"),
+    "a thermo model": ("model: constant-cp, T0: 298.15 K, h0: -", "model: constant_cp, T0: 298.15 K, h0: -", "Did you"),
+    "an unknown thermo model": (
+        "{model: constant-cp, T0: 298.15 K, h0: -",
+        "{model: Mu0, h0: -",
+        "'Mu0' is not lowered",
+    ),
+    "a phase model": ("thermo: ideal-surface", "thermo: edge", "'edge' is not lowered: a contact line"),
+    "coverage-dependent thermo": (
+        "thermo: ideal-surface",
+        "thermo: coverage-dependent-surface\n  reference-state-coverag: 0.1",
+        "Did you mean 'reference-state-coverage'?",
+    ),
+    "a coverage of the standard state": (
+        "  reactions: all",
+        "  reactions: all\n  reference-state-coverage: 0.1",
+        "it belongs to `thermo: coverage-dependent-surface`",
+    ),
+    "neighbours": (
+        "  reactions: all",
+        "  reactions: all\n  adjacent-phases: [gas]",
+        "'adjacent-phases' cannot be used",
+    ),
+    "coverage dependence of a species": (
+        "  sites: 2",
+        "  sites: 2\n  coverage-dependencies: {}",
+        "only a phase with `thermo: coverage-dependent-surface` reads this",
+    ),
+    "sticking": ("  rate-constant:", "  sticking-coefficient:", "needs a gas"),
+    "sticking by its type": (
+        "  rate-constant: {A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "  type: sticking-Blowers-Masel",
+        "needs a gas beside the surface",
+    ),
+    "charge transfer": (
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}\n  beta: 0.5",
+        "charge",
+    ),
+    "Blowers-Masel": (
+        "  rate-constant: {A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "  type: Blowers-Masel\n  rate-constant: {A: 1e8 m^2/mol/s, b: 0, Ea0: 0, w: 1e9}",
+        "rate type 'Blowers-Masel' is not lowered",
+    ),
+    "a dependence on nothing": (
+        "  rate-constant:",
+        "  coverage-dependencies: {C(s): {a: 0, m: 0, E: 1}}\n  rate-constant:",
+        "no species 'C(s)'",
+    ),
+    "a negative order": (
+        TEXT[TEXT.index("- equation") :],
+        (
+            "- equation: A(s) + B(s) => AB(s)\n  orders: {A(s): -1, B(s): 1}\n  negative-orders: true\n"
+            "  rate-constant: {A: 1.0 mol/m^2/s, b: 0, Ea: 0}\n"
+        ),
+        "negative order",
+    ),
+    "a missing site density": ("  site-density: 1.0e-4 mol/m^2\n", "", "no `site-density`"),
+    "another file": ("  species: [A(s), B(s), AB(s)]", "  species: [{gri30.yaml/species: [H2]}]", "one file"),
+    "broken YAML": ("units: {length: m,", "units: {length: m", "expected"),
+    "a negative rate": ("A: 5.13e8 m^2/mol/s", "A: -5.13e8 m^2/mol/s", "'A' is negative"),
+    "a declared negative rate": (
+        "  rate-constant:",
+        "  negative-A: true\n  rate-constant:",
+        "'negative-A' cannot be used here",
+    ),
+    "no site density": ("1.0e-4 mol/m^2", "0 mol/m^2", "no number above zero"),
+    "sites that are none": ("sites: 2", "sites: 0", "no number above zero"),
+    "degrees Celsius": ("T0: 298.15 K, h0: -", "T0: 25 C, h0: -", "write `T0: 298.15 K`"),
+    "degrees Celsius of a state": ("state: {T: 298.15 K", "state: {T: 25 C", "write `T: 298.15 K`"),
+    "temperatures in other units": ("{length: m,", "{temperature: C, length: m,", "temperatures are in K"),
+    "units of nothing": ("{length: m,", "{lenght: m,", "Did you mean 'length'?"),
+    "a unit that is none": ("{length: m,", "{length: furlong,", "'furlong' is no unit"),
+    "a third body": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) + M <=> AB(s) + M", "third bodies belong to gases"),
+    "a falloff reaction": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) (+M) <=> AB(s) (+M)", "third bodies"),
+    "a rate that depends on pressure": ("  rate-constant:", "  type: falloff\n  rate-constant:", "belongs to gases"),
+    "efficiencies": ("  rate-constant:", "  efficiencies: {A(s): 2}\n  rate-constant:", "third bodies"),
+    "an arrow that is none": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) -> AB(s)", "two sides"),
+    "a reaction of nothing": ("A(s) + B(s) <=> AB(s)", "A(s) + B(s) <=> B(s) + A(s)", "nothing changes"),
+    "a coverage of nothing": ("coverages: {A(s): 0.5", "coverages: {a(s): 0.5", "Did you mean 'A(s)'?"),
+    "a species that is not there": ("species: [A(s), B(s),", "species: [A(s), C(s),", "no species 'C(s)'"),
+    "skipped elements": ("  reactions: all", "  reactions: all\n  skip-undeclared-elements: true", "would vanish"),
+    "a list for a mapping": (
+        "{A: 5.13e8 m^2/mol/s, b: 0, Ea: 0}",
+        "[5.13e8, 0, 0]",
+        "write `rate-constant: {A, b, Ea}`",
+    ),
+    "a duplicate": ("reactions:\n- eq", f"reactions:\n{REACTION}- eq", "duplicate reactions"),
+    "a duplicate the other way": (
+        "reactions:\n- eq",
+        f"reactions:\n{REACTION.replace('A(s) + B(s) <=> AB(s)', 'AB(s) => A(s) + B(s)').replace('m^2/mol', '1')}- eq",
+        "duplicate reactions",
+    ),
+    "a key twice": ("b: 0, Ea: 0}", "b: 0, b: 1, Ea: 0}", "the key 'b' is given twice"),
+    "a unit of the wrong kind": ("1.0e-4 mol/m^2", "1.0e-4 mol/m^3", "Cantera: "),
+    "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "no species 'D(s)'"),
+    "lost sites": ("  sites: 2\n", "", "Cantera: "),
+}
+
+
+def assert_refused(file, good, change, words, near):
+    """With the change the mechanism is an error in these words, not more than some lines from the change."""
+    old, new = change
+    assert old in good
+    file.write_text(good.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_mechanism(file)
+    changed = good[: good.index(old)].count("\n") + 1
+    assert caught.value.place.file == str(file)
+    assert abs(caught.value.place.line - changed) <= near, f"{caught.value} is not near line {changed}"
+    assert "*" not in caught.value.message
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_refused(what, tmp_path):
+    old, new, words = REFUSED[what]
+    assert_refused(tmp_path / "film.yaml", TEXT, (old, new), words, near=6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "5.13e8 m^2/mol/s",
+            "5.13e8",
+            "A(s) + B(s) <=> AB(s): A: 5.13e+08 without a unit counts in powers of",
+        ),
+        ("Ea: 0", "Ea: 50", "Ea: 50 without a unit counts in J/kmol. Write it with its unit, such as `Ea: 50 kJ/mol`"),
+        ("1.0e-4 mol/m^2", "1.0e-4", "phase film: site-density: 0.0001 without a unit counts in kmol/m^2"),
+        ("h0: -172.3808 kJ/mol", "h0: -172.3808", "species AB(s): h0: -172.381 without a unit counts in J/kmol"),
+    ],
+)
+def test_numbers_without_a_unit_need_one_from_the_file(old, new, words, tmp_path):
+    """Cantera counts in kmol, which nobody means."""
+    file = tmp_path / "film.yaml"
+    file.write_text(BARE, encoding="utf-8")
+    load_mechanism(file)
+    assert_refused(file, BARE, (old, new), words, near=0)
+    file.write_text(TEXT.replace(old, new), encoding="utf-8")
+    load_mechanism(file)
+
+
+LOADED = """\
+- equation: AB(s) => A(s) + B(s)
+  type: Bell
+  rate-constant: {A: 1 1/s, b: 0, Ea: 0}
+  x-beta: 0.4 nm
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("x-beta", "x_beta", "unknown key 'x_beta'. Did you mean 'x-beta'?"),
+        ("type: Bell", "type: Bel", "rate type 'Bel' is not lowered. Did you mean 'Bell'?"),
+        (
+            "x-beta: 0.4 nm",
+            "x-slip: 0.4 nm",
+            "'x-slip' is no key of interface-Bell; it belongs to interface-tw",
+        ),
+        (
+            "  type: Bell\n",
+            "",
+            "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, ",
+        ),
+        ("0.4 nm", "0.4", "x-beta: 0.4 has no unit, and `units` says nothing about it; write it in m, such as"),
+        ("0.4 nm", "0.4 pN", "x-beta = 0.4 pN is not a quantity in m"),
+        ("type: Bell", "type: Dudko-Hummer-Szabo", "a rate of type Dudko-Hummer-Szabo needs `barrier`"),
+    ],
+)
+def test_keys_of_a_rate_type_are_those_of_its_class(old, new, words, tmp_path):
+    file = tmp_path / "loaded.yaml"
+    text = BARE.replace("units: {length: m}\n", "").replace("reactions:\n", f"reactions:\n{LOADED}")
+    text = text.replace("A(s) + B(s) <=> AB(s)", "A(s) + B(s) => AB(s)")
+    file.write_text(text, encoding="utf-8")
+    load_mechanism(file)
+    assert_refused(file, text, (old, new), words, near=3)
+
+
+@pytest.mark.parametrize(
+    ("bond", "words"),
+    [
+        ("{stifness: 1 pN/nm}", "species AB(s): bond: unknown key 'stifness'. Did you mean 'stiffness'?"),
+        ("{stiffness: 1}", "species AB(s): bond: stiffness: 1 has no unit"),
+        ("{stiffness: 1 pN/nm, rest-length: 20}", "species AB(s): bond: rest-length: 20 has no unit"),
+        ("{rest-length: 20 nm}", "needs `stiffness`"),
+        ("5 pN/nm", "bond: this must be a mapping, not '5 pN/nm'"),
+    ],
+)
+def test_a_bond_s_elasticity_is_checked(bond, words, tmp_path):
+    text = BARE.replace("units: {length: m}\n", "")
+    assert_refused(tmp_path / "elastic.yaml", text, ("  sites: 2\n", f"  sites: 2\n  bond: {bond}\n"), words, near=3)
+
+
+def test_a_rate_of_first_order_needs_no_amount(tmp_path):
+    file = tmp_path / "tethers.yaml"
+    text = (mechanisms() / "dna-tethers.yaml").read_text(encoding="utf-8")
+    text = re.sub(r"^units: .*$", "", text, flags=re.MULTILINE)
+    file.write_text(re.sub(r"A: ([0-9.e+]+)[^,]*,", r"A: \1,", text), encoding="utf-8")
+    assert load_mechanism(file).reactions[0].A == 2.565e4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"phase": "flim"}, "Did you mean 'film'? Known: film."),
+        ({"bonds": ["AB(g)"]}, "bonds: no species 'AB(g)' in the mechanism. Did you mean 'AB(s)'?"),
+    ],
+)
+def test_errors_of_the_case_stand_in_the_case(arguments, message):
+    place = Place("cases/x.yaml", 7, "interface.mechanism")
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        load_mechanism(mechanisms() / "dna-film.yaml", place=place, **arguments)
+    assert str(caught.value).startswith("cases/x.yaml:7: interface.mechanism: ")
+
+
+def test_a_missing_file_names_what_there_is(tmp_path):
+    with pytest.raises(InputError, match=r"no mechanism file .*\. Did you mean 'selectin.yaml'\?"):
+        load_mechanism(tmp_path / "selectins.yaml")
+
+
+def test_the_mechanisms_of_the_package_are_found_by_name():
+    assert load_mechanism("selectin.yaml").phase == "contact"
+
+
+@pytest.mark.parametrize(
+    ("coverages", "message"),
+    [
+        ({"A(s)": 0.5, "AB(g)": 0.5}, "coverages: no species 'AB(g)'. Did you mean 'AB(s)'?"),
+        ({"A(s)": 0.5, "B(s)": 0.4}, "coverages sum to 0.9, not to 1."),
+    ],
+)
+def test_coverages_are_checked(coverages, message):
+    mechanism = load_mechanism(mechanisms() / "dna-film.yaml")
+    with pytest.raises(InputError, match=re.escape(message)):
+        mechanism.coverages(coverages)
+
+
+def test_several_phases_must_be_named(tmp_path):
+    phase = TEXT[TEXT.index("- name: film") : TEXT.index("\nspecies:\n")]
+    file = tmp_path / "two.yaml"
+    file.write_text(TEXT.replace(phase, phase + phase.replace("name: film", "name: brush")), encoding="utf-8")
+    with pytest.raises(InputError, match=r"several phases, name one.* Known: brush, film\."):
+        load_mechanism(file)
+    assert load_mechanism(file, "brush").phase == "brush"
+
+
+def test_reactions_of_other_species_are_left_out(tmp_path):
+    extra = "- equation: A(s) + E(s) <=> AE(s)\n  rate-constant: {A: 1 m^2/mol/s, b: 0, Ea: 0}\n"
+    text = TEXT.replace("reactions: all", "reactions: declared-species")
+    file = tmp_path / "declared.yaml"
+    file.write_text(text.replace("reactions:\n- eq", f"reactions:\n{extra}- eq"), encoding="utf-8")
+    (law,) = load_mechanism(file).reactions
+    assert file.read_text(encoding="utf-8").splitlines()[law.place.line - 1].endswith(law.equation)
+
+
+def test_sections_of_the_file_may_have_names(tmp_path):
+    text = TEXT.replace("species: [A(s), B(s), AB(s)]", "species: [{strands: all}]").replace("\nspecies:", "\nstrands:")
+    text = text.replace("  reactions: all", "  reactions: [zipping]").replace("\nreactions:", "\nzipping:")
+    file = tmp_path / "named.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert [law.equation for law in load_mechanism(file).reactions] == ["A(s) + B(s) <=> AB(s)"]
+    file.write_text(text.replace("  rate-constant", "  rate-constent"), encoding="utf-8")
+    with pytest.raises(InputError, match="Did you mean 'rate-constant'"):
+        load_mechanism(file)

@@ -1,0 +1,152 @@
+"""Mechanisms under force: rates and equilibrium constants by hand, and pairs that keep detailed balance or do not."""
+
+import math
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.mechanism import load_mechanism
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.studies.mechanisms.figure import figure
+from surfacechem.studies.mechanisms.rate_tables import Curves
+from surfacechem.studies.mechanisms.sheet import Span, sheet, verdict
+
+T, K_0, STIFFNESS, REST = 300.0, 10.0, 5e-3, 10e-9
+KT = BOLTZMANN * T
+FORCES = np.linspace(0.0, 60e-12, 7)
+TEMPERATURE = np.array([T])
+
+HEAD = """\
+units: {length: m, quantity: mol}
+phases:
+- name: contact
+  thermo: ideal-surface
+  kinetics: surface
+  species: [free(s), bond(s)]
+  reactions: all
+  site-density: 1e-10 mol/m^2
+species:
+- {name: free(s), composition: {}, thermo: {model: constant-cp}}
+- name: bond(s)
+  composition: {}
+  thermo: {model: constant-cp, s0: 19.14475... J/mol/K}
+  bond: {stiffness: 5 pN/nm, rest-length: 10 nm}
+reactions:
+""".replace("19.14475...", repr(8.31446261815324 * math.log(K_0)))
+OFF, ON, BOTH = "bond(s) => free(s)", "free(s) => bond(s)", "bond(s) <=> free(s)"
+CASE = """\
+title: Bonds pulled apart
+bodies:
+  lower: {temperature: 300 K}
+  upper: {temperature: 300 K}
+interface: {temperature: 300 K, mechanism: {file: pulled.yaml, bonds: [bond(s)]}}
+initial: {coverages: {free(s): 0.1, bond(s): 0.9}}
+loading: {g_n: {ramp: {start: 10 nm, rate: 2 nm/s}}}
+run: {until: 4 s, accuracy: 1e-8}
+"""
+
+
+def reaction(equation, A, kind="", **own):
+    lines = [f"- equation: {equation}", f"  rate-constant: {{A: {A}, b: 0, Ea: 0}}"]
+    lines += [f"  type: {kind}"] if kind else []
+    return "\n".join([*lines, *(f"  {key.replace('_', '-')}: {value}" for key, value in own.items())]) + "\n"
+
+
+PAIRS = {
+    "Bell": (reaction(OFF, 1.0, "Bell", x_beta="0.4 nm"), reaction(ON, K_0, "Bell", x_beta="-0.2 nm")),
+    "Dembo": (
+        reaction(OFF, 1.0, "Dembo", stiffness="5 pN/nm", transition_stiffness="2 pN/nm"),
+        reaction(ON, K_0, "Dembo-formation", stiffness="5 pN/nm", transition_stiffness="2 pN/nm"),
+    ),
+    "attachment": (reaction(OFF, 1.0), reaction(ON, K_0, "gap-attachment", stiffness="5 pN/nm", rest_length="10 nm")),
+    "reversible": (reaction(BOTH, 1.0, "Bell", x_beta="0.4 nm"),),
+}
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(name):
+        (tmp_path / "pulled.yaml").write_text(HEAD + "".join(PAIRS[name]), encoding="utf-8")
+        (tmp_path / "case.yaml").write_text(CASE, encoding="utf-8")
+        return tmp_path / "pulled.yaml"
+
+    return write
+
+
+def test_rates_and_constants_by_hand(file):
+    curves = Curves(load_mechanism(file("Bell")))
+    work = FORCES**2 / (2 * STIFFNESS * KT)
+    np.testing.assert_allclose(
+        curves.log_forward("R1", TEMPERATURE, FORCES), FORCES * 0.4e-9 / KT, rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(
+        curves.log_equilibrium("R2", TEMPERATURE, FORCES), math.log(K_0) - work, rtol=1e-12, atol=1e-13
+    )
+    (pair,) = curves.pairs
+    expected = FORCES * 0.6e-9 / KT - work
+    np.testing.assert_allclose(curves.departure(pair, TEMPERATURE, FORCES), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["Dembo", "attachment"])
+def test_springs_know_their_energy(name, file):
+    curves = Curves(load_mechanism(file(name)))
+    (pair,) = curves.pairs
+    assert np.max(np.abs(curves.departure(pair, TEMPERATURE, FORCES))) < 1e-12
+    assert "k_f/k_r is K(g, T) to within" in verdict(curves, "R1", Span(280.0, 360.0), Span(0.0, 60e-12))
+    solution = surfacechem.load(file(name).with_name("case.yaml")).run()
+    assert np.max(np.abs(solution.dataset.departure_R1_R2)) < 1e-11
+    assert solution.warnings == ()
+
+
+def test_a_reversible_bell_bond_is_consistent_by_construction(file):
+    curves = Curves(load_mechanism(file("reversible")))
+    reverse = curves.log_reverse("R1", TEMPERATURE, FORCES)
+    expected = math.log(K_0) + FORCES * 0.4e-9 / KT - FORCES**2 / (2 * STIFFNESS * KT)
+    np.testing.assert_allclose(reverse, expected, rtol=1e-12)
+    assert verdict(curves, "R1", Span(T, T), Span(0.0, 1e-11)).startswith("consistent by construction")
+    solution = surfacechem.load(file("reversible").with_name("case.yaml")).run()
+    assert solution.verdicts == ()
+    assert solution.audit.violations == ()
+
+
+def test_the_run_says_how_far_a_pair_departs(file):
+    """At every moment of a pull, and in words at its end."""
+    path = file("Bell")
+    solution = surfacechem.load(path.with_name("case.yaml")).run()
+    dataset = solution.dataset
+    f = dataset.f_theta_bond_s
+    np.testing.assert_allclose(f, STIFFNESS * (dataset.g_n - REST), rtol=1e-12, atol=1e-25)
+    expected = f * 0.6e-9 / KT - f**2 / (2 * STIFFNESS * KT)
+    np.testing.assert_allclose(dataset.departure_R1_R2, expected, rtol=1e-10, atol=1e-11)
+    worst = float(expected[np.argmax(np.abs(expected.values))])
+    assert (
+        f"departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
+        in solution.attributes["detailed_balance"]
+    )
+
+
+def test_the_sheet_shows_force_and_the_figure_has_a_row_for_it(file):
+    curves = Curves(load_mechanism(file("Bell")))
+    text = sheet(curves, Span(T, T), Span(0.0, 40e-12))
+    assert "Against the force on bond(s), at 300 K" in text
+    rows = [line.split() for line in text.splitlines()]
+    row = next(row[-5:] for row in rows if row[:2] == ["R1", "R2"] and len(row) == 11)
+    expected = FORCES[:5] * 0.6e-9 / KT - FORCES[:5] ** 2 / (2 * STIFFNESS * KT)
+    assert [float(value) for value in row] == pytest.approx(expected, rel=5e-3, abs=1e-9)
+    assert len(figure(curves, Span(280.0, 360.0), Span(0.0, 40e-12)).axes) == 4
+
+
+def test_forces_of_any_size_are_shown(file):
+    text = sheet(Curves(load_mechanism(file("Bell"))), Span(T, T), Span(0.0, 1e-8))
+    assert "nan" not in text
+    assert "inf" not in text
+
+
+def test_a_direction_that_is_switched_off_is_shown(file):
+    path = file("Bell")
+    path.write_text(path.read_text().replace("A: 10.0", "A: 0.0"), encoding="utf-8")
+    curves = Curves(load_mechanism(path))
+    text = sheet(curves, Span(T, T), Span(0.0, 4e-11))
+    assert "one of the two never runs" in text
+    assert figure(curves, Span(T, T), Span(0.0, 4e-11)).axes

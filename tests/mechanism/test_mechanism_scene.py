@@ -1,0 +1,220 @@
+"""A mechanism in a scene: the assembled equations are Cantera's production rates and enthalpies."""
+
+from dataclasses import replace
+
+import cantera as ct
+import numpy as np
+import pytest
+import symengine
+import thermodynamics as laws
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import surfacechem
+from mechanisms import KMOL, SHIPPED, load, loading_read, loads, mechanism_texts, pulled, species_of, states
+from surfacechem.documents.shipped import mechanisms
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.contact import ConstantInterfaceCapacity
+from surfacechem.laws.heat import Conductance
+from surfacechem.laws.loading import Hold, Ramp
+from surfacechem.mechanism import load_mechanism
+from surfacechem.mechanism.mixture import IdealMixture
+from surfacechem.model.assemble import assemble
+from surfacechem.runs.simulation import Simulation
+from surfacechem.scene import Body, Interface, Scene
+from surfacechem.solve.run import Model, Run
+
+UNDER = {"gap": 2e-9, "force": 10e-12}
+"""A load that single bonds bear."""
+
+
+def scene(mechanism, initial, capacity=None, T_c=None, stretch=None, loading=None):
+    """Two bodies and a mechanism between them, whose interface may store heat, be stretched or be kept at T_c."""
+    interface = Interface(
+        T_c or "T_c",
+        [*mechanism.potentials, *([ConstantInterfaceCapacity(C_c=capacity)] if capacity else [])],
+        reactions=mechanism.reactions,
+        variables=mechanism.variables,
+        bonds=mechanism.bonds,
+        sites=mechanism.sites,
+    )
+    paths = [
+        Conductance(between=("lower", "interface"), h=2500.0),
+        Conductance(between=("upper", "interface"), h=700.0),
+    ]
+    return Scene(
+        (Body("lower", "T_1", Constant(C=2000.0)), Body("upper", "T_2", Constant(C=1000.0))),
+        interface,
+        heat=paths,
+        loading={**(loading or {}), **({"J_c": Hold(level=stretch)} if stretch else {})},
+        T_0=298.15,
+        initial={"T_1": 298.15, "T_2": 310.0, "T_c": 302.0, **initial},
+    )
+
+
+def shipped(name, gap=UNDER["gap"], force=UNDER["force"], law=lambda level: Hold(level=level), **rest):
+    """A mechanism whose last species is its bond, at a load that a law prescribes where the mechanism reads it."""
+    names = list(load(name).species)
+    mechanism = load(name, names[-1:])
+    start = {species: (i + 1) / sum(range(len(names) + 1)) for i, species in enumerate(reversed(names))}
+    levels = {"g_n": gap, "f": force}
+    loading = {read: law(levels[read]) for read in loading_read(mechanism)}
+    return mechanism, scene(mechanism, mechanism.coverages(start), loading=loading, **rest)
+
+
+def numbers(system, expressions, point):
+    """Values of expressions at a point; what it does not name has its initial or nominal value."""
+    full = {parameter.symbol: parameter.at(0.0) for parameter in system.parameters} | {system.t: 0.0}
+    full |= {state.symbol: state.initial for state in system.states} | {state.dot: 0.0 for state in system.states}
+    full |= {symengine.Symbol(name): value for name, value in point.items()}
+    expanded = [system.expand(expression) for expression in expressions]
+    return np.array(symengine.Lambdify(list(full), expanded)([float(value) for value in full.values()]))
+
+
+def compare(mechanism, system, T, coverages, stretch=1.0, gap=0.0, force=0.0):
+    """d theta / dt and the heat that the reactions release, beside Cantera's."""
+    surface = pulled(mechanism, T, gap, force)
+    surface.site_density = surface.site_density / stretch
+    surface.coverages = coverages
+    names = [variable.name for variable in mechanism.variables]
+    point = dict(zip(names, surface.coverages, strict=True)) | {"T_c": T}
+    rates = -numbers(system, [system.rows[name] for name in names], point)  # the rows at zero derivatives
+    density = np.array([variable.density for variable in mechanism.variables]) / stretch / KMOL
+    gross = (surface.creation_rates + surface.destruction_rates) / density + 1e-300
+    assert np.all(abs(rates - surface.net_production_rates / density) <= 1e-12 * gross)
+    heat = -numbers(
+        system, [heat_row(system, names)], point | dict(zip([f"d{n}_dt" for n in names], rates, strict=True))
+    )
+    h = surface.partial_molar_enthalpies
+    size = abs(surface.creation_rates + surface.destruction_rates) @ (
+        abs(h) + ct.gas_constant * T * (1 + abs(np.log(surface.coverages)))
+    )
+    assert abs(heat[0] + stretch * (h @ surface.net_production_rates)) <= 1e-12 * stretch * size + 1e-300
+
+
+def heat_row(system, names):
+    """Part of the interface's energy balance that the coverages' derivatives bring."""
+    row = system.expand(system.rows["T_c"])
+    return row - row.subs({symengine.Symbol(f"d{name}_dt"): 0 for name in names})
+
+
+@pytest.mark.parametrize("capacity", [None, 42.0])
+@pytest.mark.parametrize("name", SHIPPED)
+@given(data=st.data(), under=loads)
+@settings(max_examples=5)
+def test_shipped_mechanisms_in_a_scene(name, capacity, data, under):
+    mechanism, built = shipped(name, capacity=capacity, **under)
+    compare(mechanism, assemble(built), *data.draw(states(len(mechanism.variables))), **under)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@given(data=st.data(), under=loads)
+@settings(max_examples=5)
+def test_a_stretched_scene_reacts_at_the_current_density(name, data, under):
+    mechanism, built = shipped(name, capacity=42.0, stretch=1.25, **under)
+    compare(mechanism, assemble(built), *data.draw(states(len(mechanism.variables))), stretch=1.25, **under)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("mechanisms") / "random.yaml"
+
+
+@given(data=st.data())
+@settings(max_examples=25)
+def test_random_mechanisms_in_a_scene(file, data):
+    ct.suppress_thermo_warnings(True)
+    file.write_text(data.draw(mechanism_texts()), encoding="utf-8")
+    mechanism = load_mechanism(file)
+    T, coverages = data.draw(states(len(mechanism.variables)))
+    initial = {variable.name: theta for variable, theta in zip(mechanism.variables, coverages, strict=True)}
+    compare(mechanism, assemble(scene(mechanism, initial, capacity=1e6)), T, coverages)
+
+
+@pytest.mark.parametrize("capacity", [None, 42.0])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_both_laws_hold(name, capacity):
+    """To the digits of the doubles that a mechanism's numbers are, also while the load grows."""
+    _, built = shipped(name, capacity=capacity, law=lambda level: Ramp(start=level, rate=level))
+    system = assemble(built)
+    for seed in range(3):
+        point = laws.consistent_point(system, seed)
+        assert laws.first_law_holds(system, point, digits=13)
+        assert laws.second_law_holds(system, point, digits=13)
+        assert all(value >= 0 for value in laws.productions(system, point).values())
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_reactions_conserve_sites(name):
+    mechanism, built = shipped(name)
+    system = assemble(built)
+    rows = [system.rows[variable.name] for variable in mechanism.variables]
+    rates = -numbers(system, rows, {"T_c": 305.0})
+    sizes = [species.sites * v.density for species, v in zip(species_of(mechanism), mechanism.variables, strict=True)]
+    changes = rates * np.array(sizes)
+    assert abs(changes.sum()) <= 1e-14 * abs(changes).max()
+
+
+def test_without_capacity_the_interface_temperature_is_algebraic():
+    _, built = shipped("dna-film.yaml")
+    system = assemble(built)
+    assert {state.name for state in system.states if state.algebraic} == {"T_c"}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_run_ends_where_nothing_reacts(name):
+    """At its end affinities are zero or reactants used up, and the sites and one temperature are left."""
+    mechanism, built = shipped(name, capacity=42.0)
+    model = Model(assemble(built))
+    trajectory = model.solve(Run(times=[0.0, 3e3], rtol=1e-10))
+    assert trajectory.status == "finished", trajectory.reason
+    names = [state.name for state in model.system.states]
+    end = dict(zip(names, trajectory.result.outputs[-1], strict=True))
+    surface = pulled(mechanism, end["T_c"], **UNDER)
+    surface.set_unnormalized_coverages([end[variable.name] for variable in mechanism.variables])
+    affinities = surface.delta_gibbs / (ct.gas_constant * end["T_c"])
+    for law, affinity in zip(mechanism.reactions, affinities, strict=True):
+        assert abs(affinity) < 1e-7 if law.reversible else min(abs(end[name]) for name in law.orders) < 1e-10
+    sizes = np.array([species.sites for species in species_of(mechanism)])
+    amounts = np.array([end[v.name] * v.density for v in mechanism.variables])
+    assert sizes @ amounts == pytest.approx(mechanism.variables[0].density * sizes[0], rel=1e-9)
+    temperatures = [end[name] for name in ("T_1", "T_2", "T_c")]
+    assert max(temperatures) - min(temperatures) < 1e-6
+
+
+def test_phi_counts_bonds_and_is_in_the_dataset():
+    mechanism, built = shipped("dna-film.yaml")
+    system = assemble(built)
+    phi = system.find("phi")
+    assert phi.output
+    assert numbers(system, [phi.expression], {"theta_AB_s": 0.4}) == pytest.approx([0.4])
+    (law,) = mechanism.reactions
+    assert {p.path for p in system.parameters} >= {"mechanism.R1.A", "interface.theta_AB_s.density"}
+    assert next(p for p in system.parameters if p.path == f"{law.path}.A").spec.unit == "m^2/s"
+
+
+def test_a_run_that_leaves_the_range_of_the_thermodynamic_data_says_so():
+    case = surfacechem.load("dna-adhesive", {"run.until": "1 s"}).case
+    interface = case.scene.interface
+    narrow = [
+        replace(law, temperatures=(300.0, 320.0)) if isinstance(law, IdealMixture) else law
+        for law in interface.potentials
+    ]
+    changed = replace(case, scene=replace(case.scene, interface=replace(interface, potentials=narrow)))
+    inside, outside = (Simulation(c).run() for c in (case, changed))
+    assert inside.warnings == ()
+    assert "ideal mixture is an extrapolation: T_c ran from" in outside.warnings[0]
+    assert outside.attributes["warnings"] == outside.warnings[0]
+
+
+def test_what_cantera_warns_of_is_a_warning_of_the_run(tmp_path):
+    """Polynomials that do not meet make the heat content jump."""
+    text = (mechanisms() / "selectin.yaml").read_text()
+    constant = next(line for line in text.splitlines() if "model: constant-cp" in line and "h0: 0 kJ/mol" in line)
+    data = "[[2.5, 0, 0, 0, 0, -100, 1], [2.6, 0, 0, 0, 0, -100, 1]]"
+    broken = f"  thermo: {{model: NASA7, temperature-ranges: [200, 310, 1000], data: {data}}}"
+    (tmp_path / "broken.yaml").write_text(text.replace(constant, broken, 1))
+    ct.suppress_thermo_warnings(False)
+    mechanism = load_mechanism(tmp_path / "broken.yaml")
+    assert len(mechanism.remarks) == 3
+    assert all("broken.yaml: Cantera: NasaPoly2::validate: For species" in remark for remark in mechanism.remarks)

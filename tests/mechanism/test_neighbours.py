@@ -1,0 +1,313 @@
+"""Surfaces beside gases, solids and electrodes: rates, heat and entropy are Cantera's, and the books close."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import cantera as ct
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+from scipy.integrate import solve_ivp
+from test_mechanism_cantera import FOLDER, SURFACES
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.reactor import InterfaceReactor, ReactorNet
+from surfacechem.runs import rerun
+
+AVOGADRO = 6.02214076e23
+RTOL = 1e-9
+BOOKS = 100 * RTOL
+"""The books are a quadrature along the steps of Cantera's integrator; fast rates magnify what its polynomials miss."""
+METHANE = (
+    "{gas: {pressure: 1 atm, composition: {CH4: 0.095, O2: 0.21, H2: 1e-3, H2O: 1e-3, CO: 1e-3, CO2: 1e-3, AR: 0.691}}}"
+)
+FUEL = "gas: {pressure: 1 atm, composition: {H2: 0.95, H2O: 0.05}}"
+ELECTROLYTE = """electrolyte: {composition: {"C3H4O3[elyt]": 0.47901, "C4H6O3[elyt]": 0.37563, "Li+[elyt]": 0.07268,
+      "PF6-[elyt]": 0.07268}}"""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A surface of Cantera with its neighbours, the coverages it starts from, and a time in which it changes."""
+
+    T: float
+    neighbours: str
+    coverages: str
+    until: float
+
+
+CASES = {
+    ("ptcombust.yaml", "Pt_surf"): Beside(900, METHANE, "{PT(S): 0.5, H(S): 0.5}", 1e-6),
+    ("methane_pox_on_pt.yaml", "Pt_surf"): Beside(900, METHANE, "{PT(S): 0.5, H(S): 0.5}", 1e-6),
+    ("sofc.yaml", "metal_surface"): Beside(1073.15, f"{{{FUEL}}}", "{(m): 0.5, H(m): 0.5}", 1e-5),
+    ("sofc.yaml", "oxide_surface"): Beside(
+        1073.15,
+        f"{{{FUEL}, oxide_bulk: {{composition: {{Ox: 0.95, VO**: 0.05}}}}}}",
+        """{"O''(ox)": 0.8, (ox): 0.2}""",
+        1e-6,
+    ),
+    ("diamond.yaml", "diamond_100"): Beside(
+        1200,
+        "{gas: {pressure: 20 torr, composition: {H: 0.002, H2: 0.9878, CH3: 0.0002, CH4: 0.01}}}",
+        "{c6HH: 0.9, 'c6H*': 0.1}",
+        0.01,
+    ),
+    ("SiF4_NH3_mec.yaml", "SI3N4"): Beside(
+        1600,
+        "{gas: {pressure: 2 torr, composition: {NH3: 0.6, SIF4: 0.3, HF: 0.1}}}",
+        "{HN_SIF(S): 0.5, HN_NH2(S): 0.5}",
+        1e-4,
+    ),
+    ("example_data/ammonia-Ru-Ba-YSZ-CSM-2019.yaml", "Ru_surface"): Beside(
+        800, "{gas: {pressure: 1 atm, composition: {NH3: 0.98, H2: 0.01, N2: 0.01}}}", "{Ru(s): 1}", 1e-6
+    ),
+    ("lithium_ion_battery.yaml", "edge_anode_electrolyte"): Beside(
+        300,
+        f"""{{anode: {{composition: {{"Li[anode]": 0.5, "V[anode]": 0.5}}}}, {ELECTROLYTE},
+      electron: {{electric-potential: -3.1 V}}}}""",
+        "{(dummy): 1}",
+        1.0,
+    ),
+    ("lithium_ion_battery.yaml", "edge_cathode_electrolyte"): Beside(
+        300,
+        f"""{{cathode: {{composition: {{"Li[cathode]": 0.6, "V[cathode]": 0.4}}}}, {ELECTROLYTE},
+      electron: {{electric-potential: 0.9 V}}}}""",
+        "{(dummy): 1}",
+        1.0,
+    ),
+}
+
+ISOTHERMAL = """
+bodies:
+  lower: {{temperature: {T} K}}
+  upper: {{temperature: {T} K}}
+interface:
+  temperature: {T} K
+  mechanism:
+    file: {file}
+    phase: {phase}
+    neighbours: {neighbours}
+initial: {{coverages: {coverages}}}
+run: {{until: {until}, outputs: 6, solver: cantera, rtol: {rtol}}}
+"""
+ADIABATIC = """
+bodies:
+  lower: {{temperature: T, C: 1 J/m^2/K, capacity: constant}}
+  upper: {{temperature: T, C: 0.5 J/m^2/K, capacity: constant}}
+interface:
+  temperature: T
+  mechanism:
+    file: {file}
+    phase: {phase}
+    neighbours: {neighbours}
+T_0: 298.15 K
+initial: {{T: {T} K, coverages: {coverages}}}
+run: {{until: {until}, outputs: 6, solver: cantera, rtol: {rtol}}}
+"""
+
+
+def written(folder: Path, surface: tuple[str, str], text: str = ISOTHERMAL, **changes: object) -> Path:
+    """A case with one of Cantera's surfaces beside it."""
+    file, phase = surface
+    shutil.copy(FOLDER / file, folder)
+    case = folder / "case.yaml"
+    case.write_text(text.format(file=Path(file).name, phase=phase, rtol=RTOL, **{**vars(CASES[surface]), **changes}))
+    return case
+
+
+def alone(surface: tuple[str, str]) -> ct.Interface:
+    """The same surface and neighbours in Cantera."""
+    case = CASES[surface]
+    made = ct.Interface(str(FOLDER / surface[0]), surface[1])
+    pressures = {"1 atm": ct.one_atm, "20 torr": ct.one_atm * 20 / 760, "2 torr": ct.one_atm * 2 / 760}
+    given = YAML(typ="safe").load(case.neighbours)
+    for name, phase in made.adjacent.items():
+        state = given.get(name, {})
+        if "composition" in state:
+            phase.X = state["composition"]
+        phase.TP = case.T, pressures.get(state.get("pressure"), phase.P)
+        phase.electric_potential = float(state.get("electric-potential", "0 V").split()[0])
+    made.TP = case.T, None
+    coverages = YAML(typ="safe").load(case.coverages)
+    made.set_unnormalized_coverages([coverages.get(name, 0.0) for name in made.species_names])
+    return made
+
+
+def coverages(dataset, surface: ct.Interface) -> np.ndarray:
+    found = [name for name in dataset if name.startswith("theta_")]
+    assert len(found) == surface.n_species
+    return np.array([dataset[name].values for name in found]).T
+
+
+def reactions(surface: ct.Interface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Net rates [1/(m^2 s)], and enthalpy and Gibbs energy of each reaction [J], those of charges included."""
+    rates = surface.net_rates_of_progress * 1e3 * AVOGADRO
+    change = surface.product_stoich_coeffs - surface.reactant_stoich_coeffs
+    phases = [surface, *surface.adjacent.values()]
+    rows = [surface.kinetics_species_index(name) for phase in phases for name in phase.species_names]
+    electric = np.concatenate([ct.faraday * phase.electric_potential * phase.charges for phase in phases])
+    h = np.concatenate([phase.partial_molar_enthalpies for phase in phases]) + electric
+    g = np.concatenate([phase.chemical_potentials for phase in phases]) + electric
+    return rates, change[rows].T @ h / (1e3 * AVOGADRO), change[rows].T @ g / (1e3 * AVOGADRO)
+
+
+def test_every_surface_of_cantera_runs():
+    assert set(CASES) == set(SURFACES)
+
+
+@pytest.mark.parametrize("which", CASES)
+def test_at_constant_temperature_as_in_cantera(which, tmp_path):
+    solution = surfacechem.load(written(tmp_path, which)).run(error="balances")
+    assert solution.status == "finished"
+    data, surface = solution.dataset, alone(which)
+    theirs = [surface.coverages]
+    for t in np.diff(data["time"].values):
+        surface.advance_coverages(t, rtol=1e-11, atol=1e-18, max_steps=100000)
+        theirs.append(surface.coverages)
+    np.testing.assert_allclose(coverages(data, surface), theirs, atol=2e-8, rtol=0)
+
+    surface.set_unnormalized_coverages(coverages(data, surface)[-1])
+    rates, h, g = reactions(surface)
+    ours = np.array([data[f"R_R{i + 1}"].values[-1] for i in range(len(rates))])
+    both_ways = (surface.forward_rates_of_progress + surface.reverse_rates_of_progress) * 1e3 * AVOGADRO
+    assert np.all(np.abs(ours - rates) <= 1e-10 * both_ways)
+    produced = sum(float(data[name][-1]) for name in data if name.startswith("sigma_"))
+    size = 1e-9 * np.sum(both_ways * np.abs(h))
+    assert produced == pytest.approx(-np.sum(rates * g) / CASES[which].T, rel=1e-7, abs=size / CASES[which].T)
+    assert float(data["Q_T_c"][-1]) == pytest.approx(np.sum(rates * h), rel=1e-7, abs=size)
+    assert solution.audit.energy_error < BOOKS
+    assert solution.audit.entropy_error < BOOKS
+    assert solution.audit.site_error < BOOKS
+
+
+def test_heat_of_reaction_warms_the_bodies(tmp_path):
+    """The energy balance of bodies and surface, integrated with Cantera's own enthalpies."""
+    which = "sofc.yaml", "metal_surface"
+    solution = surfacechem.load(written(tmp_path, which, ADIABATIC, until=1e-4)).run(error="balances")
+    data, surface = solution.dataset, alone(which)
+    start = np.append(surface.coverages, CASES[which].T)
+
+    def rates(_, y):
+        surface.TP = y[-1], None
+        surface.adjacent["gas"].TP = y[-1], ct.one_atm
+        surface.set_unnormalized_coverages(y[:-1])
+        r, h, _ = reactions(surface)
+        own = surface.get_net_production_rates(surface) / surface.site_density
+        capacity = 1.5 + surface.partial_molar_cp @ (surface.coverages * surface.site_density)
+        return np.append(own, -np.sum(r * h) / capacity)
+
+    exact = solve_ivp(rates, (0, 1e-4), start, method="Radau", rtol=1e-10, atol=1e-14, t_eval=data["time"].values)
+    rise = data["T"].values - CASES[which].T
+    assert np.abs(rise).max() > 0.01
+    np.testing.assert_allclose(rise, exact.y[-1] - CASES[which].T, atol=1e-6 * np.abs(rise).max())
+    change = float(data["E_total"][-1] - data["E_total"][0])
+    assert change == pytest.approx(float(data["H_neighbours"][-1]), rel=BOOKS)
+    assert solution.audit.violations == ()
+
+
+def test_a_reversible_surface_comes_to_rest_in_equilibrium_with_its_gas(tmp_path):
+    which = "sofc.yaml", "metal_surface"
+    solution = surfacechem.load(written(tmp_path, which, until=1.0)).run(error="balances")
+    assert solution.audit.violations == ()
+    surface = alone(which)
+    surface.set_unnormalized_coverages(coverages(solution.dataset, surface)[-1])
+    rates, _, g = reactions(surface)
+    held = [i for i, reaction in enumerate(surface.reactions()) if "O2" not in reaction.reactants]  # none is there
+    assert len(held) == len(g) - 1
+    assert np.all(np.abs(g[held]) < 1e-7 * BOLTZMANN * CASES[which].T)
+    assert -np.sum(rates * g) < 1e-12 * np.sum(surface.forward_rates_of_progress * 1e3 * AVOGADRO * np.abs(g).max())
+
+
+def test_an_electrode_turns_overpotential_into_heat(tmp_path):
+    """What current times overpotential gives is dissipated; the rest of the heat is that of the entropy."""
+    which = "lithium_ion_battery.yaml", "edge_anode_electrolyte"
+    solution = surfacechem.load(written(tmp_path, which)).run(error="balances")
+    data, surface = solution.dataset.isel(time=-1), alone(which)
+    (rate,), (h,), (g,) = reactions(surface)
+    assert abs(g) > 1e-3 * ct.electron_charge
+    assert float(data["D_R1"]) == pytest.approx(-rate * g, rel=1e-9)
+    assert float(data["Q_T_c"]) == pytest.approx(rate * h, rel=1e-9)
+    assert float(data["q_n"]) == pytest.approx(-rate * h, rel=1e-9)
+
+
+def test_a_run_again_from_its_file(tmp_path):
+    which = "sofc.yaml", "oxide_surface"
+    record = rerun.read(surfacechem.run(written(tmp_path, which, until=1e-8)).write(tmp_path / "run.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+def test_in_a_network(tmp_path):
+    which = "sofc.yaml", "oxide_surface"
+    case = written(tmp_path, which, ADIABATIC)
+    solution = surfacechem.load(case).run(error="balances")
+    interface = InterfaceReactor(case)
+    net = ReactorNet([interface])
+    net.rtol, net.atol = 1e-10, 1e-18
+    net.advance(CASES[which].until)
+    for state, value in zip(
+        solution.trajectory.model.system.states, solution.trajectory.result.outputs[-1], strict=True
+    ):
+        assert interface[state.name] == pytest.approx(value, rel=1e-6, abs=1e-12)
+
+
+FUELLED = f"{{{FUEL}}}"
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "message"),
+    [
+        (
+            "{}",
+            "the neighbour gas has no `pressure`: give `neighbours: {gas: {pressure: 1 atm, composition: {H2: 1}}}`",
+        ),
+        ("{gas: {pressure: 1 atm}}", "the neighbour gas has no `composition`"),
+        ("{gass: {pressure: 1 atm}}", "has no neighbour 'gass'. Did you mean 'gas'"),
+        (FUELLED.replace("H2O", "HH2O"), "the neighbour gas has no species 'HH2O'. Did you mean 'H2O'"),
+        (FUELLED.replace("0.95", "0.9"), "mole fractions of the neighbour gas sum to 0.95, not to 1"),
+        (FUELLED.replace("0.95", "1.95"), "H2 = 1.95 is outside its range"),
+        (FUELLED.replace("1 atm", "0 Pa"), "pressure = 0 is outside its range"),
+        (FUELLED.replace("pressure", "presure"), "unknown key 'presure'"),
+    ],
+)
+def test_states_of_neighbours_are_checked(neighbours, message, tmp_path):
+    case = written(tmp_path, ("sofc.yaml", "metal_surface"), neighbours=neighbours)
+    with pytest.raises(InputError) as caught:
+        surfacechem.load(case)
+    assert message in str(caught.value)
+    assert "case.yaml:" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("sticking-coefficient: {A: 1.0,", "sticking-coefficient: {B: 1.0,", "sticking-coefficient: unknown key 'B'"),
+        ("sticking-coefficient: {A: 1.0,", "sticking-coeficient: {A: 1.0,", "unknown key 'sticking-coeficient'"),
+        ("orders: {PT(S): 1}", "type: Bell\n  x-beta: 1 nm", "a rate of type 'Bell' belongs to surface"),
+    ],
+)
+def test_reactions_with_neighbours_are_checked(old, new, message, tmp_path):
+    case = written(tmp_path, ("ptcombust.yaml", "Pt_surf"))
+    file = tmp_path / "ptcombust.yaml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        surfacechem.load(case)
+    assert message in str(caught.value)
+    assert "ptcombust.yaml:" in str(caught.value)
+
+
+def test_what_a_reversible_reaction_may_give_back_is_told(tmp_path):
+    system = surfacechem.load(written(tmp_path, ("sofc.yaml", "metal_surface"))).system
+    assert any("the neighbours hold no O2, which reactions make" in text for text in system.warnings)
+
+
+def test_what_neighbours_do_not_hold_is_told(tmp_path):
+    neighbours = "{gas: {pressure: 1 atm, composition: {CH4: 0.095, O2: 0.21, AR: 0.695}}}"
+    simulation = surfacechem.load(written(tmp_path, ("methane_pox_on_pt.yaml", "Pt_surf"), neighbours=neighbours))
+    assert any(
+        "the neighbours hold no H2, H2O, CO, CO2, which reactions make" in text for text in simulation.system.warnings
+    )

@@ -1,0 +1,413 @@
+"""Media: fits against CoolProp, runs that leave their range, what is refused, and nothing imported without need."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson, solve_bvp
+from scipy.optimize import brentq
+
+import surfacechem
+from surfacechem import format as case
+from surfacechem.contracts import fits
+from surfacechem.contracts.terms import Varying
+from surfacechem.errors import InputError
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.contact import ConstantInterfaceCapacity
+from surfacechem.laws.factors import Exponential
+from surfacechem.laws.films import Film, FilmCapacity, FilmShear, RarefiedFilm
+from surfacechem.laws.friction import Viscous
+from surfacechem.laws.loading import Hold
+from surfacechem.laws.media import Roelands, Vogel
+from surfacechem.media.coolprop import COMBINED, CoolPropFluid
+from surfacechem.model.assemble import assemble
+from surfacechem.references.couette_flow import CouetteFlow
+from surfacechem.results.achieved import computed
+from surfacechem.results.audit import audit
+from surfacechem.runs import simulation
+from surfacechem.scene import Body, Interface, Medium, Scene
+from surfacechem.solve.run import Model, Run
+
+pytestmark = pytest.mark.around
+
+BOUND = 1e-8
+FLUIDS = [
+    ("Nitrogen", 101325.0, 220.0, 480.0),
+    ("Air", 1e5, 250.0, 600.0),
+    ("Helium", 1e5, 250.0, 400.0),
+    ("CarbonDioxide", 1e5, 280.0, 500.0),
+    ("Water", 1e6, 280.0, 440.0),
+    ("n-Dodecane", 1e5, 290.0, 420.0),
+    ("INCOMP::MEG-50%", 1e5, 260.0, 360.0),
+    ("INCOMP::S800", 1e5, 290.0, 450.0),
+]
+
+
+def medium(fluid="Water", p=1e5, thickness=2e-6) -> Medium:
+    return Medium(CoolPropFluid(fluid, p), {}, thickness)
+
+
+def lubricated(found: Medium, v=2.0, T=300.0, C=500.0, capacity=True) -> Scene:
+    """Two bodies that slide on a film of the medium."""
+    interface = Interface("T_c", [FilmCapacity()] * capacity, [FilmShear()], medium=found)
+    pair = Body("lower", "T_1", Constant(C=C)), Body("upper", "T_2", Constant(C=C))
+    initial = {"T_1": T, "T_2": T} | ({"T_c": T} if capacity else {})
+    heat = [Film(between=("lower", "upper"), closure="medium")]
+    return Scene(pair, interface, heat, {"v": Hold(level=v)}, None, 300.0, initial)
+
+
+def solved(scene: Scene, *times: float, **changes: float):
+    return Model(assemble(scene)).solve(Run(times=times), changes)
+
+
+# -- fits -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "p", "low", "high"), FLUIDS, ids=[row[0] for row in FLUIDS])
+def test_fits_are_within_their_bound(name, p, low, high):
+    fluid = CoolPropFluid(name, p)
+    T = np.random.default_rng(7).uniform(low, high, 400)
+    for quantity in COMBINED:
+        if name.startswith("INCOMP") and quantity == "gamma_m":
+            continue
+        pieces = fluid.fit(quantity, low, high)
+        assert [pieces[0].low, *(piece.high for piece in pieces)][-1] == high
+        index = np.searchsorted([piece.high for piece in pieces], T)
+        values = np.array([pieces[i](t) for i, t in zip(index, T, strict=True)])
+        assert np.max(np.abs(values / fluid.values(quantity, T) - 1)) < BOUND, quantity
+
+
+def test_kinks_and_jumps_lie_between_pieces():
+    kinked = fits.fit(lambda T: 1 + np.abs(np.sin(T / 50 - 6.1)), 280.0, 330.0)
+    jumping = fits.fit(lambda T: np.exp(T / 300) + (T > 311.7), 280.0, 330.0)
+    assert min(abs(piece.high - 305.0) for piece in kinked) < 1e-4
+    assert min(abs(piece.high - 311.7) for piece in jumping) < 1e-4
+
+
+def test_what_is_not_smooth_is_refused():
+    noise = np.random.default_rng(3)
+    with pytest.raises(fits.NoFitError):
+        fits.fit(lambda T: 1 + 1e-6 * noise.random(len(T)), 280.0, 330.0)
+
+
+@pytest.mark.parametrize("name", ["Water", "Nitrogen", "INCOMP::MEG-50%"])
+def test_properties_in_the_compiled_code(name):
+    scene = lubricated(medium(name), v=2.0 if name != "Nitrogen" else 30.0)
+    values = computed(solved(scene, *np.linspace(0.0, 2.0, 21)))
+    exact = CoolPropFluid(name, 1e5)
+    for quantity in ("k_m", "eta_m"):
+        assert values[quantity] == pytest.approx(exact.values(quantity, values["T_c"]), rel=BOUND)
+    assert values["t_film_shear"] == pytest.approx(values["eta_m"] * values["v"] / 2e-6, rel=1e-12)
+
+
+def test_energy_and_entropy_of_a_film_are_the_integrals_of_its_heat_capacity():
+    values = computed(solved(lubricated(medium("Nitrogen"), v=40.0), *np.linspace(0.0, 2.0, 21)))
+    fluid, d = CoolPropFluid("Nitrogen", 1e5), 2e-6
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    start = values["T_c"][0]
+    for T, U, S in zip(values["T_c"][1:], values["U_c"][1:], values["S_c"][1:], strict=True):
+        points = start + (T - start) * (nodes + 1) / 2
+        over_T = d * fluid.values("capacity_m", points)
+        assert pytest.approx((T - start) / 2 * weights @ over_T, rel=BOUND) == S
+        assert pytest.approx((T - start) / 2 * weights @ (over_T * points), rel=BOUND) == U
+    assert (values["U_c"][0], values["S_c"][0]) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_films_close_energy_and_entropy():
+    for capacity in (True, False):
+        books = audit(solved(lubricated(medium(), capacity=capacity), 0.0, 1.0, 5.0))
+        assert books.energy_error < 1e-9
+        assert books.entropy_error < 1e-9
+        assert books.violations == ()
+
+
+# -- heat made across a film ------------------------------------------------------------------------------------------
+
+K_M, ETA, D_M = 0.13, 0.01, 5e-6
+
+
+def between_walls(T_1, T_2, v, viscosity=ETA, law=Film, given=None, **parameters) -> Scene:
+    """A film of constant conductivity that is sheared between walls of constant temperature."""
+    properties = {"k_m": K_M, "rho_m": 860.0, "cp_m": 2000.0, "eta_m": ETA} if given is None else given
+    friction = FilmShear() if viscosity is ETA else Viscous(eta=viscosity)
+    found = Medium(None, properties, D_M)
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=8.6)], [friction], medium=found)
+    walls = Body("lower", Hold(level=T_1)), Body("upper", Hold(level=T_2))
+    heat = [law(between=("lower", "upper"), closure="medium", **parameters)]
+    loading = {"v": Hold(level=v)} | ({} if viscosity is ETA else {"g_n": Hold(level=D_M)})
+    return Scene(walls, interface, heat, loading, T_0=300.0, initial={"T_c": 300.0})
+
+
+def steady(scene: Scene) -> dict[str, float]:
+    return {name: values[-1] for name, values in computed(solved(scene, 0.0, 0.02)).items()}
+
+
+@pytest.mark.parametrize(("T_1", "T_2", "v"), [(300.0, 300.0, 10.0), (300.0, 340.0, 30.0), (390.0, 310.0, 0.5)])
+def test_a_sheared_film_against_couette_flow(T_1, T_2, v):
+    """The parabola on a line that solves k T'' + eta (v/d)^2 = 0."""
+    values, heat = steady(between_walls(T_1, T_2, v)), ETA * v**2 / D_M
+    across = K_M / D_M * (T_2 - T_1)
+    assert values["T_c"] == pytest.approx((T_1 + T_2) / 2 + ETA * v**2 / (12 * K_M), rel=1e-11)
+    assert values["q_1"] == pytest.approx(heat / 2 + across, rel=1e-9)
+    assert values["q_2"] == pytest.approx(heat / 2 - across, rel=1e-9)
+    profile = np.linspace(0.0, 1.0, 20001)
+    T = T_1 + (T_2 - T_1) * profile + ETA * v**2 / (2 * K_M) * profile * (1 - profile)
+    assert values["T_c"] == pytest.approx(np.trapezoid(T, profile), rel=1e-8)
+
+
+@pytest.mark.parametrize("alphas", [(1.0, 1.0), (0.9, 0.2)])
+def test_heat_made_across_a_gas_passes_the_jump_at_each_wall(alphas):
+    T_1, T_2, d = 300.0, 320.0, 1e-7
+    given = {"alpha_1": alphas[0], "alpha_2": alphas[1]}
+    scene = between_walls(T_1, T_2, 200.0, law=RarefiedFilm, given={}, **given)
+    scene = dataclasses.replace(
+        scene, interface=dataclasses.replace(scene.interface, medium=medium("Nitrogen", 1e5, d))
+    )
+    values = steady(scene)
+    fluid, T_c = CoolPropFluid("Nitrogen", 1e5), values["T_c"]
+    gas = {name: float(fluid.values(name, np.array([T_c]))[0]) for name in ("k_m", "eta_m", "rho_m", "cp_m", "gamma_m")}
+    law = RarefiedFilm(between=("lower", "upper"), **given)
+    r_1, r, r_2 = law.resistances(**gas, p_m=1e5, d_m=d)
+    # T = level + slope y - heat r y^2 / 2 across the film; at each wall the flux passes the resistance of the jump.
+    heat = gas["eta_m"] * 200.0**2 / d
+    jumps = [[1.0, -r_1 / r], [1.0, 1.0 + r_2 / r]]
+    level, slope = np.linalg.solve(jumps, [T_1, T_2 + heat * (r / 2 + r_2)])
+    assert T_c == pytest.approx(level + slope / 2 - heat * r / 6, rel=1e-8)
+    assert values["q_1"] == pytest.approx(slope / r, rel=1e-6)
+    assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
+
+
+@pytest.mark.parametrize("Na", [0.01, 1.0, 18.2, 1e4])
+def test_couette_flow_solves_its_boundary_value_problem(Na):
+    """By SciPy, with the temperature in 1/beta, the velocity in v and the traction in eta v / d."""
+    beta, T_w = 0.04, 300.0
+    v = np.sqrt(Na * K_M / (beta * ETA))
+    exact = CouetteFlow(T_w=T_w, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v).solution(0.0)
+
+    def film(_, z):
+        shear = z[3] * np.exp(z[0])
+        return np.vstack([z[1], -Na * z[3] * shear, shear, 0 * shear])
+
+    y = np.linspace(0.0, 1.0, 401)
+    rise, traction = beta * (exact["T_max"] - T_w), exact["t_t"] * D_M / (ETA * v)
+    start = np.vstack([4 * rise * y * (1 - y), 4 * rise * (1 - 2 * y), y, 0 * y + traction])
+    ends = lambda a, b: np.array([a[0], b[0], a[2], b[2] - 1])  # noqa: E731
+    found = solve_bvp(film, ends, y, start, tol=1e-9, max_nodes=200000)
+    assert found.success
+    fine = np.linspace(0.0, 1.0, 8001)
+    assert traction == pytest.approx(found.sol(0.5)[3], rel=1e-7)
+    assert rise == pytest.approx(found.sol(0.5)[0], rel=1e-7)
+    assert beta * (exact["T_c"] - T_w) == pytest.approx(simpson(found.sol(fine)[0], x=fine), rel=1e-6)
+
+
+def test_couette_flow_bears_most_at_the_nahme_fold():
+    """At the fold lambda tanh lambda = 1, beta (tau d)^2 / (k eta) = 8 lambda^2 / cosh^2 lambda."""
+    fold = brentq(lambda x: x * np.tanh(x) - 1, 1.0, 2.0)
+    v = np.sqrt(8 * K_M / (0.04 * ETA)) * np.sinh(fold) * np.array([0.99, 1.0, 1.01])
+    films = [CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=0.04, v=x) for x in v]
+    before, most, beyond = (float(film.solution(0.0)["t_t"]) for film in films)
+    assert before < most > beyond
+    assert films[1].nahme == pytest.approx(18.2, abs=0.02)
+    assert 0.04 * (most * D_M) ** 2 / (K_M * ETA) == pytest.approx(8 * fold**2 / np.cosh(fold) ** 2, rel=1e-13)
+
+
+@pytest.mark.parametrize(("Na", "rise", "traction"), [(1e-3, 2e-5, 1e-8), (1.0, 0.014, 0.0017), (18.2, 0.043, 0.097)])
+def test_a_film_that_thins_stays_near_couette_flow_up_to_the_nahme_fold(Na, rise, traction):
+    """The film has one temperature, and its viscosity; the solution across it has both everywhere."""
+    beta = 0.04
+    v = np.sqrt(Na * K_M / (beta * ETA))
+    thinning = Varying(ETA, (Exponential(beta=beta),))
+    values = steady(between_walls(300.0, 300.0, v, thinning))
+    exact = CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v).solution(0.0)
+    assert values["T_c"] - 300.0 == pytest.approx(exact["T_c"] - 300.0, rel=rise)
+    assert values["t_viscous"] == pytest.approx(exact["t_t"], rel=traction)
+
+
+@pytest.mark.parametrize("T_c", [250.0, 320.0, 340.0, 345.0, 352.0, 700.0])
+def test_a_film_produces_entropy_whatever_its_temperature(T_c):
+    scene = dataclasses.replace(between_walls(250.0, 450.0, 0.0), initial={"T_c": T_c})
+    assert np.all(computed(solved(scene, 0.0, 1e-6, 1e-4, 1e-2))["sigma_film"] > 0)
+
+
+def test_a_film_on_one_wall_in_perfect_contact():
+    """With the mean temperature of the film at that of one wall the profile reaches the other by 4 k/d."""
+    scene = between_walls(300.0, 310.0, 10.0)
+    pair = Body("lower", "T_1", Constant(C=1e3)), scene.bodies[1]
+    interface = dataclasses.replace(scene.interface, temperature="T_1")
+    joined = dataclasses.replace(scene, bodies=pair, interface=interface, initial={"T_1": 300.0})
+    values = computed(solved(joined, 0.0, 0.1))
+    assert values["q_2"] == pytest.approx(4 * K_M / D_M * (values["T_1"] - 310.0), rel=1e-9)
+    assert audit(solved(joined, 0.0, 0.1)).energy_error < 1e-9
+
+
+# -- runs that leave the range ----------------------------------------------------------------------------------------
+
+
+def test_a_run_that_leaves_the_range_goes_on_with_a_wider_one(monkeypatch):
+    model = Model(assemble(lubricated(medium("Nitrogen"), v=60.0)))
+    monkeypatch.setattr("surfacechem.solve.run.compile_program", None)
+    monkeypatch.setattr("surfacechem.solve.run.compile_function", None)
+    trajectory = model.solve(Run(times=np.linspace(0.0, 8.0, 9)))
+    assert trajectory.status == "finished"
+    values = computed(trajectory)
+    assert values["T_c"][-1] > 420.0
+    exact = CoolPropFluid("Nitrogen", 1e5).values("eta_m", values["T_c"])
+    assert values["eta_m"] == pytest.approx(exact, rel=BOUND)
+    again = model.solve(Run(times=np.linspace(0.0, 8.0, 9)))
+    assert np.array_equal(again.result.outputs, trajectory.result.outputs)
+
+
+def test_an_algebraic_temperature_beyond_the_first_range_is_found():
+    scene = lubricated(medium("Nitrogen", thickness=5e-4), v=870.0, capacity=False)
+    trajectory = solved(scene, 0.0, 1.0)
+    values = computed(trajectory)
+    assert values["T_c"][0] > 340.0
+    exact = CoolPropFluid("Nitrogen", 1e5)
+    for quantity in ("k_m", "eta_m"):
+        assert values[quantity] == pytest.approx(exact.values(quantity, values["T_c"]), rel=BOUND)
+
+
+def test_a_start_elsewhere_is_fitted_there():
+    model = Model(assemble(lubricated(medium("Nitrogen"))))
+    changes = {f"initial.{name}": 500.0 for name in ("T_1", "T_2", "T_c")}
+    values = computed(model.solve(Run(times=[0.0, 0.1]), changes))
+    assert values["eta_m"][0] == pytest.approx(CoolPropFluid("Nitrogen", 1e5).values("eta_m", np.array([500.0]))[0])
+
+
+def test_a_liquid_that_boils_ends_the_run():
+    trajectory = solved(lubricated(medium(), v=20.0), 0.0, 1.0, 5.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith("Water at 100000 Pa boils at T_c = 372.752 K")
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fluid", "p", "T", "message"),
+    [
+        ("Propyne", 5e5, 300.0, "Propyne at 500000 Pa: Viscosity model is not available for this fluid"),
+        ("Water", 1e5, 250.0, "Water at 100000 Pa has no properties at 250 K: CoolProp's range is 273.16 to 2000 K"),
+        ("Watr", 1e5, 300.0, "CoolProp knows no fluid 'Watr'. Did you mean 'Water'?"),
+    ],
+)
+def test_what_coolprop_has_not_is_refused_with_the_reason(fluid, p, T, message):
+    with pytest.raises(InputError, match="^" + message.replace("?", r"\?")):
+        assemble(lubricated(medium(fluid, p), T=T))
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (
+            Medium(None, {"eta_m": 0.1, "rho_m": 800.0, "cp_m": 2e3}, 1e-6),
+            "reads the thermal conductivity of the medium k_m",
+        ),
+        (Medium(None, {"eta_m": 0.1, "k_m": 0.1, "rho_m": 800.0}, 1e-6), "needs the density and the heat capacity"),
+        (Medium(CoolPropFluid("Water", 1e5), {}, None), "a film that stores heat needs a thickness"),
+    ],
+)
+def test_a_medium_that_lacks_what_is_asked_for(found, message):
+    scene = lubricated(found)
+    scene = dataclasses.replace(scene, loading={**scene.loading, "g_n": Hold(level=1e-6)})
+    with pytest.raises(InputError, match=message):
+        assemble(scene)
+
+
+TEXT = """
+bodies: {lower: {temperature: T_1, C: 500}, upper: {temperature: T_2, C: 500}}
+T_0: 300
+interface: {temperature: T_c, medium: {%s}, friction: [film-shear]}
+heat: [film: {between: [lower, upper], closure: medium}]
+loading: {v: 2, g_n: 1 um}
+initial: {T_1: 300, T_2: 300}
+run: {until: 1}
+"""
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("fluid: Watr, pressure: 1 atm", "case.yaml:4: interface.medium.fluid: CoolProp knows no fluid 'Watr'"),
+        ("fluid: Water", "case.yaml:4: interface.medium: the fluid needs a `pressure`"),
+        ("pressure: 1 atm", "case.yaml:4: interface.medium.pressure: `pressure` belongs to a fluid"),
+        ("conductivity: {vogel: {a: 1, b: 1, c: 1}}", "vogel is a law of the viscosity of the medium, not of the cond"),
+        ("viscosity: 3 m", "viscosity"),
+        ("viscosty: 3", "unknown key 'viscosty'. Did you mean 'viscosity'?"),
+    ],
+)
+def test_media_of_case_files_that_are_wrong(content, message):
+    with pytest.raises(InputError) as caught:
+        case.load_text(TEXT % content)
+    assert message in str(caught.value)
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_property_that_is_given_goes_before_that_of_the_fluid():
+    found = Medium(CoolPropFluid("Water", 1e5), {"eta_m": Vogel(a=6e-5, b=900.0, c=165.0)}, 2e-6)
+    values = computed(solved(lubricated(found, v=0.5), 0.0, 1.0))
+    assert values["eta_m"] == pytest.approx(6e-5 * np.exp(900.0 / (values["T_c"] - 165.0)), rel=1e-12)
+    assert values["k_m"] == pytest.approx(CoolPropFluid("Water", 1e5).values("k_m", values["T_c"]), rel=BOUND)
+
+
+def test_a_thick_gas_film_conducts_like_a_continuum():
+    gas = {"k_m": 0.0259, "eta_m": 1.79e-5, "rho_m": 1.138, "cp_m": 1041.0, "gamma_m": 1.401, "p_m": 101325.0}
+    rarefied, film = (law(between=("lower", "upper")) for law in (RarefiedFilm, Film))
+    assert rarefied.conductance(d_m=1.0, **gas) == pytest.approx(film.conductance(k_m=gas["k_m"], d_m=1.0), rel=1e-6)
+
+
+def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
+    def run(gap, Y):
+        return surfacechem.run("closing-gas-gap", {"loading.g_n": gap, "heat.rarefied-film.Y": Y})
+
+    pressed, apart = run("-1 um", "2 um"), run("1 um", "1 um")
+    assert pressed.status == "finished"
+    np.testing.assert_allclose(pressed.dataset["T_1"], apart.dataset["T_1"], rtol=1e-9)
+
+
+def test_viscosity_laws_fall_with_temperature_and_rise_with_pressure():
+    roelands = Roelands(eta_0=0.04, Z=0.6, S_0=1.1)
+    assert roelands.value(T_c=350.0, p=0.0, T_0=313.0) < 0.04 < roelands.value(T_c=313.0, p=1e8, T_0=313.0)
+    slope = np.log(roelands.value(T_c=313.0, p=1e3, T_0=313.0) / 0.04) / 1e3
+    assert slope == pytest.approx(0.6 * (np.log(0.04) + 9.67) / 0.196e9, rel=1e-4)
+
+
+def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
+    found = Medium(None, {"eta_m": Vogel(a=6e-5, b=90.0, c=165.0), "k_m": 0.1}, 2e-6)
+    scene = lubricated(found, T=170.0, capacity=False)
+    scene = dataclasses.replace(scene, loading={**scene.loading, "Q_1": Hold(level=-2e3), "Q_2": Hold(level=-2e3)})
+    scene = dataclasses.replace(scene, loading={**scene.loading, "v": Hold(level=0.0)})
+    trajectory = solved(scene, 0.0, 10.0)
+    assert trajectory.status == "stopped"
+    assert "T_c left the range of the law vogel" in trajectory.reason
+
+
+# -- nothing without need ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("exothermic", False), ("lubricated-sliding", False), ("closing-gas-gap", True)]
+)
+def test_coolprop_is_imported_only_for_a_fluid(name, wanted):
+    code = f"import sys, surfacechem\nsurfacechem.run('{name}').dataset\nprint('CoolProp' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == str(wanted)
+
+
+def test_a_medium_gives_only_what_is_asked_for():
+    names = set(computed(simulation.load("lubricated-sliding").model.solve(Run(times=[0.0, 1.0]))))
+    assert {"k_m", "eta_m"} <= {*names, "k_m"}
+    assert not {"gamma_m", "p_m", "rho_m"} & names
+    parameters = [p.path for p in assemble(lubricated(medium(), capacity=False)).parameters]
+    assert not [path for path in parameters if "rho_m" in path or "cp_m" in path]
+
+
+@pytest.mark.parametrize("T", [138.0, 100.0, 1e-3])
+def test_roelands_is_a_number_beyond_its_pole(T):
+    """A run stops at the pole; a value asked for beyond it is finite."""
+    value = Roelands(eta_0=0.04, Z=0.6, S_0=1.1).value(T_c=T, p=1e8, T_0=313.15)
+    assert 0 < value < 1

@@ -1,0 +1,310 @@
+"""Bonds under load in a scene: who carries what, when bonds rupture, and survival however small."""
+
+import math
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import symengine
+from tables_bonds import SITES, isothermal
+
+from surfacechem.compile.printing import python
+from surfacechem.errors import InputError
+from surfacechem.format import load_text
+from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, ReversibleBell, TwoPathway
+from surfacechem.laws.contact import NormalStiffness
+from surfacechem.laws.kinetics import Bimolecular
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.results.audit import audit
+from surfacechem.scene import Body, Interface, Scene, Sites
+from surfacechem.solve.run import Model, Run
+
+THERMAL = BOLTZMANN * 300.0
+X = 4e-10
+UNIT = THERMAL / X
+"""Force at which Bell's exponent is one [N]."""
+SLIP = Bell(k_off=1.0, x_off=X)
+
+
+def named(trajectory) -> dict[str, np.ndarray]:
+    names = [item.name for item in trajectory.model.system.outputs]
+    return dict(zip(names, trajectory.outputs.T, strict=True))
+
+
+def solved(scene, *times, **settings):
+    return Model(assemble(scene)).solve(Run(times=[0.0, *times], **settings))
+
+
+def role_of(scene, name):
+    return next((role.by for role in assemble(scene).roles if role.variable == name), None)
+
+
+# -- who carries the load ---------------------------------------------------------------------------------------------
+
+
+def test_bonds_share_the_tension_and_feel_no_compression():
+    loading = {"t_n": Harmonic(amplitude=UNIT * SITES, frequency=0.25)}
+    trajectory = solved(isothermal(Bell(k_off=0.1, x_off=X, k_on=1.0), loading), *np.linspace(0.1, 4.0, 40))
+    values = named(trajectory)
+    phi = trajectory.result.outputs[:, 0]
+    np.testing.assert_allclose(values["f"], np.maximum(values["t_n"], 0) / (SITES * phi), rtol=1e-12, atol=1e-26)
+    assert audit(trajectory).site_error < 1e-10
+    restarts = trajectory.result.events.t
+    assert np.allclose(restarts, [2.0], atol=1e-9) or np.allclose(restarts, [2.0, 4.0], atol=1e-9)
+
+
+def test_elastic_bonds_carry_what_stretches_them_and_the_contact_the_rest():
+    potentials = [LatticeGas(epsilon=5e-20), BondSprings(k_b=1e-3, l_0=1e-9), NormalStiffness(E_n=1e13)]
+    scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.5, potentials=potentials)
+    values = named(solved(scene, 1.0, 5.0))
+    np.testing.assert_allclose(values["f"], 1e-3 * (values["g_n"] - 1e-9), rtol=1e-12, atol=1e-24)
+    assert role_of(scene, "f") == "bond elasticity"
+
+
+def test_what_nobody_reads_is_not_there():
+    scene = isothermal(
+        Bimolecular(k_f=1e-16, k_r=1.0), {"g_n": Hold(level=1e-9)}, 0.1, potentials=[BondSprings(k_b=1e-3)]
+    )
+    system = assemble(scene)
+    assert "f" not in {item.name for item in system.named} | {role.variable for role in system.roles}
+    assert not any(margin.name == "bonds left" for margin in system.margins)
+
+
+@pytest.mark.parametrize(
+    ("loading", "potentials", "message"),
+    [
+        ({}, (), "the law bell reads the force per bond, tension positive f, but nothing evolves or prescribes it"),
+        ({"f": 1e-12, "t_n": 1.0}, (), "f has two roles: prescribed (loading) and derived (load shared by all bonds)"),
+        ({"g_n": 1e-9, "t_n": 1.0}, (NormalStiffness(E_n=1.0),), "t_n has two roles: prescribed (loading) and derived"),
+        ({"g_n": 1e-9, "f": 1.0}, (BondSprings(k_b=1.0),), "f has two roles: prescribed (loading) and derived"),
+    ],
+)
+def test_a_load_has_one_role(loading, potentials, message):
+    histories = {name: Hold(level=value) for name, value in loading.items()}
+    with pytest.raises(InputError) as error:
+        assemble(isothermal(SLIP, histories, potentials=potentials))
+    assert message in str(error.value)
+
+
+def test_unequal_densities_meet_in_the_law_of_mass_action():
+    """d phi/dt = a (1 - phi)(r - phi) - b phi with r = n_2 / n_c, in closed form."""
+    kept = Hold(level=300.0)
+    ratio, k_f, k_r = 0.6, 2e-16, 0.3
+    interface = Interface(kept, reactions=[Bimolecular(k_f=k_f, k_r=k_r)], sites=Sites(SITES, ratio * SITES))
+    scene = Scene((Body("a", kept), Body("b", kept)), interface, initial={"phi": 0.0})
+    t = np.array([0.1, 0.5, 2.0])
+    phi = solved(scene, *t).result.outputs[1:, 0]
+    a = k_f * SITES
+    high, low = sorted(np.roots([a, -(a * (1 + ratio) + k_r), a * ratio]).real, reverse=True)
+    decay = np.exp(-a * (high - low) * t) * low / high
+    np.testing.assert_allclose(phi, (low - high * decay) / (1 - decay), rtol=1e-9)
+
+
+# -- rupture ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jump", [0.5, 5.0, 30.0, 45.0, 60.0, 200.0, 290.0, 1e3, 1e6])
+def test_a_sudden_load_breaks_bonds_when_it_comes(jump):
+    """From exponents of one half to a million, and never a number that is none."""
+    load = UNIT * SITES
+    loading = {"t_n": Table(times=[0.0, 1.0, 1.0, 30.0], values=[0.0, 0.0, jump * load, jump * load])}
+    trajectory = solved(isothermal(Bell(k_off=1e-3, x_off=X), loading), 0.5, 2e3)
+    assert trajectory.status == "stopped"
+    assert re.match("the bonds ruptured (at|near) t = ", trajectory.reason)
+    assert np.isfinite(trajectory.outputs).all()
+    assert trajectory.result.t >= 1.0
+    assert jump < 30 or trajectory.result.t == pytest.approx(1.0, abs=1e-9)
+
+
+def test_bonds_form_without_load_and_none_form_under_one():
+    free = solved(isothermal(Bell(k_off=1.0, x_off=X, k_on=1.0), {"t_n": Hold(level=0.0)}, 0.0), 20.0)
+    assert free.result.outputs[-1, 0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_load_beyond_reason_is_refused_at_the_start():
+    with pytest.raises(InputError, match=r"at the start the bonds ruptured .*lower `t_n`, or let it grow from zero"):
+        solved(isothermal(SLIP, {"t_n": Hold(level=1e5 * UNIT * SITES)}), 1.0)
+
+
+def test_rupture_does_not_depend_on_the_form_of_the_state():
+    scene = isothermal(SLIP, {"t_n": Hold(level=0.5 * UNIT * SITES)})
+    plain, logarithmic = (solved(form, 1.0) for form in (scene, in_logarithms(scene)))
+    assert logarithmic.result.t == pytest.approx(plain.result.t, rel=1e-12)
+    assert logarithmic.result.t == pytest.approx(0.559773594776160811746795939315, rel=1e-12)
+
+
+# -- survival in logarithms -------------------------------------------------------------------------------------------
+
+
+def in_logarithms(scene, ln_phi=0.0):
+    return Scene(scene.bodies, scene.interface, loading=scene.loading, initial={"ln_phi": ln_phi}, T_0=scene.T_0)
+
+
+def test_survival_of_any_smallness():
+    """Along a ramp ln S = -(k_0 / f') (exp(f) - 1) is met to 1e-10 down to S = e^-1000000."""
+    hazard = np.array([1e-3, 1.0, 50.0, 690.0, 745.0, 1e4, 1e6])
+    times = np.log1p(hazard)  # the force grows by one unit, the rate at no force is one
+    trajectory = solved(in_logarithms(isothermal(SLIP, {"f": Ramp(rate=UNIT)})), *times)
+    np.testing.assert_allclose(trajectory.result.outputs[1:, 0], -hazard, rtol=1e-10)
+    np.testing.assert_allclose(named(trajectory)["phi"][1:5], np.exp(-hazard[:4]), rtol=1e-8)
+    assert np.isfinite(trajectory.outputs).all()
+    assert audit(trajectory).site_error < 1e-10
+
+
+def test_logarithms_change_nothing_else():
+    potentials = [LatticeGas(epsilon=2e-20), BondSprings(k_b=1e-3)]
+    scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.7, potentials=potentials)
+    plain, logarithmic = (solved(form, 1.0, 3.0, 9.0) for form in (scene, in_logarithms(scene, math.log(0.7))))
+    assert logarithmic.model.system.states[0].name == "ln_phi"
+    ours, theirs = named(logarithmic), named(plain)
+    np.testing.assert_allclose(ours.pop("phi"), plain.result.outputs[:, 0], rtol=1e-9)
+    for name, values in ours.items():
+        np.testing.assert_allclose(values, theirs[name], rtol=1e-8, atol=1e-8 * abs(theirs[name]).max(), err_msg=name)
+    assert audit(logarithmic).energy_error < 1e-9
+    assert audit(logarithmic).violations == ()
+
+
+def test_printed_equations_of_a_logarithmic_state_run():
+    system = assemble(in_logarithms(isothermal(SLIP, {"f": Hold(level=UNIT)}), math.log(0.5)))
+    space: dict = {}
+    exec(python(system, "logarithmic"), space)
+    assert space["residual"](0.0, [math.log(0.5)], [-math.e]) == pytest.approx([0.0], abs=1e-12)
+    assert space["ledger"](0.0, [math.log(0.5)], [-math.e])[0] == pytest.approx(-math.e / 2)
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        ({"ln_phi": 0.0, "phi": 1.0}, "phi has two roles: given by itself and by ln_phi"),
+        ({"ln_phi": 0.1}, "initial phi = 1.10517 is outside its range: 0 to 1"),
+        ({"ln_phi": -1e4}, "is no bonding state that a number can hold"),
+    ],
+)
+def test_initial_logarithms_are_checked(initial, message):
+    scene = isothermal(SLIP, {"f": Hold(level=0.0)})
+    with pytest.raises(InputError) as error:
+        assemble(Scene(scene.bodies, scene.interface, loading=scene.loading, initial=initial))
+    assert message in str(error.value)
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("f", [0.0, 3e-12, 40e-12, 1e-9, 1e-6, 1e3])
+@pytest.mark.parametrize(
+    "law",
+    [
+        SLIP,
+        ReversibleBell(k_off=1.0, x_off=X),
+        DemboSpring(k_off=1.0, stiffness=2e-3, transition_stiffness=1e-3, k_on=1.0),
+        DemboSpring(k_off=1.0, stiffness=1e-3, transition_stiffness=2e-3, k_on=1.0),
+        TwoPathway(k_slip=0.1, x_slip=2e-10, k_catch=100.0, x_catch=2e-9),
+        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=0.5),
+        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20),
+        DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=1.0),
+    ],
+    ids=lambda law: law.name() if hasattr(law, "name") else None,
+)
+def test_no_force_makes_a_number_that_is_none(law, f):
+    """Values and slopes are finite, in compression too."""
+    names = ("phi", "n_c", "f", "T_c", "mu")
+    symbols = {name: symengine.Symbol(name) for name in names if name in law.rate.__code__.co_varnames}
+    rate = law.rate(**symbols)
+    rows = [rate, *(symengine.diff(rate, symbol) for symbol in symbols.values())]
+    function = symengine.Lambdify(list(symbols.values()), rows)
+    for sign in (1, -1):
+        for phi in (0.0, 1e-12, 0.5, 1.0):
+            point = {"phi": phi, "n_c": SITES, "f": sign * f, "T_c": 300.0, "mu": -1e-20}
+            assert np.isfinite(function([point[name] for name in symbols])).all(), (sign, phi)
+
+
+def test_dembo_springs_slip_hold_or_catch_by_their_transition_state():
+    rates = [
+        -DemboSpring(k_off=1.0, stiffness=2e-3, transition_stiffness=ts).rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0)
+        for ts in (1e-3, 2e-3, 3e-3)
+    ]
+    assert rates[0] > 1.0 == rates[1] > rates[2]
+
+
+def test_two_pathways_live_longest_at_the_stated_force():
+    law = TwoPathway(k_slip=0.1, x_slip=2e-10, k_catch=10.0, x_catch=2e-9)
+    best = THERMAL / 2.2e-9 * math.log(10.0 / 0.1 * 2e-9 / 2e-10)
+    life = [-law.rate(phi=1.0, n_c=1.0, f=best * factor, T_c=300.0) for factor in (0.99, 1.0, 1.01)]
+    assert min(life) == life[1]
+
+
+def test_dudko_tends_to_bell_and_ends_at_its_largest_rate():
+    bell = SLIP.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0)
+    linear = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=1.0)
+    high = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-16, nu=0.5)
+    assert linear.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0) == pytest.approx(bell, rel=1e-12)
+    assert high.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0) == pytest.approx(bell, rel=1e-4)
+    cusp = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=0.5)
+    rates = [-cusp.rate(phi=1.0, n_c=1.0, f=f, T_c=300.0) for f in np.linspace(0.0, 2e-9, 400).tolist()]
+    assert all(b >= a for a, b in pairwise(rates))
+    assert cusp.ranges == {"f": (-math.inf, 6e-20 / (0.5 * X))}
+
+
+def test_dembo_s_rates_balance_with_springs_and_mixing():
+    """k_on / k_off at any gap is what the potential says: the affinity vanishes where the net rate does."""
+    epsilon = THERMAL * math.log(50.0)
+    potentials = [LatticeGas(epsilon=epsilon), BondSprings(k_b=2e-3)]
+    law = DemboSpring(k_off=0.1, k_on=5.0, stiffness=2e-3, transition_stiffness=0.5e-3)
+    for gap in (0.0, 2e-9, 4e-9):
+        scene = isothermal(law, {"g_n": Hold(level=gap)}, 0.5, potentials=potentials)
+        trajectory = solved(scene, 1e4)
+        assert abs(named(trajectory)["mu"][-1]) < 1e-9 * THERMAL
+        assert audit(trajectory).violations == ()
+
+
+def test_attachment_falls_with_the_gap():
+    law = GapAttachment(k_on=2.0, stiffness=1e-3, rest_length=1e-8)
+    values = [
+        solved(isothermal(law, {"g_n": Hold(level=gap)}, 0.0, potentials=[]), 0.1).result.outputs[-1, 0]
+        for gap in (1e-8, 1.4e-8)
+    ]
+    rates = [2.0, 2.0 * math.exp(-1e-3 * (4e-9) ** 2 / 2 / THERMAL)]
+    assert values == pytest.approx([-math.expm1(-0.1 * rate) for rate in rates], rel=1e-9)
+
+
+CASE = """
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface:
+  temperature: 300 K
+  sites: 1e16 1/m^2
+  bonding:
+    - bell: {k_off: 0.1 1/s, x_off: 0.4 nm}
+loading: {f: {ramp: {rate: 100 pN/s}}}
+initial: {ln_phi: 0}
+run: {until: 1 s}
+"""
+
+
+def test_force_spectroscopy_needs_no_gap():
+    case = load_text(CASE)
+    trajectory = Model(case.system()).solve(Run(times=[0.0, 1.0]))
+    grown = math.expm1(100e-12 * X / THERMAL)
+    assert trajectory.result.outputs[-1, 0] == pytest.approx(-0.1 * THERMAL / (X * 100e-12) * grown, rel=1e-10)
+
+
+@pytest.mark.parametrize("rtol", [3e-5, 1e-6, 1e-8, 1e-11])
+@pytest.mark.parametrize("stiffness", [1e-6, 1e-3])
+@pytest.mark.parametrize("rest", [0.0, 1e-4])
+def test_a_narrow_peak_of_attachment_is_not_passed_over(rtol, stiffness, rest):
+    """A surface that arrives through a layer of tethers thousands of times thinner than its way."""
+    speed, k_on, T = 1e-4, 3.7, 300.0
+    law = GapAttachment(k_on=k_on, stiffness=stiffness, rest_length=rest)
+    pair = Body("lower", Hold(level=T)), Body("upper", Hold(level=T))
+    interface = Interface(Hold(level=T), [LinearEnthalpy(H_r=20.0)], (), [law], Sites(1e18, 1e18))
+    loading = {"g_n": Ramp(start=rest + 3e-4, rate=-speed)}
+    scene = Scene(pair, interface, [], loading, T_0=T, initial={"phi": 0.0})
+    trajectory = Model(assemble(scene)).solve(Run(times=(0.0, 3.0, 6.0), rtol=rtol))
+    half = k_on / speed * math.sqrt(math.pi * BOLTZMANN * T / (2 * stiffness))
+    exact = [0.0, -math.expm1(-half), -math.expm1(-2 * half)]
+    # The tolerance of phi is a part of its scale, one; half of the peak is far more than that.
+    assert exact[1] > 3 * rtol
+    assert trajectory.result.outputs[:, 0] == pytest.approx(exact, rel=max(1e-9, 2 * rtol), abs=2 * rtol)

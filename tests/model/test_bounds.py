@@ -1,0 +1,270 @@
+"""Bounds of the bonding state: reached, held and left again as the law turns round."""
+
+import math
+
+import numpy as np
+import pytest
+import symengine
+from scenes import SITES, bodies, varying
+
+import surfacechem
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.contact import BondedContact, BondStiffness
+from surfacechem.laws.factors import LinearInTemperature, Proportional
+from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, KamalSourour, LinearAffinity, MassAction
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Hold, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.model.constraints.enclosure import WHOLE, enclosure
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.results.audit import audit
+from surfacechem.runs.sweeps import Separate
+from surfacechem.scene import Body, Interface, Mounting, Scene
+from surfacechem.solve import run as integrate
+from surfacechem.solve.run import Model, Run
+
+T_MAX, G_0 = 1e6, 1e-7
+"""Strength and length of a cohesive zone."""
+
+E, K, TOP = 1e12, 0.5, 2e-6
+"""Bonds of stiffness E and energy K, torn by a gap that rises to TOP in a second and falls to nothing in another."""
+RATE = 40.0
+"""Rate of bonding at rest [1/s]."""
+
+
+def damage(phi=1.0, scale=1.0, until=2.0, gaps=(0.0, TOP, 0.0)) -> Scene:
+    pair = bodies("T", "T", C_1=50.0, C_2=50.0)
+    interface = Interface(
+        "T",
+        [BondStiffness(E_b=E, E_n=E), BondEnergy(K_0=K)],
+        reactions=[LinearAffinity(c_r=RATE * SITES.density / K * scale)],
+        sites=SITES,
+    )
+    times = np.linspace(0.0, until, len(gaps)).tolist()
+    loading = {"g_n": Table(times=times, values=list(gaps))}
+    return Scene(pair, interface, loading=loading, T_0=300.0, initial={"phi": phi, "T": 300.0})
+
+
+def solve(scene, until=2.0, outputs=81, **run):
+    return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, outputs), **run))
+
+
+def free(t: float, start: float = 1.0) -> float:
+    """The bonding state without a bound: phi' = RATE (1 - phi - a t^2) with a = E TOP^2 / 2 K."""
+    a = E * TOP**2 / (2 * K)
+    particular = lambda s: 1 - a * (s**2 - 2 * s / RATE + 2 / RATE**2)  # noqa: E731
+    return particular(t) + (start - particular(0.0)) * math.exp(-RATE * t)
+
+
+def test_bonds_are_gone_until_the_law_forms_them_again():
+    from scipy.optimize import brentq
+
+    trajectory = solve(damage())
+    unbonded, rebond = trajectory.jumps
+    assert (unbonded.transition.name, rebond.transition.name) == ("unbonded", "rebond")
+    assert unbonded.t == pytest.approx(brentq(free, 0.3, 1.0, xtol=1e-15), rel=1e-10)
+    assert rebond.t == pytest.approx(2 - math.sqrt(2 * K / E) / TOP, rel=1e-12)
+    assert unbonded.released == rebond.released == 0.0
+    phi = trajectory.everywhere["phi"]
+    assert phi.min() > -1e-15
+    assert phi[-1] > 0.5
+    balances = audit(trajectory)
+    assert balances.energy_error < 1e-9
+    assert balances.violations == ()
+
+
+def test_held_bonds_are_said_in_the_dataset_and_dissipate_nothing():
+    trajectory = solve(damage())
+    values = trajectory.everywhere
+    held = values["held"] != 0
+    assert held.any()
+    assert np.all(values["phi"][held] == 0.0)
+    assert np.all(values["R_linear_affinity"][held] == 0.0)
+    assert np.all(values["sigma_linear_affinity"][held] == 0.0)
+
+
+def test_no_bond_at_the_start_under_a_load_that_allows_none():
+    trajectory = solve(damage(phi=0.0, gaps=(TOP, TOP)), until=1.0)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded"]
+    assert trajectory.jumps[0].t == 0.0
+    assert trajectory.status == "finished"
+    assert np.all(trajectory.everywhere["phi"] == 0.0)
+
+
+def test_a_bound_is_touched_again_and_again():
+    gaps = (0.0, *(TOP, 0.0) * 20)
+    trajectory = solve(damage(gaps=gaps, until=40.0), until=40.0, outputs=11)
+    names = [jump.transition.name for jump in trajectory.jumps]
+    assert names == ["unbonded", "rebond"] * 20
+    assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-13])
+def test_bounds_at_any_tolerance(rtol):
+    trajectory = solve(damage(), rtol=rtol)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
+
+
+def test_constant_affinity_bonds_all_sites():
+    interface = Interface("T", [LinearEnthalpy(H_r=2.0)], reactions=[LinearAffinity(c_r=SITES.density)], sites=SITES)
+    scene = Scene(bodies("T", "T"), interface, T_0=300.0, initial={"phi": 0.25, "T": 300.0})
+    trajectory = solve(scene, until=1.0)
+    (complete,) = trajectory.jumps
+    assert complete.t == pytest.approx(0.375, rel=1e-12)
+    heat = trajectory.outputs[-1, [o.name for o in trajectory.model.system.outputs].index("U_c")]
+    assert heat == pytest.approx(0.0, abs=1e-12)
+    assert trajectory.result.y[0] == 1.0
+
+
+def test_a_limit_frees_complete_bonding():
+    """Bonds that were held at their upper bound break at once, and form again."""
+    interface = Interface(
+        "T",
+        [BondedContact(E_n=1e13), LinearEnthalpy(H_r=2.0)],
+        reactions=[LinearAffinity(c_r=SITES.density)],
+        sites=SITES,
+        limits=[TensileStrength(t_max=1e6)],
+    )
+    loading = {"w_n": Table(times=[0.0, 1.0, 2.0], values=[0.0, 0.0, 1e-6])}
+    scene = Scene(
+        bodies("T", "T"),
+        interface,
+        loading=loading,
+        T_0=300.0,
+        initial={"phi": 0.5, "T": 300.0},
+        normal=Mounting(k=1e13),
+    )
+    trajectory = solve(scene)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["complete", "debond", "complete"]
+    assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("potential", "law"),
+    [
+        (BondEnergy(K_0=300.0), LinearAffinity(c_r=1e16)),
+        (BondEnergy(K_0=300.0, phi_eq=0.7), LinearAffinity(c_r=1e16)),
+        (BondEnergy(K_0=300.0), ExponentialAffinity(C_r=1e34)),
+        (LatticeGas(epsilon=6e-20), LinearAffinity(c_r=1e16)),
+        (LatticeGas(epsilon=6e-20), MassAction(k_on=3.0, k_off=1.0)),
+        (LinearEnthalpy(H_r=2.0), Arrhenius(A=1.0)),
+        (LinearEnthalpy(H_r=2.0), KamalSourour(A_1=1.0, A_2=1.0, m=0.5, n=1.5)),
+    ],
+)
+def test_laws_that_stay_within_the_bounds_have_no_modes(potential, law):
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+    interface = Interface(Hold(level=300.0), [potential], (), [law], SITES)
+    system = assemble(Scene(pair, interface, T_0=300.0, initial={"phi": 0.5}))
+    assert system.modes == ()
+
+
+def cohesion_of_bonds() -> Scene:
+    """Cohesion in proportion to the bonds pays for more of them than there are sites; gap and temperature are held."""
+    strength = varying(T_MAX, Proportional(of="phi"), LinearInTemperature(of="T_c", slope=-1e-3))
+    zone = ExponentialCohesiveZone(t_max=strength, g_0=G_0, E_n=1e13)
+    reactions = [LinearAffinity(c_r=RATE * SITES.density / K)]
+    interface = Interface(Hold(level=300.0), [zone, BondEnergy(K_0=K)], reactions=reactions, sites=SITES)
+    loading = {"g_n": Table(times=[0.0, 1.0], values=[G_0, G_0])}
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+    return Scene(pair, interface, loading=loading, T_0=300.0, initial={"phi": 0.25})
+
+
+def test_a_bound_that_only_a_branch_of_the_rate_passes():
+    trajectory = solve(cohesion_of_bonds(), until=1.0)
+    (complete,) = trajectory.jumps
+    driven = 2 * T_MAX * G_0 / K  # e t_max g_0 (1 + g/g_0) exp(-g/g_0) over K at g = g_0
+    assert complete.t == pytest.approx(math.log((driven + 0.75) / driven) / RATE, rel=1e-11)
+    assert trajectory.status == "finished"
+    assert trajectory.result.y[0] == 1.0
+
+
+@pytest.mark.parametrize("law", [LinearAffinity(c_r=1e19), ExponentialAffinity(C_r=1e34)])
+def test_mixing_entropy_yields_to_stretched_springs(law):
+    """An equilibrium of exp(-1000) bonds is none: they are gone, and form again as the gap closes."""
+    interface = Interface("T", [LatticeGas(epsilon=6e-20), BondSprings(k_b=1e-3)], reactions=[law], sites=SITES)
+    loading = {"g_n": Table(times=[0.0, 1.0, 2.0], values=[0.0, 1e-7, 0.0])}
+    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial={"phi": 0.5, "T": 300.0})
+    trajectory = solve(scene)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
+    assert trajectory.status == "finished"
+    assert trajectory.everywhere["phi"].min() > -1e-14
+    gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)
+    assert trajectory.jumps[1].t == pytest.approx(2 - gap / 1e-7, rel=1e-4)
+    assert trajectory.result.y[0] > 1e-6
+    assert audit(trajectory).energy_error < 1e-9
+
+
+PHI_EQ = "interface.potential.bond-energy.phi_eq"
+
+
+def completed(phi_eq: float, phi: float = 0.05) -> float:
+    """Time at which phi' = 1.1 (phi_eq - phi) reaches one."""
+    return math.log((phi_eq - phi) / (phi_eq - 1)) / 1.1
+
+
+def test_changed_parameters_bring_the_bounds_that_they_need():
+    simulation = surfacechem.load("two-way-linear")
+    assert simulation.system.modes == ()
+    beyond = simulation.run({PHI_EQ: 1.5})
+    (complete,) = beyond.trajectory.jumps
+    assert complete.t == pytest.approx(completed(1.5), rel=1e-11)
+    same = surfacechem.run("two-way-linear", {PHI_EQ: 1.5})
+    assert same.dataset["phi"].values.tobytes() == beyond.dataset["phi"].values.tobytes()
+    back = surfacechem.load("two-way-linear", {PHI_EQ: 1.5}).run({PHI_EQ: 0.7})
+    assert "held" not in back.dataset
+
+
+def test_bounds_are_decided_without_compiling_while_they_stay_as_they_are(monkeypatch):
+    simulation = surfacechem.load("two-way-linear")
+    simulation.run({PHI_EQ: 1.5})
+    monkeypatch.setattr(integrate, "compile_program", lambda *_, **__: pytest.fail("compiled"))
+    simulation.run({PHI_EQ: 0.6})
+    simulation.run({PHI_EQ: 1.2})
+    simulation.sweep({PHI_EQ: [0.5, 0.6, 1.2]})
+    assert not isinstance(simulation.sweep({PHI_EQ: [0.5, 0.6]}).sweep, Separate)
+
+
+def test_a_sweep_across_the_need_of_a_bound():
+    values = [0.5, 1.2, 1.5]
+    swept = surfacechem.load("two-way-linear").sweep({PHI_EQ: values})
+    data = swept.dataset
+    assert list(data["status"].values) == ["finished"] * 3
+    for i, phi_eq in enumerate(values):
+        free = phi_eq - (phi_eq - 0.05) * np.exp(-1.1 * data["time"].values)
+        np.testing.assert_allclose(data["phi"].values[i], np.minimum(free, 1.0), rtol=1e-9)
+    assert [len(swept.sweep[i].jumps) for i in range(3)] == [0, 1, 1]
+    assert data.attrs["error"] < 1e-9
+    assert data.attrs["energy_error"] < 1e-9
+
+
+def test_what_has_no_value_may_be_anything():
+    x = symengine.Symbol("x")
+    for nothing in (symengine.zoo, symengine.nan):
+        assert enclosure(x + nothing, {x: (0.0, 1.0)}) == WHOLE
+        assert enclosure(nothing * x**2, {x: (0.0, 1.0)}) == WHOLE
+
+
+def test_intervals_enclose_values():
+    x, y = symengine.symbols("x y")
+    known = {x: (-1.5, 2.0), y: (0.25, 3.0)}
+    expressions = [
+        x**2 - y,
+        x**3 * y,
+        symengine.exp(-x) / y,
+        y**-2.5 + symengine.log(y),
+        symengine.sinh(x) * symengine.sin(x),
+        1 / x,
+        symengine.Piecewise((x, x < 0), (-x, True)),
+        symengine.Piecewise((y, y > 5), (2 * y, True)),
+        symengine.pi * y,
+        symengine.Piecewise((x + 2, x < 1), (y - x, True)),
+        symengine.Piecewise((y - x, x < y), (3 * x - 3 * y + 1, x < 2 * y), (x * y, True)),
+        symengine.Piecewise((symengine.exp(-x - y), x + y > 0), (2 * x + 2 * y, True)),
+    ]
+    for expression in expressions:
+        low, high = enclosure(expression, known)
+        for a in np.linspace(-1.5, 2.0, 20):
+            for b in np.linspace(0.25, 3.0, 20):
+                value = float(expression.subs({x: a, y: b}))
+                assert low - 1e-12 <= value <= high + 1e-12, expression

@@ -1,0 +1,296 @@
+"""What ends where bodies meet: gaps that nothing bears, laws at the end of their domain, limits, softening laws."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes import SITES, bodies, varying
+
+from surfacechem.contracts.terms import Potential, parameter
+from surfacechem.errors import InputError
+from surfacechem.laws.bonding import BondEnergy, BondSprings, LinearEnthalpy
+from surfacechem.laws.contact import BondedContact, BondStiffness, NormalStiffness, Penalty
+from surfacechem.laws.factors import Proportional
+from surfacechem.laws.friction import Viscous
+from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Hold, Ramp, Table
+from surfacechem.laws.longrange import (
+    ElectrostaticFlatFlat,
+    LennardJonesDerjaguin,
+    LennardJonesFlatFlat,
+    LennardJonesSpherePlane,
+    VanDerWaalsFlatFlat,
+    VanDerWaalsSpherePlane,
+)
+from surfacechem.laws.softening import CompliantDebonding
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.solve.branches import zero_ahead
+from surfacechem.solve.run import Model, Run
+
+CLOSED = "the gap closed, and no potential bears the bodies in contact"
+ATTRACTIVE = [
+    (VanDerWaalsFlatFlat(A_H=1e-19), 1e14, 1e-7),
+    (VanDerWaalsSpherePlane(A_H=1e-19, R=1e-6, area=1e-12), 1e11, 5e-7),
+]
+SITES_OF = {"n_1": 2e19, "n_2": 3e19, "psi_0": 4e-21, "g_0": 3e-10}
+REPULSIVE = [
+    (LennardJonesFlatFlat(**SITES_OF), 1e14, 6e-8),
+    (LennardJonesSpherePlane(**SITES_OF, R=1e-6, area=1e-12), 1e11, 6e-7),
+    (LennardJonesDerjaguin(**SITES_OF, R=1e-6, area=1e-12), 1e11, 6e-7),
+]
+
+
+def scene(potentials=(), loading=None, mount=None, initial=None, **interface):
+    start = {"T": 300.0} | (initial or {})
+    return Scene(
+        bodies("T", "T"), Interface("T", potentials, **interface), (), loading or {}, None, 300.0, start, normal=mount
+    )
+
+
+def solve(given, until):
+    return Model(assemble(given)).solve(Run(np.linspace(0.0, until, 11).tolist()))
+
+
+def approach(law, k, far):
+    loading = {"w_n": Table(times=[0.0, 5.0], values=[far, 1e-9])}
+    return solve(scene([law], loading, Mounting(k=k), {"g_n": far}), 5.0)
+
+
+def gap(trajectory):
+    return trajectory.result.y[[s.name for s in trajectory.model.system.states].index("g_n")]
+
+
+# -- snaps into what has no end ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("law", "k", "far"), ATTRACTIVE)
+def test_attraction_that_nothing_bears_snaps_to_no_equilibrium(law, k, far):
+    """Without repulsion the gap would pass touch, and the bodies each other."""
+    trajectory = approach(law, k, far)
+    (snap,) = trajectory.jumps
+    assert (trajectory.status, snap.verdict, snap.released) == ("stopped", "impossible", 0.0)
+    assert (
+        f"which is impossible: no gap follows at which the tractions are in equilibrium and the laws hold: {CLOSED}"
+        in (trajectory.reason)
+    )
+    assert 0 < gap(trajectory) < far
+    assert audit(trajectory).energy_error < 1e-8
+
+
+@pytest.mark.parametrize(("law", "k", "far"), ATTRACTIVE)
+def test_with_a_contact_the_same_snap_is_borne(law, k, far):
+    E_n = 1e20
+    loading = {"w_n": Table(times=[0.0, 5.0], values=[far, 1e-9])}
+    trajectory = solve(scene([law, Penalty(E_n=E_n)], loading, Mounting(k=k), {"g_n": far}), 5.0)
+    assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
+    contact = law.bind({}).energy
+    pull = (contact(g_n=0.0) - contact(g_n=-1e-12)) / 1e-12
+    assert gap(trajectory) == pytest.approx((k * 1e-9 - pull) / (k + E_n), rel=1e-6)
+
+
+@pytest.mark.parametrize(("law", "k", "far"), REPULSIVE)
+def test_repulsion_ends_the_snap_before_the_pole(law, k, far):
+    trajectory = approach(law, k, far)
+    assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
+    assert 0.01 * law.g_0 < gap(trajectory) < law.g_0
+    assert assemble(scene([law], {"w_n": Hold(level=far)}, Mounting(k=k), {"g_n": far})).warnings == ()
+
+
+def test_charges_that_pull_a_spring_shut():
+    """A constant pull: g = w - t / k, zero at w = t / k."""
+    law, k, rate = ElectrostaticFlatFlat(s_1=1e-4, s_2=-2e-4), 1e12, -1e-9
+    pull = 1e-4 * 2e-4 / (2 * 8.8541878128e-12)
+    trajectory = solve(scene([law], {"w_n": Ramp(start=5e-9, rate=rate)}, Mounting(k=k), {"g_n": 4e-9}), 10.0)
+    assert (trajectory.status, trajectory.reason.partition(" at t")[0]) == ("stopped", CLOSED)
+    assert trajectory.result.t == pytest.approx((5e-9 - pull / k) / 1e-9, rel=1e-3)
+    assert trajectory.result.t == pytest.approx((5e-9 - pull / k + 1e-12) / 1e-9, rel=1e-8)
+
+
+class OddPole(Potential):
+    """Attraction without a guard; beyond its pole it changes its sign. Source: a test. g_n > -D."""
+
+    A: float = parameter("J", "strength", above=0)
+    D = 1e-9
+
+    @property
+    def limits(self):
+        return {"g_n": (-self.D, math.inf)}
+
+    def energy(self, g_n):
+        return -self.A / (2 * (g_n + self.D) ** 2)
+
+
+def test_a_law_states_where_it_ends():
+    """The search meets a pole at which the traction changes its sign, and what it lands on lies beyond."""
+    trajectory = approach(OddPole(A=1e-20), 1e14, 1e-7)
+    assert trajectory.status == "stopped"
+    assert "is impossible: no gap follows" in trajectory.reason
+    assert gap(trajectory) > 0
+
+
+@pytest.mark.parametrize("power", [1, 3])
+def test_a_pole_is_no_zero(power):
+    def pole(gaps):
+        return 1.0 / (np.asarray(gaps) + 1.0) ** power
+
+    assert zero_ahead(pole, 1.0, -1.0, 1.0) is None
+    assert zero_ahead(lambda g: np.asarray(g) ** power, 1.0, -1.0, 1.0) == pytest.approx(0.0, abs=1e-12)
+
+
+# -- masses and dampers that meet ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mount", "start", "t", "names"),
+    [
+        (Mounting(m=4.0), {"v_n": 0.02}, (0.02 + math.sqrt(0.02**2 + 2 * 9.75e-3)) / 9.75, ["impact", "rest"]),
+        (Mounting(c_g=1e4), {}, 1e4 * 1e-3 / 39.0, ["touch"]),
+    ],
+)
+def test_bodies_do_not_pass_through_each_other(mount, start, t, names):
+    """From 1 mm under a dead load of -39 Pa: the time of fall, and that of a damper."""
+    given = scene((), {"F_n": Hold(level=-39.0)}, mount, {"g_n": 1e-3} | start)
+    assert assemble(given).warnings == ()
+    trajectory = solve(given, 30.0)
+    assert [jump.transition.name for jump in trajectory.jumps] == names
+    assert [jump.t for jump in trajectory.jumps] == pytest.approx(len(names) * [t], rel=1e-12)
+    assert (trajectory.status, gap(trajectory)) == ("finished", 0.0)
+
+
+@pytest.mark.parametrize("mount", [Mounting(m=4.0), Mounting(c_g=1e4)])
+def test_a_law_of_an_open_gap_ends_the_run(mount):
+    given = scene(
+        (), {"F_n": Hold(level=-39.0), "v": Hold(level=0.1)}, mount, {"g_n": 1e-3}, frictions=[Viscous(eta=1e-6)]
+    )
+    assert assemble(given).modes == ()
+    trajectory = solve(given, 30.0)
+    assert trajectory.status == "stopped"
+    assert "g_n reached zero, where the law viscous ends" in trajectory.reason
+
+
+def test_a_gap_that_only_opens_is_no_mistake():
+    trajectory = solve(scene((), {"F_n": Hold(level=8.0)}, Mounting(m=4.0), {"g_n": 0.0}), 2.0)
+    assert trajectory.status == "finished"
+    assert gap(trajectory) == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_gap_given_closed_is_refused_with_the_remedy():
+    given = scene((), {"F_n": Hold(level=8.0)}, Mounting(m=4.0), {"g_n": -1e-6})
+    with pytest.raises(
+        InputError, match=r"at the start the bodies overlap.*Give a potential that lets them, such as `penalty`,"
+    ):
+        solve(given, 2.0)
+
+
+@pytest.mark.parametrize(("phi", "status"), [(1.0, "finished"), (0.0, "stopped")])
+def test_springs_bear_contact_only_while_there_are_bonds(phi, status):
+    """They push the mass back; without them it comes through."""
+    law, extra = LinearAffinity(c_r=1e-30), {"sites": SITES}
+    potentials, initial = [BondSprings(k_b=1e-9), BondEnergy(K_0=1.0)], {"g_n": 1e-6, "v_n": -1e-3, "phi": phi}
+    trajectory = solve(
+        scene(potentials, {"F_n": Hold(level=0.0)}, Mounting(m=4.0), initial, reactions=[law], **extra), 1e-2
+    )
+    assert trajectory.status == status
+
+
+# -- bonds, and what limits them ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("g_n", "bonded"), [(1e-3, 0.0), (0.0, 1.0), (-1e-6, 1.0)])
+def test_contact_without_bonds_is_bonded_where_it_starts_closed(g_n, bonded):
+    model = Model(assemble(scene([BondedContact(E_n=5e9)], {"F_n": Hold(level=-39.0)}, Mounting(m=4.0), {"g_n": g_n})))
+    problem = model.problem(Run([0.0, 1e-3]), model.values())
+    paths = [parameter.path for parameter in model.system.parameters]
+    assert problem.parameters[0, paths.index("mode.bonded")] == bonded
+
+
+def test_a_body_bounces_on_a_contact_that_is_not_bonded():
+    """Free flight between touches, half a period of the spring in contact: back at its height after both."""
+    m, E_n, F, g_0 = 4.0, 5e9, 39.0, 1e-3
+    given = scene([BondedContact(E_n=E_n)], {"F_n": Hold(level=-F)}, Mounting(m=m), {"g_n": g_0})
+    omega, fall = math.sqrt(E_n / m), math.sqrt(2 * g_0 * m / F)
+    speed, sag = F / m * fall, F / E_n
+    contact = 2 * (math.pi - math.atan2(speed / omega, sag)) / omega
+    trajectory = solve(given, 2 * fall + contact)
+    assert [jump.transition.name for jump in trajectory.jumps] == ["touch", "release"]
+    assert trajectory.jumps[0].t == pytest.approx(fall, rel=1e-10)
+    assert gap(trajectory) == pytest.approx(g_0, rel=1e-8)
+
+
+@pytest.mark.parametrize(("start", "carried"), [(1e-6, 0.0), (0.0, 1.0)])
+def test_a_prescribed_gap_is_bonded_where_it_starts_closed(start, carried):
+    trajectory = solve(scene([BondedContact(E_n=1e12)], {"g_n": Ramp(start=start, rate=1e-6)}), 2.0)
+    names = [item.name for item in trajectory.model.system.outputs]
+    t_n = trajectory.outputs[:, names.index("t_n")]
+    assert t_n == pytest.approx(carried * 1e12 * (start + 1e-6 * trajectory.result.problem.times), rel=1e-12)
+
+
+@pytest.mark.parametrize("rest", [{"mount": Mounting(k=3e13)}, {}])
+def test_a_limit_of_a_tension_that_bonds_do_not_carry_is_refused(rest):
+    loading = {"w_n" if rest else "g_n": Ramp(rate=1e-6)}
+    extra = {"limits": [TensileStrength(t_max=9e7)], "sites": SITES, "initial": {"phi": 1.0}}
+    potentials = [NormalStiffness(E_n=2e14), BondEnergy(K_0=8.0)]
+    with pytest.raises(InputError, match="would change nothing: the tension of normal-stiffness does not depend"):
+        assemble(scene(potentials, loading, **rest, **extra))
+    for carries in (
+        BondedContact(E_n=2e14),
+        BondStiffness(E_b=2e14, E_n=2e14),
+        NormalStiffness(E_n=varying(2e14, Proportional(of="phi"))),
+    ):
+        trajectory = solve(scene([carries, potentials[1]], loading, **rest, **extra), 5.0)
+        (debond,) = [jump for jump in trajectory.jumps if jump.transition.name == "debond"]
+        assert debond.released > 0
+
+
+# -- bonds that break one by one ---------------------------------------------------------------------------------------
+
+
+def softened(**changes):
+    law = CompliantDebonding(**{"t_max": 5e7, "E_b": 4e13, "g_f": 6e-6} | changes)
+    potentials = [BondStiffness(E_b=4e13, E_n=4e13), LinearEnthalpy(H_r=3.0)]
+    loading, initial = {"w_n": Ramp(rate=1e-6)}, {"phi": 1.0}
+    return scene(potentials, loading, Mounting(k=5e13), initial, reactions=[law], sites=SITES)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"g_f": 1.1e-6}, r"t_max / E_b = 1.25e-06 m, .*, is not below g_f = 1.1e-06 m: .* snap back"),
+        ({"g_f": 1.25e-6}, r"t_max / E_b = 1.25e-06 m, .*, is not below g_f = 1.25e-06 m"),
+        ({"t_max": 1e-30}, r"t_max / E_b = 2.5e-44 m, .*, is less than 1e-09 g_f, too little to be resolved"),
+        ({"E_b": 1e30}, r"t_max / E_b = 5e-23 m, .*, is less than 1e-09 g_f, too little to be resolved"),
+    ],
+)
+def test_an_envelope_that_does_not_fall_after_it_rose_is_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        assemble(softened(**changes))
+
+
+@pytest.mark.parametrize(("changes", "borne"), [({"E_b": 5e13}, "4e.07"), ({"E_b": 2e13}, "1e.08")])
+def test_two_stiffnesses_of_the_same_bonds_are_refused(changes, borne):
+    """They bear E_b g_n where the law says t_max."""
+    with pytest.raises(InputError, match=f"the bonds of the potential bear {borne} Pa, not the t_max of 5e.07 Pa"):
+        assemble(softened(**changes))
+
+
+def test_no_bonds_in_the_potential_are_no_bonds_to_break():
+    law = CompliantDebonding(t_max=5e7, E_b=4e13, g_f=6e-6)
+    potentials = [NormalStiffness(E_n=4e13), LinearEnthalpy(H_r=3.0)]
+    given = scene(potentials, {"w_n": Ramp(rate=1e-6)}, Mounting(k=5e13), {"phi": 1.0}, reactions=[law], sites=SITES)
+    with pytest.raises(InputError, match="the bonds of the potential bear 0 Pa, not the t_max of"):
+        assemble(given)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [({"g_f": 1.1e-6}, "bonds begin to break beyond g_f"), ({"E_b": 5e13}, "another traction than t_max")],
+)
+def test_a_sweep_cannot_leave_what_holds(change, message):
+    model = Model(assemble(softened()))
+    ((name, value),) = change.items()
+    path = f"interface.bonding.compliant-debonding.{name}"
+    with pytest.raises(InputError, match=f"at the start .*{message}"):
+        model.solve(Run([0.0, 1.0]), {path: value})

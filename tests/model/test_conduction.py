@@ -1,0 +1,516 @@
+"""Bodies divided into cells: second order in space, exact solutions, both laws, cells by accuracy, Biot numbers."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import slabs
+from scipy.special import erfcx
+
+import surfacechem
+from surfacechem.contracts.grids import points
+from surfacechem.errors import InputError
+from surfacechem.format import load_text
+from surfacechem.plots import run as plots
+from surfacechem.references import get
+from surfacechem.references._slabs import HELD
+from surfacechem.results import spatial
+from surfacechem.results.achieved import against_tighter, with_cells
+from surfacechem.results.spatial import judged
+from surfacechem.runs.simulation import Simulation
+
+TWO = """
+title: two slabs
+bodies:
+  lower: {{temperature: {first}, capacity: constant, C: 4 kJ/m^2/K, conduction: {{{lower}}}}}
+  upper: {{temperature: {second}, capacity: constant, C: 9 kJ/m^2/K, conduction: {{{upper}}}}}
+{heat}
+T_0: 300 K
+initial: {{{initial}}}
+run: {{times: [1, 3, 10, 30], rtol: 1e-11}}
+"""
+LOWER, UPPER = "thickness: 2 mm, conductivity: 0.2 W/m/K", "thickness: 5 mm, conductivity: 0.7 W/m/K"
+THROUGH = "heat: [conductance: {between: [lower, upper], h: 400 W/m^2/K}]"
+FAR = {
+    "insulated": "",
+    "held": ", far: {temperature: 330 K}",
+    "convective": ", far: {temperature: 330 K, h: 50 W/m^2/K}",
+}
+
+
+def two(cells: object, far: str = "insulated", grading: float = 1.0, perfect: bool = False) -> Simulation:
+    """Two slabs in contact, perfect or through a resistance."""
+    more = f", cells: {cells}, grading: {grading}"
+    text = TWO.format(
+        first="T" if perfect else "T_1",
+        second="T" if perfect else "T_2",
+        lower=LOWER + more,
+        upper=UPPER + more + FAR[far],
+        heat="" if perfect else THROUGH,
+        initial="profile_1: 400 K, profile_2: 300 K" if perfect else "T_1: 400 K, T_2: 300 K",
+    )
+    return Simulation(load_text(text + "reference: conducting-slabs\n"))
+
+
+def errors(simulation: Simulation) -> np.ndarray:
+    """Largest error [K] at each output time after the start."""
+    run = simulation.run()
+    assert run.accuracy.source == "exact solution conducting-slabs"
+    dataset = run.dataset
+    parts = [abs(dataset[f"profile_{k}"] - dataset[f"profile_{k}_exact"]).max(f"x_{k}").values[1:] for k in (1, 2)]
+    return np.max(parts, axis=0)
+
+
+@pytest.mark.parametrize("far", FAR)
+@pytest.mark.parametrize("grading", [1, 10])
+def test_second_order_in_space(far, grading):
+    table = np.array([errors(two(cells, far, grading)) for cells in (20, 40, 80)])
+    orders = np.log2(table[:-1] / table[1:])
+    assert np.all(orders[-1] > 1.9)
+    assert np.all(table[-1] < 0.03)
+
+
+def test_the_table_of_the_documentation():
+    """Cells, error at 1 s, order, at 10 s, order, at 30 s, order."""
+    page = (Path(__file__).parents[2] / "docs" / "heat-paths.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"^\| \d+ \|.*\|.*e-.*$", page, re.M)]
+    table = np.array([errors(two(int(row[0]), "held"))[[0, 2, 3]] for row in rows])
+    np.testing.assert_allclose([[float(cell) for cell in row[1::2]] for row in rows], table, rtol=5e-3)
+    shown = [[float(cell) for cell in row[2::2]] for row in rows[1:]]
+    np.testing.assert_allclose(shown, np.log2(table[:-1] / table[1:]), atol=6e-3)
+    assert len(rows) == 4
+
+
+def test_second_order_in_perfect_contact():
+    table = np.array([errors(two(cells, perfect=True)) for cells in (20, 40, 80)])
+    assert np.all(np.log2(table[:-1] / table[1:]) > 1.9)
+
+
+def test_the_contact_goes_to_the_temperature_of_the_effusivities_at_once():
+    exact = get("sudden-contact")(
+        T_1=353.15, C_1=2530.0, thickness_1=2e-3, conductivity_1=0.2, T_2=293.15, C_2=4000.0, thickness_2=2e-3,
+        conductivity_2=1.0,
+    )  # fmt: skip
+    e_1, e_2 = np.sqrt(0.2 * 2530 / 2e-3), np.sqrt(1.0 * 4000 / 2e-3)
+    assert exact.contact == pytest.approx((e_1 * 353.15 + e_2 * 293.15) / (e_1 + e_2), rel=1e-14)
+    early = [
+        "run.until=60 ms",
+        "run.first=10 ms",
+        *(f"bodies.{name}.conduction.cells=80" for name in ("epoxy", "glass")),
+    ]
+    run = surfacechem.run("sudden-contact", [*early, "reference=sudden-contact"])
+    assert run.accuracy.source == "exact solution sudden-contact"
+    assert abs(run.dataset["T"][1:] - exact.contact).max() < 2e-3
+    assert run.accuracy.error < 1e-4
+
+
+@pytest.mark.parametrize("bulk", ["constant", "quadratic"])
+def test_two_temperatures_in_contact_become_the_one_that_keeps_their_energy(bulk):
+    """With energies that are quadratic in temperature that is a mean of squares."""
+    text = TWO.format(
+        first="T", second="T", heat="", lower=LOWER + ", cells: 4", upper=UPPER + ", cells: 4",
+        initial="profile_1: 400 K, profile_2: 300 K",
+    ).replace("capacity: constant", f"capacity: {bulk}")  # fmt: skip
+    start = float(Simulation(load_text(text)).run().dataset["T"][0])
+    power = 1 if bulk == "constant" else 2
+    assert start == pytest.approx(((4 * 400**power + 9 * 300**power) / 13) ** (1 / power), rel=1e-13)
+
+
+@pytest.mark.parametrize("far", FAR)
+@pytest.mark.parametrize("perfect", [True, False])
+def test_both_laws_are_kept_by_the_cells(far, perfect):
+    run = two(30, far, perfect=perfect).run()
+    assert run.audit.energy_error < 1e-11
+    assert run.audit.entropy_error < 1e-9
+    assert run.audit.violations == ()
+    dataset = run.dataset
+    gained = (dataset.U_1 - dataset.U_1[0]).values
+    np.testing.assert_allclose(gained, dataset.heat_into_1.values, atol=1e-6 * abs(gained).max())
+
+
+def test_cells_cost_in_proportion():
+    """Compiled derivatives and their evaluation grow with the cells, not with their square."""
+    sizes = [two(cells).model.program.jacobian.size for cells in (10, 20, 40)]
+    assert sizes[2] - sizes[1] == 2 * (sizes[1] - sizes[0])
+    program = two(40).model.program
+    assert program.jacobian.size == 2 * (2 * 2 + 2 * 2 + 3 * 80)
+
+
+def test_chains_are_solved_as_the_whole_matrix_is():
+    simulation = two(20, "convective", grading=5)
+    ours = simulation.run().trajectory.result
+    for solver in ("scipy-radau", "ida"):
+        run = replace(simulation.case.run, solver=solver, rtol=1e-9)
+        other = simulation.model.solve(run).result
+        np.testing.assert_allclose(other.outputs, ours.outputs, rtol=2e-7)
+
+
+def test_derivatives_of_chains_stand_where_they_belong():
+    simulation = two(6, "convective")
+    system, program = simulation.system, simulation.model.program
+    inputs = np.concatenate([[0.0], *np.random.default_rng(1).uniform(300, 400, (2, program.n))])
+    inputs = np.concatenate([inputs, [parameter.at(0.0) for parameter in system.parameters]])
+    by_state, by_rate = program.derivatives(inputs)
+    base = program.residual(inputs)
+    for first, matrix in ((1, by_state), (1 + program.n, by_rate)):
+        for j in range(program.n):
+            nudged = inputs.copy()
+            nudged[first + j] += 1.0  # the equations are linear here
+            np.testing.assert_allclose(matrix[:, j], program.residual(nudged) - base, atol=1e-7 * abs(matrix).max())
+
+
+def test_a_very_good_conductor_is_a_lump():
+    changes = [
+        f"bodies.{body}.conduction={{thickness: 1 mm, conductivity: 1e7 W/m/K, cells: 8}}"
+        for body in ("lower", "upper")
+    ]
+    lumped, divided = surfacechem.run("three-temperatures"), surfacechem.run("three-temperatures", changes)
+    for name in ("T_1", "T_2", "T_c", "U_1", "heat_into_1"):
+        size = abs(lumped.dataset[name]).max()
+        assert abs(divided.dataset[name] - lumped.dataset[name]).max() < 1e-6 * size
+
+
+@pytest.mark.parametrize("h", ["1e10", "1e20"])
+def test_huge_conductances_lose_nothing(h):
+    text = TWO.format(first="T_1", second="T_2", lower=LOWER + ", cells: 20", upper=UPPER + ", cells: 20",
+                      heat=THROUGH.replace("400", h), initial="T_1: 400 K, T_2: 300 K")  # fmt: skip
+    run, perfect = Simulation(load_text(text)).run(), two(20, perfect=True).run()
+    np.testing.assert_allclose(run.dataset.profile_1[1:], perfect.dataset.profile_1[1:], rtol=1e-8)
+    assert run.audit.energy_error < 1e-11
+
+
+def test_conductivity_that_varies_with_temperature():
+    """The steady flux through a slab is the mean conductivity times the gradient, for any cells."""
+    varying = "{value: 0.2 W/m/K, times: [linear: {of: T_1, about: 300 K, slope: 0.004}]}"
+    text = f"""
+bodies:
+  lower:
+    temperature: 400 K
+    C: 4 kJ/m^2/K
+    conduction: {{thickness: 2 mm, conductivity: {varying}, cells: 6, far: {{temperature: 300 K}}}}
+  upper: {{temperature: 400 K}}
+T_0: 300 K
+initial: {{profile_1: 350 K}}
+run: {{until: 1 hour}}
+"""
+    run = Simulation(load_text(text)).run()
+    assert run.dataset.Q_T_far_1[-1] == pytest.approx(-0.2 * 1.2 * 100 / 2e-3, rel=1e-9)
+    assert run.audit.violations == ()
+
+
+def test_a_joint_jump_heats_the_volume_of_the_bodies():
+    rises = []
+    for cells in (2, 20):
+        conduction = f"{{thickness: 1 mm, conductivity: 0.5 W/m/K, cells: {cells}}}"
+        run = surfacechem.run("debonding", [f"bodies.{body}.conduction={conduction}" for body in ("lower", "upper")])
+        assert run.trajectory.jumps[0].verdict == "admissible"
+        assert run.audit.energy_error < 1e-12
+        rises.append(run.dataset["T"].values[-1])
+    lumped = surfacechem.run("debonding").dataset["T"].values[-1]
+    np.testing.assert_allclose(rises, lumped, rtol=1e-9)
+
+
+def test_cells_are_chosen_by_an_accuracy():
+    chosen = two("{accuracy: 1e-4}").run()
+    assert chosen.accuracy.error < 1e-4
+    assert not chosen.warnings
+    widths = np.diff(chosen.dataset.x_1)
+    assert np.all(widths[1:] > widths[:-1])
+    reached = np.sqrt(0.2 * 2e-3 / 4e3 * 1.0)  # by the first output
+    assert widths[0] < reached / 8
+
+
+def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(spatial, "TRIALS", 1)
+    simulation = two("{accuracy: 1e-5}")
+    chosen, trajectory, errors = simulation._resolved(simulation.case.run, {})
+    assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
+    assert errors == chosen._halved(trajectory, given=False)
+
+
+def test_the_error_of_the_cells_is_estimated():
+    simulation = two(40)
+    exact = simulation.run().accuracy
+    estimate = against_tighter(trajectory := simulation.run().trajectory, simulation._cell_errors(trajectory))
+    assert estimate.source.endswith("and one with half of the cells")
+    for name in ("T_1", "profile_1", "profile_2"):
+        assert 0.5 < estimate.variables[name] / exact.variables[name] < 2
+
+
+def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave():
+    text = """
+bodies:
+  a: {temperature: T_1, capacity: constant, C: 1.0e4, conduction: {thickness: 5 mm, conductivity: 20, cells: CELLS}}
+  b: {temperature: 400 K}
+heat: [conductance: {between: [a, b], h: 2.0e3}]
+T_0: 300 K
+initial: {T_1: 300 K}
+run: {until: 0.2 s, outputs: 11}
+"""
+    conductivities = np.array([20.0, 2.0, 0.2, 0.02])
+    stated = {}
+    for cells in ("{accuracy: 1e-4}", "24"):
+        simulation = Simulation(load_text(text.replace("CELLS", cells)))
+        swept = simulation.sweep({"bodies.a.conduction.conductivity": conductivities})
+        exact = [slabs.touched(0.0, swept.dataset.time[1:] * k / 50.0, 10.0 / k)[:, 0] for k in conductivities]
+        true = np.max(abs(swept.dataset.T_1[:, 1:] / (300 + 100 * np.array(exact)) - 1), axis=1).values
+        stated[cells] = swept.accuracy.errors
+        assert np.all((stated[cells] > 0.8 * true) & (stated[cells] < 4 * true + 1e-10)), (stated[cells], true)
+    assert np.all(stated["{accuracy: 1e-4}"] < 1e-4)
+    assert max(stated["24"]) > 1e-3
+
+
+@pytest.mark.parametrize("C_c", ["1e-3", "1e-15"])
+def test_an_interface_of_hardly_any_capacity_between_conducting_bodies(C_c):
+    changes = [f"bodies.{body}.conduction={{{LOWER}, cells: 8}}" for body in ("lower", "upper")]
+    changes += [f"interface.potential=[constant-interface-capacity: {{C_c: {C_c}}}]", "run.first=1 s", "reference="]
+    run = surfacechem.run("three-temperatures", changes)
+    none = surfacechem.run(
+        "three-temperatures", [*changes[:2], "interface.potential=[]", "run.first=1 s", "reference="]
+    )
+    assert run.status == "finished"
+    np.testing.assert_allclose(run.dataset.T_c[2:], none.dataset.T_c[2:], rtol=1e-5 if C_c == "1e-3" else 1e-9)
+    assert run.audit.energy_error < 1e-9
+
+
+def test_an_accuracy_out_of_reach_is_said():
+    text = TWO.format(first="T", second="T", lower=LOWER + ", cells: {accuracy: 1e-9}", upper=UPPER + ", cells: 4",
+                      heat="", initial="profile_1: 400 K, profile_2: 300 K")  # fmt: skip
+    warnings = Simulation(load_text(text)).run().warnings
+    assert any("the accuracy 1e-09 of the cells is not reached" in warning for warning in warnings)
+
+
+def test_bodies_start_from_the_temperature_that_keeps_their_energy():
+    dataset = two(40, perfect=True).run().dataset
+    shares = 4e3 / 40, 9e3 / 40
+    assert dataset["T"][0] == pytest.approx((shares[0] * 400 + shares[1] * 300) / sum(shares), rel=1e-14)
+    assert dataset.E_total[0] == pytest.approx(4e3 * 100, rel=1e-13)
+
+
+def test_profiles_have_their_places_in_the_file(tmp_path):
+    import xarray
+
+    run = two(10, "held", grading=4).run()
+    with xarray.open_dataset(run.write(tmp_path / "run.nc")) as file:
+        assert file.profile_2.dims == ("time", "x_2")
+        np.testing.assert_allclose(file.x_2, 5e-3 * np.array(points(10, 4)), rtol=1e-14)
+        assert file.profile_2[-1, -1] == 330
+        assert np.array_equal(file.profile_1[:, 0], file.T_1)
+        assert not any(name.startswith("T_1_x") for name in file)
+
+
+def test_profiles_are_drawn_over_places():
+    dataset = two(10).run().dataset
+    (axes,) = plots.figure(dataset, ["profile_1", "profile_2"]).axes
+    assert len(axes.get_lines()) == 2 * dataset.sizes["time"]
+    assert "Distance from the contact" in axes.get_xlabel()
+    with pytest.raises(InputError, match="T_1 goes over time"):
+        plots.figure(dataset, ["profile_1", "T_1"])
+
+
+def test_an_initial_temperature_of_a_body_is_that_of_all_its_cells():
+    dataset = two(10).run({"initial.T_1": 350.0}).dataset
+    assert np.all(dataset.profile_1[0] == 350)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("cells: 8", "cells: 7", "cells must be even"),
+        ("cells: 8", "cells: many", "no choice of cells 'many'"),
+        ("cells: 8, ", "", "conduction needs `cells`"),
+        ("cells: 8", "cells: lump", "has no far side"),
+        ("thickness: 2 mm", "thickness: 0 mm", "outside its range"),
+        ("far: {temperature: 330 K}", "far: warm", "the far side is `insulated`"),
+        ("far: {temperature: 330 K}", "far: {h: 3}", "the far side needs a `temperature`"),
+        ("C: 4 kJ/m^2/K, ", "", "conducts heat but stores none"),
+        ("T_1: 400 K", "T_1: 400 K, profile_3: 300 K", "nothing that evolves is called 'profile_3'"),
+        ("T_1: 400 K", "T_1: 400 K, profile_1: -1 K", "profile_1"),
+        ("[lower, upper]", "[lower, surroundings]", "would end at its contact"),
+        ("0.2 W/m/K", "{value: 0.2, times: [linear: {of: T_2, slope: 1}]}", "varies with its own temperature only"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(old, new, message):
+    text = """
+bodies:
+  lower:
+    {temperature: T_1, C: 4 kJ/m^2/K, conduction: {thickness: 2 mm,
+     conductivity: 0.2 W/m/K, cells: 8, far: {temperature: 330 K}}}
+  upper: {temperature: T_2, C: 9 kJ/m^2/K}
+surroundings: {temperature: 300 K}
+heat: [conductance: {between: [lower, upper], h: 400 W/m^2/K}]
+T_0: 300 K
+initial: {T_1: 400 K, T_2: 300 K}
+run: {until: 1 s}
+"""
+    assert text.count(old) == 1
+    with pytest.raises(InputError, match=re.escape(message)):
+        Simulation(load_text(text.replace(old, new))).run()
+
+
+def test_a_series_for_a_slab_on_a_reservoir():
+    """Insulated and held behind: the textbook sine series."""
+    L, k, C, t = 2e-3, 0.2, 4e3, np.array([0.5, 5.0, 20.0])
+    x, alpha, n = np.linspace(0, L, 7), 0.2 * 2e-3 / 4e3, np.arange(300)[:, None, None]
+    for h_far, root, back in ((0.0, (n + 0.5) * np.pi, 0.0), (HELD, (n + 1) * np.pi, 100.0)):
+        decay = np.exp(-(root**2) * alpha * t[:, None] / L**2)
+        series = back * x / L + 100 * np.sum(2 / root * np.sin(root * x / L) * decay, axis=0)
+        slab = get("conducting-slabs")(
+            T_1=400.0, C_1=C, thickness_1=L, conductivity_1=k, T_2=300.0, h_far_1=h_far, T_far_1=300 + back
+        )
+        np.testing.assert_allclose(slab.profile(1, x, t), 300 + series, atol=1e-10)
+
+
+def test_thick_bodies_are_slabs_that_have_not_felt_their_far_side():
+    for R in (0.0, 1e-3, 0.1):
+        bodies = {"T_1": 400.0, "T_2": 300.0, "C_1": 4e3, "C_2": 9e3, "thickness_1": 2e-3, "thickness_2": 5e-3}
+        bodies |= {"conductivity_1": 0.2, "conductivity_2": 0.7, "R": R}
+        thick, slabs = get("sudden-contact")(**bodies), get("conducting-slabs")(**bodies)
+        t, x = np.geomspace(1e-4, 1, 8) * thick.end_time, np.linspace(0, 2e-3, 9)
+        for k in (1, 2):
+            np.testing.assert_allclose(slabs.profile(k, x, t), thick.profile(k, x, t), atol=1e-10)
+
+
+def test_an_exact_solution_of_another_scene_is_not_used():
+    law = "{potential: [constant-interface-capacity: {C_c: 1}], temperature: T}"
+    varying = "{value: 1, times: [linear: {of: T_2, slope: 1e-3}]}"
+    cases = {
+        "the interface has laws of its own": [f"interface={law}", "initial.T=310 K"],
+        "the heat capacity of glass varies": ["bodies.glass.capacity=quadratic"],
+        "the conductivity of glass varies": [f"bodies.glass.conduction.conductivity={varying}"],
+    }
+    for reason, change in cases.items():
+        source = surfacechem.run("sudden-contact", [*change, "run.until=1 s"]).accuracy.source
+        assert reason in source
+        assert "half of the cells" in source
+
+
+# -- layers thinner than a cell ---------------------------------------------------------------------------------------
+
+ONE = """
+T_0: 300 K
+bodies:
+  a: {temperature: T_1, capacity: constant, C: 1.0e4, conduction: {thickness: 5 mm, conductivity: 0.2, cells: CELLS}}
+  b: {temperature: 500 K}
+heat: [conductance: {between: [a, b], h: CONDUCTANCE}]
+loading: {Q_1: FLUX}
+initial: {T_1: 300 K}
+run: {RUN}
+"""
+EFFUSIVITY = np.sqrt(0.2 * 1e4 / 5e-3)
+
+
+def one(cells: object, run: str, h: float = 1e-9, flux: object = 0.0) -> Simulation:
+    """A bad conductor that something acts on for a moment."""
+    changes = {"CELLS": str(cells), "CONDUCTANCE": repr(h), "FLUX": str(flux), "RUN": run}
+    text = ONE
+    for word, value in changes.items():
+        text = text.replace(word, value)
+    return Simulation(load_text(text))
+
+
+def test_a_flash_heats_the_skin_of_a_bad_conductor():
+    run = one("{accuracy: 1e-3}", "until: 1.2 us", flux=5e7).run()
+    exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
+    assert exact[-1] == pytest.approx(397.72, abs=0.01)
+    np.testing.assert_allclose(run.dataset["T_1"], exact, rtol=1e-3)
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-3
+
+
+def test_a_hot_plate_touches_a_bad_conductor_for_a_moment():
+    run = one("{accuracy: 1e-3}", "until: 20 us", h=2e4).run()
+    exact = 500 - 200 * erfcx(2e4 * np.sqrt(run.dataset.time.values) / EFFUSIVITY)
+    assert exact[-1] == pytest.approx(328.30, abs=0.01)
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-3
+
+
+@pytest.mark.parametrize("cells", [2, 16, 30, 400])
+def test_a_number_of_cells_that_is_too_small_for_the_layer_says_so(cells):
+    run = one(cells, "until: 1.2 us", flux=5e7).run()
+    exact = 300 + 2 * 5e7 * np.sqrt(run.dataset.time.values / np.pi) / EFFUSIVITY
+    true = abs(run.dataset["T_1"] / exact - 1).values.max()
+    assert true > 0.2
+    assert 0.9 * true < run.accuracy.error < 2 * true
+    assert "cells that suit" in run.accuracy.source
+    assert any("the error of" in warning for warning in run.warnings)
+
+
+def test_each_pulse_starts_a_layer_of_its_own():
+    pulses = "{table: {times: [0 s, 0.1 s, 0.1 s, 0.2 s, 0.2 s, 1 s], values: [0, 0, 1e6, 1e6, 0, 0]}}"
+    run = one("{accuracy: 1e-4}", "times: [0.1, 0.10001, 0.15, 0.2, 0.20001, 1.0]", flux=pulses).run()
+    t = run.dataset.time.values
+    since = [np.sqrt(np.maximum(t - start, 0) / np.pi) for start in (0.1, 0.2)]
+    exact = 300 + 2 * 1e6 * (since[0] - since[1]) / EFFUSIVITY
+    assert abs(run.dataset["T_1"] / exact - 1).max() <= run.accuracy.error < 1e-4
+
+
+def test_an_error_that_does_not_converge_is_unknown():
+    found = judged({"T_1": 1e-4}, {"T_1": 5e-5}, rtol=1e-11)
+    assert not found.converged
+    assert np.isnan(found.largest)
+    run = two(40).run()
+    estimate = with_cells(against_tighter(run.trajectory), found)
+    assert np.isnan(estimate.error)
+    assert estimate.source.startswith("unknown: the error of the cells")
+
+
+def random_slab(random: np.random.Generator) -> tuple[Simulation, float, object]:
+    """A slab of any properties that is heated or touched, between 1e-6 and 100 times of its diffusion time: its
+    simulation, the accuracy asked for, and its temperatures by places and times.
+    """
+    C, L, k = (float(10 ** random.uniform(*span)) for span in ((2, 5), (-4, -1), (-1.5, 2.5)))
+    time, length = C * L / k, float(10 ** random.uniform(-6, 2))
+    asked = float(random.choice([1e-3, 1e-4, np.inf]))
+    outputs, end = int(random.integers(3, 60)), length * time
+    first = float(end * 10 ** random.uniform(-4, -0.5))
+    spacing = f", spacing: logarithmic, first: {first!r}" if random.random() < 0.5 else ""
+    rise, biot = float(random.uniform(10, 300)), float(10 ** random.uniform(-3, 3))
+    flux = float(rise / slabs.heated(0.0, length)[0, 0] * k / L)
+    heats = bool(random.random() < 0.5)
+    text = f"""
+T_0: 300 K
+bodies:
+  a:
+    temperature: T_1
+    capacity: constant
+    C: {C!r}
+    conduction:
+      thickness: {L!r}
+      conductivity: {k!r}
+      cells: {f"{{accuracy: {asked}}}" if np.isfinite(asked) else 2 * random.integers(1, 40)}
+  b: {{temperature: {300 + rise!r}}}
+heat: [conductance: {{between: [a, b], h: {0.0 if heats else biot * k / L!r}}}]
+loading: {{Q_1: {flux if heats else 0.0!r}}}
+initial: {{T_1: 300 K}}
+run: {{until: {end!r}, outputs: {outputs}{spacing}}}
+"""
+
+    def exact(x, t):
+        x, t = x / L, t / time
+        return 300 + (flux * L / k * slabs.heated(x, t) if heats else rise * slabs.touched(x, t, biot))
+
+    return Simulation(load_text(text)), asked, exact
+
+
+def assert_known(seed: int, scenes: int) -> None:
+    random = np.random.default_rng(seed)
+    for i in range(scenes):
+        simulation, asked, exact = random_slab(random)
+        run = simulation.run()
+        values = exact(run.dataset.x_1.values, run.dataset.time.values[1:])
+        true, stated = np.max(abs(run.dataset.profile_1.values[1:] / values - 1)), run.accuracy.error
+        assert true <= asked, (seed, i, true)
+        assert true < 1.4 * stated, (seed, i, true, stated)
+        assert stated < 20 * true + 1e-9, (seed, i, true, stated)
+
+
+def test_random_slabs_are_as_accurate_as_they_say():
+    assert_known(seed=1, scenes=16)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_many_random_slabs_are_as_accurate_as_they_say(seed):
+    assert_known(seed, scenes=60)

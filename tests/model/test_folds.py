@@ -1,0 +1,214 @@
+"""Folds in shear and in mixed mode: where they are, what they release, and where the gaps come to rest."""
+
+import math
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from scenes import SITES, bodies, perfect_contact, varying
+from scipy.optimize import brentq, fsolve
+from scipy.special import lambertw
+
+from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.factors import Power
+from surfacechem.laws.friction import Coulomb, MohrCoulomb
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.solve.run import Model, Run
+
+PHI, G_N, G_T = 0.1, 1e-8, 2e-8
+ZONE = XuNeedleman(Phi_n=PHI, g_0=G_N, g_t0=G_T)
+STIFF = 2 * PHI / G_T**2
+"""Stiffness of the zone in shear where it is closed [Pa/m]."""
+NORMAL = 1e14
+
+
+def solve(loading, until=40.0, potentials=(ZONE,), frictions=(), reactions=(), initial=None, **mounts):
+    interface = Interface("T", potentials, frictions, reactions, SITES if reactions else None)
+    start = {"T": 300.0} | (initial or {})
+    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=start, **mounts)
+    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 41)))
+    assert audit(trajectory).energy_error < 1e-9
+    assert audit(trajectory).violations == ()
+    return trajectory
+
+
+def snaps(trajectory):
+    return [jump for jump in trajectory.jumps if jump.transition.name == "snap"]
+
+
+def shear(x):
+    """Traction of the closed zone at g_t = x g_t0."""
+    return STIFF * G_T * x * math.exp(-(x**2))
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 0.05, 0.3, 0.44])
+def test_a_soft_spring_on_a_zone_in_shear_snaps_where_the_tangent_is_lost(ratio):
+    """(2 x^2 - 1) exp(-x^2) = k / stiffness, with Lambert's function."""
+    k, rate = ratio * STIFF, 1e-8
+    x = math.sqrt(0.5 - lambertw(-ratio * math.sqrt(math.e) / 2).real)
+    w = x * G_T + shear(x) / k
+    top = brentq(lambda y: k * (w - y * G_T) - shear(y), 1.01 * x, w / G_T) if ratio < 0.4 else None
+    trajectory = solve({"g_n": Hold(level=0.0), "w_t": Ramp(rate=rate)}, 1.2 * w / rate, tangential=Mounting(k=k))
+    (snap,) = snaps(trajectory)
+    assert snap.t == pytest.approx(w / rate, rel=1e-10)
+    assert snap.verdict == "admissible"
+    names = [state.name for state in trajectory.model.system.states]
+    gaps = snap.after.y[[names.index("g_t"), names.index("u_t")]]
+    assert gaps[0] == pytest.approx(gaps[1], rel=np.finfo(float).eps)  # two states, each rounded
+    if top is not None:
+        energy = [0.5 * k * (w - y * G_T) ** 2 - PHI * math.exp(-(y**2)) for y in (x, top)]
+        assert snap.after.y[names.index("g_t")] == pytest.approx(top * G_T, rel=1e-8)
+        assert snap.released == pytest.approx(energy[0] - energy[1], rel=1e-7)
+
+
+def test_a_stiff_spring_follows_the_whole_zone_in_shear():
+    """Nothing snaps above 2 exp(-3/2) of the stiffness."""
+    loading = {"g_n": Hold(level=0.0), "w_t": Ramp(rate=1e-8)}
+    trajectory = solve(loading, tangential=Mounting(k=0.45 * STIFF))
+    assert snaps(trajectory) == []
+    assert trajectory.status == "finished"
+
+
+def opened(k, C):
+    """Fold of a zone of strength T_0/T that a spring opens without heat: load, gap, temperature; and the rest after
+    it: gap, temperature. The entropy C T/T_0 - a/T^2 stays at the fold, the energy after it."""
+    t_0, T_0, g_0 = mpf(10) ** 6 * mp.e, mpf(300), mpf(10) ** -7
+
+    def zone(x):
+        return t_0 * T_0 * g_0 * (1 + x) * mp.exp(-x) / C
+
+    start = T_0 - zone(0) / T_0
+
+    def warm(x):
+        return mp.findroot(lambda u: (u - start / T_0) * u**2 - zone(x) / T_0**2, 1) * T_0
+
+    def force(x, T):
+        return t_0 * T_0 / T * x * mp.exp(-x)
+
+    def load(x):
+        return x * g_0 + force(x, warm(x)) / k
+
+    x = mp.findroot(lambda x: mp.diff(load, x, h=mpf(10) ** -12), (1.2, 1.3), tol=1e-25)
+    w = load(x)
+
+    def energy(x, T):
+        return C * T**2 / (2 * T_0) - 2 * C * zone(x) / T + k * (w - x * g_0) ** 2 / 2
+
+    def unbalanced(y, u):
+        return (force(y, u * T_0) / k / w + y * g_0 / w - 1, energy(y, u * T_0) / energy(x, warm(x)) - 1)
+
+    y, u = mp.findroot(unbalanced, (w / g_0, 1))
+    return [float(value) for value in (w, x * g_0, warm(x), y * g_0, u * T_0)]
+
+
+@pytest.mark.parametrize(("k", "C"), [(1e12, 2.0), (1e12, 0.02), (2.5e12, 0.01)])
+def test_moment_and_state_of_a_fold_are_those_of_the_fold_itself(k, C):
+    """The zone cools as it opens; a run ends a little before the fold, by the root of what time resolves."""
+    with mp.workdps(40):
+        w, g, T, apart, hot = opened(mpf(k), mpf(C))
+    zone = ExponentialCohesiveZone(t_max=varying(1e6, Power(exponent=-1.0)), g_0=1e-7, E_n=1e16)
+    scene = perfect_contact([zone], C_1=C / 2, C_2=C / 2, loading={"w_n": Ramp(rate=1e-6)}, normal=Mounting(k=k))
+    trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1.5 * w / 1e-6], rtol=1e-13))
+    (snap,) = snaps(trajectory)
+    assert snap.t == pytest.approx(w / 1e-6, rel=5e-15)
+    assert snap.before.y == pytest.approx([g, T], rel=5e-15)
+    assert snap.after.y == pytest.approx([apart, hot], rel=1e-13)
+
+
+def gradient(z, w_n, w_t, k_t):
+    """Driving tractions of both gaps, in units of the gaps, and the determinant of their stiffness."""
+    u, x = z
+    e = math.exp(-u - x**2)
+    r = (NORMAL * (w_n - u * G_N) - PHI / G_N * u * e, k_t * (w_t - x * G_T) - 2 * PHI / G_T * x * (1 + u) * e)
+    nn = NORMAL + PHI / G_N**2 * (1 - u) * e
+    tt = k_t + 2 * PHI / G_T**2 * (1 + u) * (1 - 2 * x**2) * e
+    nt = -2 * PHI / (G_N * G_T) * u * x * e
+    return r, nn * tt - nt**2
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3])
+def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes(ratio):
+    """Each tangent by itself would be lost later."""
+    k, v_n, v_t = ratio * STIFF, 3e-9, 1e-8
+
+    def system(q):
+        r, det = gradient(q[:2], v_n * q[2], v_t * q[2], k)
+        return r[0] * G_N / PHI, r[1] * G_T / PHI, det / NORMAL / STIFF
+
+    loading = {"w_n": Ramp(rate=v_n), "w_t": Ramp(rate=v_t)}
+    trajectory = solve(loading, normal=Mounting(k=NORMAL), tangential=Mounting(k=k))
+    snap = snaps(trajectory)[0]
+    names = [state.name for state in trajectory.model.system.states]
+    start = (snap.before.y[names.index("g_n")] / G_N, snap.before.y[names.index("g_t")] / G_T, snap.t)
+    u, x, t = fsolve(system, start, xtol=1e-13)
+    assert snap.t == pytest.approx(t, rel=1e-9)
+    e = math.exp(-u - x**2)
+    assert k + 2 * PHI / G_T**2 * (1 + u) * (1 - 2 * x**2) * e > 1e-3 * k
+    r, det = gradient(
+        (snap.after.y[names.index("g_n")] / G_N, snap.after.y[names.index("g_t")] / G_T), v_n * t, v_t * t, k
+    )
+    assert det > 0
+    assert np.all(np.abs(r) < 1e-6 * k * G_T)
+
+
+def test_shear_snaps_back_as_often_as_it_is_driven():
+    loading = {"g_n": Hold(level=0.0), "w_t": Harmonic(amplitude=4e-7, frequency=0.1)}
+    trajectory = solve(loading, 100.0, tangential=Mounting(k=0.05 * STIFF))
+    found = snaps(trajectory)
+    assert len(found) == 40
+    released = [snap.released for snap in found]
+    assert released[2::4] == pytest.approx([released[2]] * 10, rel=1e-8)
+    assert trajectory.status == "finished"
+
+
+@pytest.mark.parametrize("friction", [Coulomb(mu=0.3), MohrCoulomb(mu=0.3, c=1e7)])
+def test_a_zone_in_shear_beside_friction(friction):
+    loading = {"w_n": Hold(level=-1e-9), "w_t": Ramp(rate=1e-8)}
+    mounts = {"normal": Mounting(k=1e15), "tangential": Mounting(k=0.05 * STIFF)}
+    trajectory = solve(loading, frictions=[friction], **mounts)
+    assert trajectory.status == "finished", trajectory.reason
+
+
+@pytest.mark.parametrize("k", [1e13, 1e14, 1e16])
+def test_adhesion_intensity_in_shear_on_a_spring(k):
+    zone = AdhesionIntensity(C_N=1e15, C_T=1e15, w=0.1, E_n=1e16)
+    loading = {"g_n": Hold(level=0.0), "w_t": Ramp(rate=1e-8)}
+    settings = {"potentials": [zone], "reactions": [AdhesionLoss(b=1e-3)], "initial": {"phi": 1.0}}
+    trajectory = solve(loading, tangential=Mounting(k=k), **settings)
+    assert trajectory.status == "finished", trajectory.reason
+
+
+def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
+    strength = PHI * math.sqrt(2 / math.e) / G_T
+    trajectory = solve({"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)})
+    assert trajectory.status == "stopped"
+    assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("rtol", [1e-13, 1e-11, 1e-6])
+@pytest.mark.parametrize("k", [1e10, 3e12])
+def test_a_pull_off_snaps_at_any_tolerance(k, rtol):
+    """At the tightest the run reaches the fold itself, where the push is rounding."""
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
+    top = 1.2e6 / k + 5e-8
+    history = Table(times=[0.0, 1.0, 2.0, 3.0, 4.0], values=[0.0, top, -1e-9, top, 0.0])
+    scene = Scene(
+        bodies("T", "T"),
+        Interface("T", [zone]),
+        loading={"w_n": history},
+        T_0=300.0,
+        initial={"T": 300.0},
+        normal=Mounting(k=k),
+    )
+    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 4.0, 11), rtol=rtol))
+    assert trajectory.status == "finished", trajectory.reason
+    off, _, again, _ = snaps(trajectory)
+    ratio = k * 1e-8 / 1e6
+    g = 1e-8 * (1 - lambertw(-ratio).real)
+    w = g + 1e6 * g / 1e-8 * math.exp(1 - g / 1e-8) / k
+    assert off.t == pytest.approx(w / top, rel=max(1e-9, rtol))
+    assert again.t == pytest.approx(2 + (w + 1e-9) / (top + 1e-9), rel=max(1e-9, rtol))

@@ -1,0 +1,395 @@
+"""Heat paths: conductance laws against exact tables, closures, the ledger of fluxes, ranges and behaviour at touch."""
+
+import dataclasses
+from textwrap import dedent
+
+import numpy as np
+import pytest
+import scenes
+import tables
+from scenes import bodies, path, varying
+
+from surfacechem.compile.printing import python
+from surfacechem.errors import InputError
+from surfacechem.format import load_text
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity
+from surfacechem.laws.contact_conductance import (
+    BondedPressureConductance,
+    CooperMikicYovanovich,
+    PressureConductance,
+    PressureTable,
+)
+from surfacechem.laws.factors import Proportional
+from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.gap_conductance import GapConductance, GapTable, GasGap
+from surfacechem.laws.heat import Conductance, Radiation
+from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.loading import Hold, Ramp, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.quantities import STEFAN_BOLTZMANN
+from surfacechem.results.achieved import computed
+from surfacechem.results.audit import audit
+from surfacechem.results.solution import Solution
+from surfacechem.runs.simulation import Simulation
+from surfacechem.scene import Body, Interface, Scene
+from surfacechem.solve.run import Model, Run
+
+ENDS = ("lower", "upper")
+GAP = {"h_0": 2e4, "C_trans": 2e6, "k_gas": 0.026, "g_0": 3.7e-7, "epsilon_1": 0.8, "epsilon_2": 0.6}
+
+
+def direct(heat, loading, T_1=350.0, T_2=500.0, C=1e30, interface=None, **rest) -> Scene:
+    """Two bodies without a medium, so large that they keep their temperatures unless told otherwise."""
+    interface = interface or Interface(None)
+    initial = {"T_1": T_1, "T_2": T_2}
+    return Scene(bodies(energy=Constant, C_1=C, C_2=C), interface, heat, loading, T_0=300.0, initial=initial, **rest)
+
+
+def solved(scene: Scene, *times: float):
+    return Model(assemble(scene)).solve(Run(times=times))
+
+
+def history(values) -> Table:
+    return Table(times=[float(i) for i in range(len(values))], values=list(values))
+
+
+# -- exact tables -----------------------------------------------------------------------------------------------------
+
+
+def test_conductance_in_contact():
+    p, columns = tables.read("j_conductance_contact")
+    rows = len(columns["h"])
+    parameters = {
+        "h_0_b": p["h0b"],
+        "h_0_ub": p["h0u"],
+        "h_c_b": p["hcb"],
+        "h_c_ub": p["hcu"],
+        "H": p["H"],
+        "q": p["q"],
+    }
+    law = BondedPressureConductance(between=ENDS, **parameters)
+    loading = {"p": history(columns["p_c"]), "phi": history(columns["phi"])}
+    values = computed(solved(direct([law], loading), *range(rows)))
+    assert values["q_t"] / 150.0 == pytest.approx(columns["h"], rel=1e-12)
+
+
+def test_conductance_out_of_contact_and_what_carries_it():
+    p, columns = tables.read("j_conductance_out_of_contact")
+    rows = len(columns["h"])
+    assert p["c_rad"] == STEFAN_BOLTZMANN
+    law = GapConductance(between=ENDS, **GAP)
+    values = computed(solved(direct([law], {"g_n": history(columns["g_n"])}), *range(rows)))
+    assert values["q_t"] == pytest.approx(columns["q_t"], rel=1e-12)
+    taken_over = -np.expm1(-p["C_trans"] * columns["g_n"])
+    assert values["q_12_gas"] == pytest.approx(-150 * columns["h_gas"] * taken_over, rel=1e-9)
+    assert values["q_12_radiation"] == pytest.approx(-150 * columns["h_rad"] * taken_over, rel=1e-9)
+
+
+def test_radiation_is_exact_in_the_fourth_power():
+    law = Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=0.6)
+    values = computed(solved(direct([law], {}), 0.0, 1.0))
+    exact = STEFAN_BOLTZMANN * (350.0**4 - 500.0**4) / (1 / 0.8 + 1 / 0.6 - 1)
+    assert values["q_12"] == pytest.approx(exact, rel=1e-14)
+
+
+# -- the ledger of fluxes ---------------------------------------------------------------------------------------------
+
+
+def ledger() -> Scene:
+    """Spots, gas and radiation in parallel, and friction and reaction heat, part of it lost to the surroundings."""
+    scene = scenes.no_medium()
+    heat = [
+        PressureConductance(between=ENDS, h_c=1e4, H=1e9),
+        GasGap(between=ENDS, k=0.026, M=3.7e-7),
+        Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=0.6),
+        path("upper", "surroundings", 12.0),
+    ]
+    loading = {**scene.loading, "g_n": Hold(level=2e-6)}
+    interface = dataclasses.replace(scene.interface, loss=0.1)
+    return dataclasses.replace(scene, heat=heat, loading=loading, interface=interface, surroundings=Hold(level=280.0))
+
+
+def test_fluxes_by_channel_sum_to_the_total():
+    values = computed(solved(ledger(), 0.0, 0.5, 2.0))
+    channels = ("spots", "gas", "radiation", "friction", "reaction", "external")
+    for k in "12":
+        parts = [values[f"q_{k}_{channel}"] for channel in channels]
+        assert sum(parts) == pytest.approx(values[f"q_{k}"], rel=1e-13)
+    across = [values[f"q_12_{channel}"] for channel in channels[:3]]
+    assert sum(across) == pytest.approx(values["q_12"], rel=1e-13)
+
+
+def test_lost_heat_is_booked_and_both_laws_hold():
+    trajectory = solved(ledger(), 0.0, 0.5, 2.0)
+    books = audit(trajectory)
+    assert books.energy_error < 1e-10
+    assert books.entropy_error < 1e-10
+    assert books.violations == ()
+    values = computed(trajectory)
+    for channel, heat in (("friction", values["D_coulomb"]), ("reaction", values["D_linear_affinity"])):
+        for k, share in (("1", 0.3), ("2", 0.6)):
+            assert values[f"q_{k}_{channel}"] == pytest.approx(share * heat, rel=1e-13)
+
+
+def test_fluxes_by_source_sum_to_the_total_in_perfect_contact():
+    potentials = [BondEnergy(K_0=300.0, K_2=40.0), InterfaceCapacity(C_c=0.2)]
+    loading = {"p": Hold(level=1e5), "v": Hold(level=0.02)}
+    scene = scenes.perfect_contact(
+        potentials, [LinearAffinity(c_r=1e16)], frictions=[Coulomb(mu=0.3)], loading=loading, C_1=2.0, C_2=3.0
+    )
+    values = computed(solved(scene, 0.0, 0.1, 1.0))
+    for k, C in (("1", 2.0), ("2", 3.0)):
+        friction, reaction = values[f"q_{k}_friction"], values[f"q_{k}_reaction"]
+        assert friction + reaction == pytest.approx(values[f"q_{k}"], rel=1e-12)
+        capacity = C * values["T"] / 300.0
+        assert friction == pytest.approx(values["D_coulomb"] * capacity / values["C_T"], rel=1e-12)
+    assert not [name for name in values if name.endswith("_exchange")]
+
+
+def test_what_is_exchanged_completes_the_sources():
+    values = computed(solved(scenes.one_sided(), 0.0, 0.1, 1.0))
+    assert values["q_1_reaction"] + values["q_1_exchange"] == pytest.approx(values["q_1"], rel=1e-12)
+    heated = scenes.perfect_contact(
+        [BondEnergy(K_0=30.0)],
+        [LinearAffinity(c_r=1e16)],
+        heat=[path("lower", "surroundings", 5.0)],
+        surroundings=Hold(level=280.0),
+    )
+    values = computed(solved(heated, 0.0, 0.1))
+    out = values["q_1a"]
+    assert values["q_1_exchange"] == pytest.approx(out / 2, rel=1e-9)
+    assert values["q_2_exchange"] == pytest.approx(-out / 2, rel=1e-9)
+
+
+def test_a_flux_of_one_channel_has_one_name():
+    names = computed(solved(scenes.algebraic(), 0.0, 0.1))
+    assert {"q_c1", "q_c2", "q_1", "q_2"} <= set(names)
+    assert not [name for name in names if name.startswith(("q_1_", "q_c1_"))]
+
+
+def test_no_radiation_in_the_source_of_a_scene_without_it():
+    without, having = ([Conductance(between=ENDS, h=10.0)], [GapConductance(between=ENDS, **GAP)])
+    assert "radiation" not in python(assemble(direct(without, {})))
+    assert "radiation" in python(assemble(direct(having, {"g_n": Hold(level=1e-6)})))
+
+
+# -- closures ---------------------------------------------------------------------------------------------------------
+
+
+def through_medium(heat) -> Scene:
+    interface = Interface("T_c", [], [Coulomb(mu=0.3)])
+    loading = {"p": Hold(level=1e5), "v": Hold(level=0.02)}
+    return direct(heat, loading, C=1e3, interface=interface)
+
+
+def test_one_conductance_through_a_medium_is_twice_that_on_each_side():
+    law = PressureConductance(between=ENDS, h_0=200.0, h_c=1e6, H=1e9, closure="medium")
+    h = law.conductance(p=1e5)
+    first = solved(through_medium([law]), 0.0, 1.0, 3.0)
+    sides = [path("lower", "interface", 2 * h), path("interface", "upper", 2 * h)]
+    second = solved(through_medium(sides), 0.0, 1.0, 3.0)
+    assert first.result.outputs == pytest.approx(second.result.outputs, rel=1e-10)
+    values = computed(first)
+    T_1, T_2 = values["T_1"], values["T_2"]
+    assert values["q_t"] == pytest.approx(h * (T_2 - T_1), rel=1e-9)
+
+
+def test_a_medium_is_between_the_bodies():
+    law = Conductance(between=("lower", "surroundings"), h=1.0, closure="medium")
+    with pytest.raises(InputError, match="belongs to a path between the two bodies"):
+        assemble(dataclasses.replace(through_medium([law]), surroundings=Hold(level=300.0)))
+
+
+def test_mean_influx_against_its_exact_solution():
+    """Between bodies that keep their temperatures the interface relaxes to the harmonic mean."""
+    mean = Conductance(between=("upper", "lower"), h=40.0, closure="mean")
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=20.0)])
+    initial = {"T_1": 300.0, "T_2": 450.0, "T_c": 300.0}
+    scene = dataclasses.replace(direct([mean], {}, interface=interface), initial=initial)
+    trajectory = solved(scene, 0.0, 0.1, 0.5, 2.0)
+    values, t = computed(trajectory), np.array([0.0, 0.1, 0.5, 2.0])
+    harmonic = 2 * 300.0 * 450.0 / 750.0
+    exact = harmonic + (300.0 - harmonic) * np.exp(-2 * 40.0 * t / 20.0)
+    assert values["T_c"] == pytest.approx(exact, rel=1e-10)
+    assert values["q_1"] == pytest.approx(40.0 * (exact - harmonic), rel=1e-8)
+    assert values["q_t"] == pytest.approx(np.zeros(4), abs=1e-9)
+
+
+def test_mean_influx_into_a_hotter_body_is_told():
+    """From 400 K it heats a body of 500 K beside one of 300 K; both together produce entropy."""
+    mean = Conductance(between=ENDS, h=10.0, closure="mean")
+    interface = Interface("T_c", [ConstantInterfaceCapacity(C_c=100.0)])
+    scene = dataclasses.replace(
+        direct([mean], {}, interface=interface), initial={"T_1": 300.0, "T_2": 500.0, "T_c": 400.0}
+    )
+    (warning,) = assemble(scene).warnings
+    assert "upper also from an interface that is cooler than itself, between 375 K and 500 K" in warning
+    values = computed(solved(scene, 0.0, 0.1))
+    assert values["q_2"][0] == pytest.approx(250.0)
+    assert values["sigma_q_c12"][0] == pytest.approx(10.0 * 25.0 * (1 / 300 + 1 / 500 - 2 / 400), rel=1e-12)
+    alike = dataclasses.replace(scene, initial={"T_1": 300.0, "T_2": 300.0, "T_c": 400.0})
+    assert assemble(alike).warnings == ()
+
+
+def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
+    mean = Conductance(between=("lower", "surroundings"), h=1.0, closure="mean")
+    with pytest.raises(InputError, match="`closure: mean` belongs to a path between the two bodies"):
+        assemble(dataclasses.replace(through_medium([mean]), surroundings=Hold(level=300.0)))
+    shared = Scene(
+        bodies("T", "T"),
+        Interface("T_c", [InterfaceCapacity(C_c=3.0)]),
+        [Conductance(between=ENDS, h=1.0, closure="mean")],
+        T_0=300.0,
+        initial={"T": 300.0, "T_c": 310.0},
+    )
+    with pytest.raises(InputError, match="two bodies with temperatures of their own"):
+        assemble(shared)
+
+
+# -- ranges -----------------------------------------------------------------------------------------------------------
+
+PRESSURES = {"pressures": [0.0, 1e6, 3e6], "conductances": [500.0, 1500.0, 3000.0]}
+
+
+@pytest.mark.parametrize("extrapolation", ["hold", "linear"])
+def test_tables_beyond_their_ends(extrapolation):
+    law = PressureTable(between=ENDS, extrapolation=extrapolation, **PRESSURES)
+    assert law.conductance(p=1e6) == 1500.0
+    value = law.conductance(p=6e6)
+    step = 10.0
+    slope = (law.conductance(p=3e6) - law.conductance(p=3e6 - step)) / step
+    expected = 0.0 if extrapolation == "hold" else slope
+    assert (value - 3000.0) / 3e6 == pytest.approx(expected, rel=1e-4, abs=1e-12)
+
+
+def test_a_table_that_refuses_to_be_extrapolated_ends_the_run():
+    law = PressureTable(between=ENDS, extrapolation="refuse", **PRESSURES)
+    trajectory = solved(direct([law], {"p": Ramp(rate=1e6)}), 0.0, 2.0, 10.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.result.t == pytest.approx(3.0, rel=1e-6)
+    assert "p left the range of the law pressure-table, 0 to 3e+06" in trajectory.reason
+
+
+def test_the_ends_of_a_range_belong_to_it():
+    """A pressure at the end of a table, and an emissivity of one that varies with the bonds, all of which are there."""
+    table = PressureTable(between=ENDS, extrapolation="refuse", **PRESSURES)
+    black = Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=varying(1.0, Proportional(of="phi")))
+    trajectory = solved(direct([table, black], {"p": Hold(level=3e6), "phi": Hold(level=1.0)}), 0.0, 2.0)
+    assert trajectory.status == "finished"
+
+
+def test_a_correlation_outside_its_range_says_so():
+    law = CooperMikicYovanovich(between=ENDS, k=20.0, m=0.1, sigma=1e-6, H=2e9)
+    inside = Solution(solved(direct([law], {"p": Hold(level=1e6)}), 0.0, 1.0))
+    outside = Solution(solved(direct([law], {"p": Hold(level=1e9)}), 0.0, 1.0))
+    assert inside.warnings == ()
+    assert outside.warnings[0].startswith("cooper mikic yovanovich is an extrapolation: p ran from 1e+09 to 1e+09")
+
+
+@pytest.mark.parametrize(
+    ("at", "values", "message"),
+    [
+        ([0.0, 1.0], [1.0], "as many gaps"),
+        ([0.0, 0.0], [1.0, 2.0], "must increase"),
+        ([0.0, 1.0], [1.0, -2.0], "not negative"),
+    ],
+)
+def test_tables_that_are_none(at, values, message):
+    with pytest.raises(InputError, match=message):
+        GapTable(between=ENDS, gaps=at, conductances=values)
+
+
+# -- touch ------------------------------------------------------------------------------------------------------------
+
+
+def warnings_of(*heat) -> tuple[str, ...]:
+    loading = {"g_n": Ramp(start=1e-6, rate=-1e-7), "p": Hold(level=0.0)}
+    if not any("p" in law.conductance.__code__.co_varnames for law in heat):
+        del loading["p"]
+    return assemble(direct(heat, loading)).warnings
+
+
+def test_a_conductance_that_rises_as_the_gap_opens_is_warned_of():
+    (warning,) = warnings_of(GapConductance(between=ENDS, **GAP))
+    assert "not monotone: 20000 W/(m^2 K) at touch" in warning
+
+
+def test_a_conductance_that_falls_as_the_gap_opens_is_not():
+    assert warnings_of(GapConductance(between=ENDS, **GAP | {"h_0": 8e4})) == ()
+    assert (
+        warnings_of(
+            GapConductance(between=ENDS, **GAP | {"h_0": 8e4}), PressureConductance(between=ENDS, h_c=1e4, H=1e9)
+        )
+        == ()
+    )
+
+
+def test_a_contact_that_holds_across_an_open_gap_is_warned_of():
+    contact = PressureConductance(between=ENDS, h_0=500.0, h_c=1e4, H=1e9)
+    (warning,) = warnings_of(GasGap(between=ENDS, k=0.026, M=3.7e-7), contact)
+    assert "does not vanish without pressure" in warning
+
+
+class Jumping(Conductance):
+    def conductance(self, g_n):
+        from surfacechem.expressions import where
+
+        return self.h * where(g_n > 0, 1.0, 3.0)
+
+
+def test_a_jump_at_touch_is_warned_of():
+    (warning,) = warnings_of(Jumping(between=ENDS, h=10.0))
+    assert "jumps at touch, from 30 to 10 W/(m^2 K)" in warning
+    assert assemble(direct([Jumping(between=ENDS, h=10.0)], {"g_n": Hold(level=1e-6)})).warnings == ()
+
+
+@pytest.mark.parametrize("gap", ["10 um", "{ramp: {start: 10 um, rate: -1 um/s}}"])
+def test_a_film_that_conducts_without_end_at_touch_does_not_jump_there(gap):
+    text = """
+T_0: 300 K
+bodies: {a: {temperature: T_1, capacity: constant, C: 1000}, b: {temperature: T_2, capacity: constant, C: 1000}}
+interface: {medium: {conductivity: 0.1}}
+heat: [{film: {between: [a, b]}}]
+loading: {g_n: GAP}
+initial: {T_1: 300, T_2: 400}
+run: {until: 1 s}
+"""
+    assert load_text(text.replace("GAP", gap)).system().warnings == ()
+
+
+def test_a_gas_layer_without_roughness_ends_at_touch():
+    trajectory = solved(direct([GasGap(between=ENDS, k=0.026)], {"g_n": Ramp(start=1e-6, rate=-1e-7)}), 0.0, 20.0)
+    assert trajectory.status == "stopped"
+    assert "g_n reached zero" in trajectory.reason
+
+
+def test_reservoirs_exchange_by_radiation_with_the_surroundings():
+    body = Body("lower", "T_1", Constant(C=1e3)), Body("upper", Hold(level=300.0))
+    law = Radiation(between=("lower", "surroundings"), epsilon_1=0.9)
+    scene = Scene(body, Interface(None), [law], {}, Hold(level=290.0), 300.0, {"T_1": 600.0})
+    trajectory = solved(scene, 0.0, 100.0)
+    assert audit(trajectory).energy_error < 1e-10
+    assert computed(trajectory)["q_1a"][0] == pytest.approx(0.9 * STEFAN_BOLTZMANN * (600.0**4 - 290.0**4), rel=1e-13)
+
+
+def test_heat_into_a_body_that_is_kept_warm_is_all_that_the_interface_gives():
+    """Prescribed temperatures: conduction from the other body, friction, and bonds at their internal energy."""
+    text = """
+    T_0: 300 K
+    bodies: {lower: {temperature: T_1}, upper: {temperature: T_2}}
+    interface:
+      temperature: T_1
+      sites: 1e18 1/m^2
+      potential: [bond-energy: {K_0: 0.5 J/m^2, K_1: 0.2 J/m^2}]
+      friction: [coulomb: {mu: 0.25}]
+      bonding: [relaxation: {tau: 0.5 s}]
+    heat: [conductance: {between: [upper, interface], h: 30 W/m^2/K}]
+    loading: {T_1: 310 K, T_2: 350 K, p: 1 kPa, v: 2 mm/s}
+    initial: {phi: 0}
+    run: {times: [0.5, 1, 2], rtol: 1e-12}
+    """
+    data = Simulation(load_text(dedent(text))).run().dataset
+    np.testing.assert_allclose(data.q_1, 30 * 40 + 0.25 * 1e3 * 2e-3 + np.exp(-4 * data.time), rtol=1e-12)
+    np.testing.assert_allclose(data.q_2, -30 * 40, rtol=1e-14)

@@ -1,0 +1,561 @@
+"""Rigid contact of bodies with a mass: rebounds, rest after infinitely many of them, release, and friction."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import SITES, bodies, path, varying
+from scipy.integrate import solve_ivp
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.laws.anisotropic import AnisotropicCoulomb
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.contact import Penalty, TangentialStiffness
+from surfacechem.laws.contact_conductance import PressureConductance
+from surfacechem.laws.factors import Linear, Proportional
+from surfacechem.laws.friction import Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.references import get
+from surfacechem.results.achieved import EVENTS, apart
+from surfacechem.results.audit import audit
+from surfacechem.results.event_table import event_times
+from surfacechem.scene import Body, Interface, Mounting, Scene
+from surfacechem.solve.run import Model, Run
+
+M, F, FELL = 4.0, 40.0, 0.2
+PRESSED = {"F_n": Hold(level=-F)}
+V_0, T_0 = math.sqrt(2 * F / M * FELL), math.sqrt(2 * FELL * M / F)
+"""Speed and time of the first impact of what falls from rest."""
+
+
+def scene(mount, loading=PRESSED, initial=None, pair=None, interface=None, **more):
+    start = {"T": 300.0, "g_n": FELL} | (initial or {})
+    held = bodies("T", "T") if pair is None else pair
+    return Scene(held, interface or Interface("T"), (), loading, None, 300.0, start, normal=mount, **more)
+
+
+def solve(given, until, rtol=1e-11, points=11):
+    trajectory = Model(assemble(given)).solve(Run(np.linspace(0.0, until, points).tolist(), rtol=rtol))
+    books = audit(trajectory)
+    assert not books.violations
+    assert trajectory.status == "finished", trajectory.reason
+    return trajectory
+
+
+def names(trajectory):
+    return [jump.transition.name for jump in trajectory.jumps]
+
+
+def made(trajectory, name):
+    return [jump for jump in trajectory.jumps if jump.transition.name == name]
+
+
+def state(trajectory, name):
+    return trajectory.everywhere[name]
+
+
+def end(trajectory, name):
+    return float(trajectory.result.y[[s.name for s in trajectory.model.system.states].index(name)])
+
+
+# -- rebounds ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_body_that_does_not_rebound_rests():
+    trajectory = solve(scene(Mounting(m=M)), 1.0)
+    assert names(trajectory) == ["impact", "rest"]
+    impact, rest = trajectory.jumps
+    assert (impact.t, rest.t) == (pytest.approx(T_0, rel=1e-14), impact.t)
+    assert impact.released == pytest.approx(F * FELL, rel=1e-14)
+    assert rest.released == 0.0
+    assert (end(trajectory, "g_n"), end(trajectory, "v_n")) == (0.0, 0.0)
+    assert trajectory.everywhere["t_n"][-1] == -F
+    assert audit(trajectory).energy_error < 1e-12
+
+
+@pytest.mark.parametrize("e", [0.3, 0.5, 0.9])
+def test_all_rebounds_under_a_dead_load(e):
+    """Rebound k follows the one before after 2 v_0 e^k m / F, and all of them end in a finite time."""
+    trajectory = solve(scene(Mounting(m=M, e=e)), 5.0)
+    impacts = made(trajectory, "impact")
+    k = np.arange(len(impacts))
+    speeds = V_0 * e**k
+    assert np.array([-jump.before.y[1] for jump in impacts]) == pytest.approx(speeds, rel=1e-12)
+    assert np.array([jump.since for jump in impacts[1:]]) == pytest.approx(2 * M / F * speeds[1:], rel=1e-12)
+    assert 0 <= math.ceil(math.log(1e-12) / math.log(e)) - len(impacts) <= 8
+    (rest,) = made(trajectory, "rest")
+    assert rest.t == pytest.approx(T_0 + 2 * V_0 * M / F * e / (1 - e), rel=1e-11)
+    assert sum(jump.released for jump in impacts) == pytest.approx(F * FELL, rel=1e-12)
+    assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
+    assert (end(trajectory, "g_n"), end(trajectory, "v_n")) == (0.0, 0.0)
+    assert audit(trajectory).energy_error < 1e-12
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+def test_the_tolerance_says_when_rebounds_are_nothing(rtol):
+    trajectory = solve(scene(Mounting(m=M, e=0.5)), 5.0, rtol)
+    (rest,) = made(trajectory, "rest")
+    assert rest.t == pytest.approx(T_0 + 2 * V_0 * M / F, rel=rtol)
+    assert len(made(trajectory, "impact")) <= math.ceil(math.log(0.1 * rtol) / math.log(0.5))
+
+
+def test_rebounds_that_hardly_lose_anything_end_too():
+    trajectory = solve(scene(Mounting(m=M, e=0.99)), 80.0)
+    assert len(made(trajectory, "impact")) < 2600
+    assert made(trajectory, "rest")[0].t == pytest.approx(T_0 + 2 * V_0 * M / F * 99, rel=1e-10)
+
+
+def test_a_thousand_rebounds_without_loss():
+    trajectory = solve(scene(Mounting(m=M, e=1.0)), T_0 + 2 * T_0 * 999.5)
+    speeds = np.array([-jump.before.y[1] for jump in trajectory.jumps])
+    assert len(speeds) == 1000
+    assert speeds == pytest.approx(V_0, rel=1e-12)
+    assert trajectory.jumps[-1].t == pytest.approx(T_0 + 2 * T_0 * 999, rel=1e-11)
+    assert sum(abs(jump.released) for jump in trajectory.jumps) < 1e-12 * F * FELL * 1000
+    assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
+
+
+@pytest.mark.parametrize("w", [0.0, -0.5, 0.3])
+def test_rebounds_on_a_spring(w):
+    """The way between two impacts is an arc of the swing about w, half of one where w is at touch."""
+    k, g_0, e = 100.0, 1.0, 0.8
+    omega = math.sqrt(k / M)
+    trajectory = solve(scene(Mounting(m=M, k=k, e=e), {"w_n": Hold(level=w)}, {"g_n": g_0}), 3.0)
+    t, g, v = 0.0, g_0, 0.0
+    for jump in made(trajectory, "impact")[:8]:
+        swing = math.hypot(g - w, v / omega)
+        angle = math.acos(-w / swing) - math.copysign(math.acos((g - w) / swing), -v)
+        t += angle / omega
+        assert jump.t == pytest.approx(t, rel=1e-11)
+        assert jump.before.y[1] == pytest.approx(-omega * math.sqrt(swing**2 - w**2), rel=1e-10)
+        g, v = 0.0, -e * jump.before.y[1]
+    if w == 0:
+        gaps = np.diff([jump.t for jump in made(trajectory, "impact")])
+        assert gaps == pytest.approx(math.pi / omega, rel=1e-11)
+
+
+def test_a_spring_that_conserves_energy():
+    k = 100.0
+    trajectory = solve(scene(Mounting(m=M, k=k, e=1.0), {"w_n": Hold(level=-0.5)}, {"g_n": 1.0}), 500.0, points=2001)
+    assert len(trajectory.jumps) > 1000
+    energy = trajectory.everywhere["E_total"]
+    assert np.ptp(energy) < 1e-9 * 0.5 * k * 1.5**2
+
+
+@pytest.mark.parametrize("e", [0.0, 0.6])
+def test_dampers_against_another_integrator(e):
+    m, k, c_b, c_g = 4.0, 100.0, 6.0, 1.5
+    drive = Harmonic(mean=-0.3, amplitude=0.4, frequency=0.4)
+    turn = 2 * math.pi * 0.4
+
+    def motion(t, y):
+        w, w_dot = -0.3 + 0.4 * math.sin(turn * t), 0.4 * turn * math.cos(turn * t)
+        return [y[1], (k * (w - y[0]) + c_b * (w_dot - y[1]) - c_g * y[1]) / m]
+
+    def touch(t, y):
+        return y[0]
+
+    touch.terminal, touch.direction = True, -1
+    trajectory = solve(scene(Mounting(m=m, k=k, c_b=c_b, c_g=c_g, e=e), {"w_n": drive}, {"g_n": 0.3}), 3.0)
+    y, t = [0.3, 0.0], 0.0
+    for jump in made(trajectory, "impact")[:6]:
+        found = solve_ivp(motion, (t, t + 3.0), y, "DOP853", events=touch, rtol=1e-13, atol=1e-15)
+        t, speed = found.t[-1], found.y[1, -1]
+        assert jump.t == pytest.approx(t, abs=1e-10)
+        assert jump.before.y[1] == pytest.approx(speed, rel=1e-8)
+        if e == 0:
+            break
+        y = [0.0, -e * speed]
+    assert audit(trajectory).energy_error < 1e-9
+
+
+def test_a_shaken_body_leaves_and_lands_as_it_has_to():
+    """Under F(t) = -a + b sin(w t) the body rests from each landing until the pull returns."""
+    a, b, turn = 10.0, 30.0, math.pi
+    trajectory = solve(scene(Mounting(m=M), {"F_n": Harmonic(mean=-a, amplitude=b, frequency=0.5)}, {"g_n": 0.0}), 20.0)
+    leaves = [jump.t for jump in made(trajectory, "open")]
+    lands = [jump.t for jump in made(trajectory, "impact")]
+    assert len(leaves) > 2
+    first = math.asin(a / b) / turn
+    assert [math.remainder(t - first, 2 * math.pi / turn) for t in leaves] == pytest.approx(
+        len(leaves) * [0], abs=1e-10
+    )
+
+    def gap(t, t_0):
+        tau = t - t_0
+        turned = math.sin(turn * t_0) + turn * tau * math.cos(turn * t_0) - math.sin(turn * t)
+        return (-a * tau**2 / 2 + b / turn**2 * turned) / M
+
+    for left, landed in zip(leaves, lands, strict=False):
+        assert gap(landed, left) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_pull_that_only_reaches_the_pressure_lets_nothing_go():
+    load = Harmonic(mean=-10.0, amplitude=10.0, frequency=0.5)
+    trajectory = solve(scene(Mounting(m=M), {"F_n": load}, {"g_n": 0.1}), 20.0)
+    assert names(trajectory) == ["impact", "rest"]
+
+
+# -- rest and release --------------------------------------------------------------------------------------------------
+
+
+def test_a_ramped_pull_releases_what_rests():
+    """From the moment without pressure on, g = r tau - r / omega sin(omega tau)."""
+    k, rate = 100.0, 0.1
+    omega, tau = math.sqrt(k / M), 3.0
+    loading = {"w_n": Ramp(start=-0.5, rate=rate)}
+    trajectory = solve(scene(Mounting(m=M, k=k), loading, {"g_n": 0.3, "v_n": -1.0}), 5.0 + tau)
+    assert names(trajectory) == ["impact", "rest", "open"]
+    assert made(trajectory, "open")[0].t == pytest.approx(5.0, rel=1e-14)
+    assert end(trajectory, "g_n") == pytest.approx(rate * (tau - math.sin(omega * tau) / omega), rel=1e-10)
+    assert end(trajectory, "v_n") == pytest.approx(rate * (1 - math.cos(omega * tau)), rel=1e-10)
+    rests = (trajectory.result.times > 1.0) & (trajectory.result.times < 5.0)
+    t_n = trajectory.everywhere["t_n"][: len(rests)]
+    assert t_n[rests] == pytest.approx(k * (rate * trajectory.result.times[rests] - 0.5), rel=1e-14)
+
+
+def test_a_load_that_jumps_lets_go_at_once():
+    load = Table(times=[0, 3, 3, 4, 4, 9], values=[-10, -10, 20, 20, -30, -30])
+    trajectory = solve(scene(Mounting(m=M), {"F_n": load}), 9.0)
+    assert names(trajectory) == ["impact", "rest", "open", "impact", "rest"]
+    # It rises for 1 s at 5 m/s^2 and falls at 7.5 m/s^2.
+    height = 2.5
+    speed = math.sqrt(5.0**2 + 2 * 7.5 * height)
+    assert [jump.t for jump in trajectory.jumps[2:4]] == pytest.approx([3.0, 4.0 + (5.0 + speed) / 7.5], rel=1e-13)
+    assert made(trajectory, "impact")[1].released == pytest.approx(M * speed**2 / 2)
+
+
+@pytest.mark.parametrize(
+    ("start", "pull", "expected"),
+    [
+        ({"v_n": 0.0}, -1.0, []),
+        ({"v_n": 0.0}, 0.0, []),
+        ({"v_n": 0.0}, 1.0, []),
+        ({"v_n": 1.0}, 0.0, []),
+        ({"v_n": -1.0}, 0.0, ["impact"]),
+        ({"v_n": -1.0}, 1.0, ["impact"]),
+    ],
+)
+def test_starts_at_touch(start, pull, expected):
+    trajectory = solve(scene(Mounting(m=1.0, e=0.5), {"F_n": Hold(level=pull)}, start | {"g_n": 0.0}), 1.0)
+    assert names(trajectory) == expected
+    speed = start["v_n"] if start["v_n"] >= 0 else 0.5
+    pulled = max(pull, 0.0)
+    assert end(trajectory, "g_n") == pytest.approx(speed + pulled / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("speed", "e"), [(1e-20, 0.5), (1e-15, 0.9), (1e-24, 0.99)])
+def test_rebounds_that_are_nothing_from_the_start(speed, e):
+    trajectory = solve(scene(Mounting(m=M, e=e), PRESSED, {"g_n": 0.0, "v_n": -speed}), 3.0)
+    assert names(trajectory)[-1] == "rest"
+    assert len(trajectory.jumps) < 200
+
+
+@pytest.mark.parametrize("until", [1e-6, 1.0, 1e6])
+def test_rebounds_far_faster_than_the_run(until):
+    """Bodies of a micrometre: the first swing takes 10 ns, whatever the length of the run."""
+    mount = Mounting(m=1e-3, k=1e13, e=0.5)
+    trajectory = solve(scene(mount, {"w_n": Hold(level=-1e-9)}, {"g_n": 1e-9}), until)
+    assert names(trajectory)[-1] == "rest"
+    impacts = made(trajectory, "impact")
+    assert len(impacts) == 40
+    assert impacts[0].t == pytest.approx(math.pi / 3 * 1e-8, rel=1e-11)
+
+
+def test_bonds_hold_once_the_bodies_rest():
+    """They form in the air as well; a rebound is too brief for a traction that has an end."""
+    strength = TensileStrength(t_max=varying(50.0, Proportional(of="phi")), violation="accept")
+    bonding = Interface("T", [BondEnergy(K_0=1e-9)], (), [LinearAffinity(c_r=1e26)], sites=SITES, limits=[strength])
+    load = Table(times=[0, 1, 9], values=[-20, -20, 140])
+    trajectory = solve(scene(Mounting(m=M, e=0.5), {"F_n": load}, {"phi": 0.5}, interface=bonding), 5.0)
+    assert names(trajectory)[-2:] == ["rest", "debond"]
+    debond = trajectory.jumps[-1]
+    phi, g, v, _ = debond.before.y
+    assert (g, v) == (0.0, 0.0)
+    assert -20 + 20 * (debond.t - 1) == pytest.approx(50.0 * phi, rel=1e-9)
+    assert debond.t > 2.0
+    assert all(jump.before.y[0] > 0.5 for jump in made(trajectory, "impact"))
+
+
+def test_a_damper_closes_without_an_impact():
+    c, a, b = 10.0, 10.0, 30.0
+    load = Harmonic(mean=-a, amplitude=b, frequency=0.5)
+    trajectory = solve(scene(Mounting(c_g=c), {"F_n": load}, {"g_n": 0.1}), 3.0)
+    assert names(trajectory) == ["touch", "open"]
+    touch, leaves = trajectory.jumps
+
+    def gap(t):
+        return 0.1 + (-a * t + b / math.pi * (1 - math.cos(math.pi * t))) / c
+
+    assert gap(touch.t) == pytest.approx(0.0, abs=1e-11)
+    assert leaves.t == pytest.approx(2 + math.asin(a / b) / math.pi, rel=1e-12)
+    assert end(trajectory, "g_n") == pytest.approx(gap(3.0) - gap(leaves.t), rel=1e-9)
+
+
+# -- heat --------------------------------------------------------------------------------------------------------------
+
+
+def test_the_heat_of_impacts_is_in_the_bodies():
+    """In the shares of the mounting; the interface and a heat path see none of it at that instant."""
+    given = Scene(
+        bodies(), Interface("T_1"), [path("lower", "upper", 1e-3)], PRESSED, None, 300.0,
+        {"T_1": 300.0, "T_2": 300.0, "g_n": FELL}, normal=Mounting(m=M, e=0.5, beta_1=0.25),
+    )  # fmt: skip
+    trajectory = solve(given, 0.3)
+    (impact,) = trajectory.jumps
+    released = (1 - 0.25) * F * FELL
+    assert impact.released == pytest.approx(released, rel=1e-13)
+    for column, share, capacity in ((2, 0.25, 40.0), (3, 0.75, 25.0)):
+        before, after = impact.before.y[column], impact.after.y[column]
+        stored = capacity / 600.0 * (after**2 - before**2)
+        assert stored == pytest.approx(share * released, rel=1e-10)
+    assert impact.entropy > 0
+
+
+def test_reservoirs_take_the_heat_of_impacts():
+    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=280.0))
+    given = Scene(pair, Interface(), (), PRESSED, None, 300.0, {"g_n": FELL}, normal=Mounting(m=M, e=0.5))
+    trajectory = solve(given, 2.0)
+    assert sum(jump.heat_out for jump in trajectory.jumps) == pytest.approx(F * FELL, rel=1e-12)
+    entropy = sum(jump.entropy for jump in trajectory.jumps)
+    assert entropy == pytest.approx(F * FELL / 2 * (1 / 300 + 1 / 280), rel=1e-12)
+    assert audit(trajectory).energy_error < 1e-12
+
+
+# -- friction ----------------------------------------------------------------------------------------------------------
+
+MU, M_T = 0.3, 5.0
+SLIDING = {"u_t": 0.0, "v": 3.0}
+
+
+def sliding(e, friction=None, tangential=None, **start):
+    interface = Interface("T", frictions=[friction or Coulomb(mu=MU)])
+    held = tangential or Mounting(m=M_T)
+    return scene(Mounting(m=M, e=e), PRESSED, SLIDING | start, interface=interface, tangential=held)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_friction_answers_impacts_by_impulses(e):
+    """What slides loses mu (1 + e) m v / m_t at each impact and nothing between them."""
+    trajectory = solve(sliding(e), 4.0)
+    rubs, impacts = made(trajectory, "rub"), made(trajectory, "impact")
+    v = SLIDING["v"]
+    for impact, rub in zip(impacts, rubs, strict=False):
+        assert rub.before.y[3] == pytest.approx(v, rel=1e-9)
+        left = max(v + MU * (1 + e) * M * impact.before.y[1] / M_T, 0.0)
+        assert rub.after.y[3] == pytest.approx(left, rel=1e-9, abs=1e-14)
+        assert rub.released == pytest.approx(M_T * (v**2 - left**2) / 2, rel=1e-4)
+        v = left
+    assert audit(trajectory).energy_error < 1e-12
+    assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
+    if e < 1:
+        # The impulses of the pressure are those of the load: it stops where it would have under the load at rest.
+        assert made(trajectory, "stop")[0].t == pytest.approx(SLIDING["v"] * M_T / (MU * F), rel=1e-10)
+    else:
+        assert end(trajectory, "v") == 0.0
+        assert len(rubs) == 4
+
+
+@pytest.mark.parametrize("v", [3.0, -3.0])
+def test_adhesion_and_cohesion_have_no_impulse(v):
+    """Finite tractions act between impacts only; both signs of sliding are alike."""
+    friction = MohrCoulomb(mu=MU, t_n_max=5.0, c=2.0)
+    trajectory = solve(sliding(0.5, friction, v=v), 0.25)
+    (rub,) = made(trajectory, "rub")
+    assert abs(rub.before.y[3] - rub.after.y[3]) == pytest.approx(MU * 1.5 * M * V_0 / M_T, rel=1e-12)
+    slowed = abs(v) - (MU * 5.0 + 2.0) / M_T * T_0
+    assert abs(rub.before.y[3]) == pytest.approx(slowed, rel=1e-12)
+
+
+def test_in_two_directions_the_direction_stays():
+    interface = Interface("T", frictions=[Coulomb(mu=MU)])
+    start = {"u_t": 0.0, "u_t2": 0.0, "v": 3.0, "v_2": 4.0}
+    given = scene(Mounting(m=M, e=0.5), PRESSED, start, interface=interface, tangential=Mounting(m=M_T))
+    trajectory = solve(given, 3.0)
+    assert names(trajectory)[-1] == "stop"
+    stop = trajectory.jumps[-1]
+    assert stop.t == pytest.approx(5.0 * M_T / (MU * F), rel=1e-10)
+    assert end(trajectory, "u_t2") == pytest.approx(4 / 3 * end(trajectory, "u_t"), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("friction", "potentials"), [(Coulomb(mu=MU), ()), (Coulomb(mu=MU), [TangentialStiffness(E_t=1e3)])]
+)
+def test_what_slides_without_a_mass_or_behind_a_spring_sticks_for_an_instant(friction, potentials):
+    """No velocity of a mass jumps with the impact, so that friction takes nothing."""
+    held = Mounting(k=100.0, m=5.0) if potentials else Mounting(k=100.0)
+    interface = Interface("T", potentials, frictions=[friction])
+    start = {"u_t": 0.0} | ({"v_t": 1.0} if potentials else {})
+    given = scene(Mounting(m=M, e=0.5), PRESSED | {"w_t": Ramp(rate=0.5)}, start, interface=interface, tangential=held)
+    trajectory = solve(given, 1.0)
+    assert made(trajectory, "impact")
+    assert not made(trajectory, "rub")
+    for jump in made(trajectory, "impact"):
+        assert jump.after.y[2:-1].tolist() == jump.before.y[2:-1].tolist()
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_drive_pays_for_what_impacts_rub(e):
+    """The work of friction is mu times the impulse of the pressure times the velocity, on average that of the load."""
+    interface = Interface("T", frictions=[Coulomb(mu=MU)])
+    given = scene(Mounting(m=M, e=e), PRESSED | {"v": Hold(level=-2.0)}, interface=interface)
+    trajectory = solve(given, 3.0)
+    rub = made(trajectory, "rub")[0]
+    assert rub.released == pytest.approx(MU * (1 + e) * M * V_0 * 2.0, rel=1e-12)
+    accounts = {
+        a.quantity.name: x for a, x in zip(trajectory.model.system.ledger, trajectory.result.ledger, strict=True)
+    }
+    assert accounts["W_coulomb"] == pytest.approx(MU * F * 2.0 * 3.0, rel=1e-10)
+    assert audit(trajectory).energy_error < 1e-11
+
+
+@pytest.mark.parametrize("friction", [Stribeck(mu_s=0.6, mu_k=0.4, v_s=0.5), AnisotropicCoulomb(mu_1=0.2, mu_2=0.4)])
+def test_a_drive_knows_its_velocity(friction):
+    interface = Interface("T", frictions=[friction])
+    loading = PRESSED | {"v": Hold(level=0.6)}
+    loading |= {"v_2": Hold(level=0.8)} if isinstance(friction, AnisotropicCoulomb) else {}
+    trajectory = solve(scene(Mounting(m=M), loading, interface=interface), 0.5)
+    power = {
+        Stribeck: (0.4 + 0.2 * math.exp(-(1.2**2))) * 0.6,
+        AnisotropicCoulomb: 0.2 * 0.6**2 + 0.4 * 0.8**2,
+    }[type(friction)]
+    assert made(trajectory, "rub")[0].released == pytest.approx(power * M * V_0, rel=1e-12)
+
+
+# -- what is refused, and what is said ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("friction", "across", "why"),
+    [
+        (Stribeck(mu_s=0.6, mu_k=0.4, v_s=0.5), {}, "varies with the sliding velocity"),
+        (Coulomb(mu=varying(0.3, Linear(of="v", slope=-0.1))), {}, "varies with the sliding velocity"),
+        (Coulomb(mu=varying(0.3, Linear(of="p", slope=1e-9))), {}, "varies with the pressure"),
+        (AnisotropicCoulomb(mu_1=0.2, mu_2=0.4), {"u_t2": 0.0, "v_2": 1.0}, "differs from direction to direction"),
+    ],
+)
+def test_friction_whose_impulse_is_not_known_is_refused(friction, across, why):
+    with pytest.raises(InputError, match=f"{why}.*Let a potential bear the bodies, such as `penalty`"):
+        assemble(sliding(0.5, friction, **across))
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        (scene(Mounting(m=M, e=0.5), interface=Interface("T", [Penalty(E_n=1e9)])), "the potential of the gap bears"),
+        (scene(Mounting(c_g=1.0, e=0.5)), "nothing with a mass hits anything"),
+        (scene(Mounting(m=M), tangential=Mounting(m=M_T, e=0.5)), "bodies rebound along the normal"),
+    ],
+)
+def test_a_restitution_that_would_change_nothing_is_refused(given, why):
+    with pytest.raises(InputError, match=why):
+        assemble(given)
+
+
+@pytest.mark.parametrize("q", [0.95, 1.0])
+def test_a_conductance_that_keeps_up_with_the_pressure_misses_the_instant(q):
+    """One that grows less than in proportion conducts nothing in no time."""
+    spots = PressureConductance(between=("lower", "upper"), h_c=1e4, H=1e9, q=q)
+    given = Scene(
+        bodies(), Interface("T_1"), [spots], PRESSED, None, 300.0,
+        {"T_1": 300.0, "T_2": 310.0, "g_n": FELL}, normal=Mounting(m=M),
+    )  # fmt: skip
+    warning = (
+        "impacts take no time: what the conductance between lower and upper would do at their pressure is left out."
+    )
+    assert list(assemble(given).warnings) == ([warning] if q == 1 else [])
+
+
+# -- the case, other methods, other codes ------------------------------------------------------------------------------
+
+
+def test_the_case_says_how_often_and_when():
+    solution = surfacechem.load("bouncing-plate").run()
+    assert (solution.accuracy.source, solution.accuracy.error < 1e-9) == ("exact solution bouncing-body", True)
+    found = event_times(solution.trajectory)
+    exact = get("bouncing-body")(m=5.0, e=0.7, F_n=-49.05, g_n_i=1.0, v_n_i=0.0, C=4e3, T_0=300.0, T_i=300.0)
+    assert found["rest"] == pytest.approx([exact.rest_time], rel=1e-11)
+    # Of the impacts those are told that any tolerance has.
+    assert len(found["impact"]) == math.floor(math.log(1e-3) / math.log(0.7)) + 1
+    assert solution.dataset.closed[-1] == 1
+
+
+def test_two_tolerances_have_the_same_events():
+    given = scene(Mounting(m=M, k=300.0, c_b=2.0, e=0.6), {"w_n": Hold(level=-0.1)})
+    first, second = (solve(given, 5.0, rtol) for rtol in (1e-7, 1e-11))
+    assert len(made(first, "impact")) < len(made(second, "impact"))
+    errors, note = apart(first, second)
+    assert note == ""
+    assert errors[EVENTS] < 1e-7
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "scipy-radau", "cvode", "ida"])
+def test_other_methods_see_the_impacts(solver):
+    case = surfacechem.load("bouncing-plate")
+    run = replace(case.case.run, solver=solver, rtol=1e-8)
+    trajectory = case.model.solve(run)
+    assert trajectory.status == "finished"
+    assert names(trajectory) == 59 * ["impact"] + ["rest"]
+    assert trajectory.jumps[-1].t == pytest.approx(2.5586339652845553, rel=1e-5)
+    assert trajectory.result.outputs[:, 0].min() >= 0
+
+
+@pytest.mark.parametrize("e", [0.0, 0.4, 0.99, 1.0])
+@pytest.mark.parametrize("start", [0.0, 2.0, -3.0])
+def test_the_exact_solution_is_one(e, start):
+    """It falls freely between impacts, never below zero, and energy goes into heat."""
+    exact = get("bouncing-body")(m=2.0, e=e, F_n=-20.0, g_n_i=0.5, v_n_i=start, C=1e3, T_0=300.0, T_i=290.0)
+    t = np.linspace(0.0, 3.0, 4001)
+    values = exact.solution(t)
+    assert values["g_n"].min() > -1e-14
+    energy = values["v_n"] ** 2 + 20.0 * values["g_n"] + values["released"]
+    assert energy == pytest.approx(energy[0], rel=1e-12)
+    steps = np.diff(values["v_n"]) / np.diff(t)
+    assert np.all((np.abs(steps + 10.0) < 1e-6) | (steps > -10.0) | (t[1:] >= exact.rest_time))
+    assert exact.solution(exact.first)["v_n"] == pytest.approx(e * math.sqrt(start**2 + 10.0), rel=1e-12)
+
+
+def test_nothing_presses_what_leaves():
+    exact = get("bouncing-body")(m=2.0, e=0.5, F_n=0.0, g_n_i=0.5, v_n_i=-1.0, C=1e3, T_0=300.0, T_i=300.0)
+    assert exact.solution([0.25, 0.5, 1.5])["g_n"] == pytest.approx([0.25, 0.0, 0.5])
+    assert (exact.first, exact.rest_time) == (0.5, math.inf)
+
+
+def test_pressure_begins_at_once_under_a_damper_that_stands_still():
+    """What slides on springs sticks then, up to what the pressure bears; the strength of friction may vary."""
+    strength = varying(10.0, Linear(of="T_c", slope=-1e-3, about=300.0))
+    interface = Interface("T", [TangentialStiffness(E_t=1e3)], frictions=[MohrCoulomb(mu=0.5, t_n_max=strength)])
+    given = scene(
+        Mounting(k=100.0, c_g=20.0), {"w_n": Hold(level=-0.1), "w_t": Ramp(rate=0.5)}, {"u_t": 0.0},
+        interface=interface, tangential=Mounting(k=200.0),
+    )  # fmt: skip
+    trajectory = solve(given, 2.0)
+    touch = made(trajectory, "touch")[0]
+    assert touch.t == pytest.approx(0.2 * math.log(3.0), rel=1e-9)
+    g_t = [s.name for s in trajectory.model.system.states].index("g_t")
+    assert 1e3 * touch.before.y[g_t] == pytest.approx(5.0, rel=1e-3)
+    assert touch.after.y[g_t] == touch.before.y[g_t]
+    assert names(trajectory) == ["slip forward", "touch", "slip forward"]
+    assert 1e3 * trajectory.jumps[-1].after.y[g_t] == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
+    assert audit(trajectory).energy_error < 1e-10
+
+
+def test_a_method_that_passes_an_impact_fails(monkeypatch):
+    monkeypatch.setattr("surfacechem.solve.adapters.stepping.crossings", lambda *_: {})
+    case = surfacechem.load("bouncing-plate")
+    trajectory = case.model.solve(replace(case.case.run, solver="lsoda"))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the method has not seen the gap close; radau does")
+
+
+def test_rebounds_that_use_up_the_steps_are_named():
+    """A damper makes those without loss slower and slower, and there is no end to them."""
+    given = scene(Mounting(m=M, c_g=2.0, e=1.0))
+    trajectory = Model(assemble(given)).solve(Run([0.0, 1e3], max_steps=5000))
+    assert trajectory.status == "failed"
+    assert trajectory.reason.startswith("the number of steps allowed was used up by rebounds")

@@ -1,0 +1,366 @@
+"""Sliding with two components that moves: exact solutions, rotated axes, and independent integrations of the plane."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plane import SPRING, circling, close, events, moments, run, scene
+from scenes import varying
+from scipy.integrate import solve_ivp
+from tables_mechanics import Solved, solve
+
+from surfacechem.errors import InputError
+from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
+from surfacechem.laws.contact import TangentialStiffness
+from surfacechem.laws.factors import Linear
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck, Viscous
+from surfacechem.laws.loading import Harmonic, Ramp
+from surfacechem.laws.rate_and_state import RateAndStateAging
+from surfacechem.model.assemble import assemble
+from surfacechem.references import get
+from surfacechem.scene import Mounting, Stage
+from surfacechem.solve.run import Model
+
+# -- stops of a free mass -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, math.pi / 2, 2.5, math.pi, -1.1])
+def test_a_free_slide_is_straight_and_stops_exactly(angle):
+    e = np.array([math.cos(angle), math.sin(angle)])
+    times = np.linspace(0, 2e-3, 21)
+    solved = run(scene([Coulomb(mu=0.25)], initial={"v": 2 * e[0], "v_2": 2 * e[1]}, p=3e4), times)
+    exact = get("coulomb-stop")(m=5.0, mu=0.25, p=3e4, v_i=2.0, C=100.0, T_0=300.0, T_i=300.0)
+    values = exact.solution(times)
+    for part, (u, v) in zip(e, (("u_t", "v"), ("u_t2", "v_2")), strict=True):
+        assert np.max(np.abs(solved[u] - part * values["u_t"])) < 1e-12 * exact.stop_distance
+        assert np.max(np.abs(solved[v] - part * values["v"])) < 1e-11
+        assert np.all(solved[v][times > exact.stop_time] == 0)
+    close(solved["T"], values["T"], 1e-13)
+    assert events(solved) == ["stop"]
+    assert solved.jumps[0].t == pytest.approx(exact.stop_time, rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.1, 2.0, 5.0])
+def test_a_free_slide_turns_to_the_smoother_direction(ratio):
+    law = AnisotropicCoulomb(mu_1=0.2, mu_2=0.2 * ratio)
+    times = np.linspace(0, 2e-3, 41)
+    solved = run(scene([law], initial={"v": 1.2, "v_2": 1.6}, p=3e4), times)
+    values = {"m": 5.0, "mu_1": 0.2, "mu_2": 0.2 * ratio, "p": 3e4, "v_i": 1.2, "v_2_i": 1.6}
+    exact = get("anisotropic-slide")(C=100.0, T_0=300.0, T_i=300.0, **values)
+    for name, value in exact.solution(times).items():
+        if name in ("u_t", "u_t2", "v", "v_2", "T", "speed"):
+            close(solved[name], value, 1e-10)
+    assert events(solved) == ["stop"]
+    assert solved.jumps[0].t == pytest.approx(exact.stop_time, rel=1e-11)
+    resting = times > exact.stop_time
+    assert np.all(solved["v"][resting] == 0)
+    assert np.all(solved["v_2"][resting] == 0)
+
+
+@pytest.mark.parametrize("kappa", [1.1, 2.5, 8.0])
+def test_a_slide_across_a_dead_load_curves_into_it(kappa):
+    """Across a load F, with kappa = mu p / F, v_2 tan(alpha/2)^-kappa is constant; it is the block on an incline."""
+    m, v, F, p, mu = 5.0, 2.0, 3e3, 3e4, kappa / 10
+    stop = m * v / F * kappa / (kappa**2 - 1)
+    times = np.linspace(0, 1.2 * stop, 25)
+    solved = run(scene([Coulomb(mu=mu)], initial={"v_2": v}, p=p, F_t=F), times)
+    sliding = times < 0.95 * stop
+    alpha = np.arctan2(solved["v_2"], solved["v"])[sliding]
+    close(solved["v_2"][sliding], v * np.tan(alpha / 2) ** kappa, 1e-10)
+    assert solved.jumps[0].t == pytest.approx(stop, rel=1e-9)
+    assert np.all(solved["v"][~sliding][2:] == 0)
+    heat = 0.5 * m * v**2 + F * solved["u_t"][-1]
+    assert solved["heat_coulomb"][-1] == pytest.approx(heat, rel=1e-10)
+
+
+# -- one component, rotated -----------------------------------------------------------------------------------------
+
+FRICTIONS = [
+    [Coulomb(mu=0.4, mu_s=0.6)],
+    [MohrCoulomb(mu=0.3, t_n_max=2e4, c=5e3, mu_s=0.5)],
+    [Stribeck(mu_s=0.6, mu_k=0.4, v_s=1e-3, c_v=1e3)],
+    [Coulomb(mu=0.2, mu_s=0.5), Coulomb(mu=0.1)],
+]
+
+
+@pytest.mark.parametrize("frictions", FRICTIONS, ids=lambda laws: laws[0].name())
+@pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, m=10.0, c_b=100.0, c_g=100.0)], ids=["free", "damped"])
+def test_stick_slip_along_a_line_is_that_of_one_component(frictions, mount):
+    times = np.linspace(0, 1.1, 21)
+    one = run(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3)), times)
+    assert len(one.jumps) > 1
+    for angle in (0.0, 0.7, math.pi):
+        c, s = math.cos(angle), math.sin(angle)
+        both = run(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3 * c), w_t2=Ramp(rate=1e-3 * s)), times)
+        close(both["u_t"] * c + both["u_t2"] * s, one["u_t"], 1e-9)
+        assert np.max(np.abs(both["u_t"] * s - both["u_t2"] * c)) < 1e-12 * one["u_t"].max()
+        close(both["E_total"], one["E_total"], 1e-9)
+        close(both["t_t"] * c + both["t_t2"] * s, one["t_t"], 1e-6)
+        assert moments(both) == pytest.approx(moments(one), rel=1e-9)
+
+
+def test_creep_along_a_line_is_that_of_one_component():
+    times, mount = np.linspace(0, 2, 41), Mounting(k=1e8, c_b=1e6, c_g=1e5)
+    pull = Harmonic(amplitude=2e-3, frequency=1.0)
+    one = run(scene([Coulomb(mu=0.4)], mount, p=1e5, w_t=pull), times)
+    for c, s in ((1.0, 0.0), (0.6, 0.8), (-0.8, 0.6)):
+        w = {x: replace(pull, amplitude=2e-3 * part) for x, part in (("w_t", c), ("w_t2", s))}
+        both = run(scene([Coulomb(mu=0.4)], mount, p=1e5, **w), times)
+        close(both["u_t"] * c + both["u_t2"] * s, one["u_t"], 1e-9)
+        assert [jump.t for jump in both.jumps] == pytest.approx([jump.t for jump in one.jumps], rel=1e-9)
+
+
+@pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, m=10.0, c_b=1e4), Mounting(k=1e8, c_b=1e6)])
+def test_isotropic_sliding_does_not_know_the_axes(mount):
+    a = 0.4
+    c, s = math.cos(a), math.sin(a)
+    times = np.linspace(0, 1, 21)
+
+    def pulled(along: tuple[float, float], across: tuple[float, float]) -> Solved:
+        """Each component of the far field is a sum of two harmonics: the second comes as a traction."""
+        loads = {}
+        for axis, (x, y) in (("t", along), ("t2", across)):
+            loads[f"w_{axis}"] = Harmonic(amplitude=2e-3 * x, frequency=1.0)
+            loads[f"F_{axis}"] = Harmonic(amplitude=1.5e5 * y, frequency=1.3)
+        return run(scene([Coulomb(mu=0.4, mu_s=0.6)], mount, p=1e5, **loads), times)
+
+    straight, turned = pulled((1, 0), (0, 1)), pulled((c, -s), (s, c))
+    assert len(straight.jumps) > 1
+    for x, y in (("u_t", "u_t2"), ("v", "v_2"), ("t_t", "t_t2")):
+        size = np.hypot(straight[x], straight[y]).max()
+        tolerance = 1e-8 if x == "u_t" else 1e-6
+        assert np.max(np.abs(straight[x] - (c * turned[x] + s * turned[y]))) <= tolerance * size
+        assert np.max(np.abs(straight[y] - (c * turned[y] - s * turned[x]))) <= tolerance * size
+    assert [j.t for j in straight.jumps] == pytest.approx([j.t for j in turned.jumps], rel=1e-8)
+
+
+# -- beginning on the ellipse, and independent integrations ---------------------------------------------------------
+
+
+def test_sticking_gives_way_on_the_ellipse():
+    law, (k, x, y) = AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (1e8, 1e-3, 2e-3)
+    onset = 1e5 / (k * math.hypot(x / 0.2, y / 0.5))
+    times = [0.0, onset * (1 - 1e-6), onset * (1 + 1e-4)]
+    solved = run(scene([law], SPRING, p=1e5, w_t=Ramp(rate=x), w_t2=Ramp(rate=y)), times)
+    assert events(solved) == ["slip"]
+    assert solved.jumps[0].t == pytest.approx(onset, rel=1e-13)
+    assert solved["v"][1] == solved["v_2"][1] == solved["u_t2"][1] == 0
+    assert solved["t_t"][1] == pytest.approx(k * x * times[1], rel=1e-13)
+    assert solved["t_t2"][1] == pytest.approx(k * y * times[1], rel=1e-13)
+    assert solved["v_2"][2] / solved["v"][2] == pytest.approx(y / 0.5 / (x / 0.2), rel=1e-2)
+
+
+def cartesian(mu, m, k, c, far, p=1e5):
+    """Right-hand side of the plane in components of the velocity, for speeds that do not vanish."""
+
+    def rates(t, state):
+        u, v = state[:2], state[2:]
+        w, w_dot = far(t)
+        force = k * (w - u) + c * (w_dot - v) - p * np.asarray(mu) * v / np.linalg.norm(v)
+        return np.concatenate([v, force / m])
+
+    return rates
+
+
+@pytest.mark.parametrize(
+    ("law", "mu"),
+    [
+        (Coulomb(mu=0.4), (0.4, 0.4)),
+        (AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (0.2, 0.5)),
+        (AnisotropicCoulomb(mu_1=0.4, mu_2=0.1), (0.4, 0.1)),
+    ],
+    ids=["isotropic", "rough across", "smooth across"],
+)
+def test_dragging_in_a_circle(law, mu):
+    n, (w_i, w_dot) = np.array([0.9, 0.4]) / math.hypot(0.9, 0.4), circling(0.0)
+    u, v = w_i - 1e5 * np.asarray(mu) * n / 1e8, n * np.linalg.norm(w_dot)
+    mount, start = Mounting(k=1e8, m=10.0, c_b=1e4), {"u_t": u[0], "u_t2": u[1], "v": v[0], "v_2": v[1]}
+    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
+    times = np.linspace(0, 0.2, 21)
+    solved = run(scene([law], mount, start, p=1e5, **w), times)
+    assert not events(solved)
+    state = [*u, *v]
+    rates = cartesian(mu, 10.0, 1e8, 1e4, circling)
+    found = solve_ivp(rates, (0, 0.2), state, "Radau", t_eval=times, rtol=1e-12, atol=1e-15).y
+    for name, value in zip(("u_t", "u_t2", "v", "v_2"), found, strict=True):
+        close(solved[name], value, 2e-8)
+
+
+def test_a_block_on_a_conveyor_comes_to_rest_on_it():
+    """Held by a spring to the ground, thrown sideways onto a belt: relative to the belt the ground moves."""
+    m, k, mu, p, belt = 2.0, 1e4, 0.3, 1e3, 0.5
+    times = np.linspace(0, 0.15, 151)
+    far = {"w_t": Ramp(rate=-belt), "w_t2": 0.0}
+    solved = run(scene([Coulomb(mu=mu)], Mounting(k=k, m=m), {"v": -belt, "v_2": 0.4}, p=p, **far), times)
+
+    def ground(t):
+        return np.array([-belt * t, 0.0]), np.array([-belt, 0.0])
+
+    rates = cartesian((mu, mu), m, k, 0.0, ground, p)
+
+    def slow(t, state):
+        return np.linalg.norm(state[2:]) - 1e-7
+
+    slow.terminal = True
+    start = [0.0, 0.0, -belt, 0.4]
+    found = solve_ivp(rates, (0, 0.15), start, "DOP853", rtol=1e-12, atol=1e-14, events=slow, dense_output=True)
+    stop = solved.jumps[0].t
+    assert events(solved)[0] == "stop"
+    pull = np.linalg.norm(k * (ground(stop)[0] - found.y[:2, -1]))
+    assert stop == pytest.approx(found.t[-1] + 1e-7 * m / (mu * p - pull), rel=1e-6)
+    sliding = times < 0.98 * stop
+    for name, value in zip(("u_t", "u_t2", "v", "v_2"), found.sol(times[sliding]), strict=True):
+        close(solved[name][sliding], value, 1e-8)
+    after = (times > stop) & (times < solved.jumps[1].t)
+    assert np.all(solved["v"][after] == 0)
+    assert np.all(solved["v_2"][after] == 0)
+
+
+def test_creep_in_a_circle_follows_the_pull():
+    k, c, mu, p = 1e8, 1e6, 0.3, 1e5
+    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
+    times = np.linspace(0, 1, 21)
+    solved = run(scene([Coulomb(mu=mu)], Mounting(k=k, c_g=c), p=p, **w), times)
+
+    def rates(t, u):
+        pull = k * (circling(t)[0] - u)
+        size = np.linalg.norm(pull)
+        return pull / c * max(1 - mu * p / size, 0)
+
+    found = solve_ivp(rates, (0, 1), [0.0, 0.0], "DOP853", t_eval=times, rtol=1e-12, atol=1e-16).y
+    close(solved["u_t"], found[0], 1e-8)
+    close(solved["u_t2"], found[1], 1e-8)
+
+
+def test_what_bears_nothing_across_slides_there():
+    """A block on rails: friction along, none across, where the spring swings it for good."""
+    law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.0)
+    times, omega = np.linspace(0, 0.01, 51), math.sqrt(1e8 / 10)
+    solved = run(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=1e-4, w_t2=0.0), times)
+    assert solved["u_t"][-1] > 0  # what slides across is not held along
+    free = run(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=0.0, w_t2=0.0), times)
+    close(free["u_t2"], 0.1 / omega * np.sin(omega * times), 1e-8)
+    assert np.all(free["u_t"] == 0)
+
+
+def test_bonds_break_as_sliding_begins_in_the_plane():
+    law = BondedCoulomb(mu=0.3, mu_b=0.7, mu_ub=0.3)
+    loading = {"w_t": Ramp(rate=3e-3), "w_t2": Ramp(rate=4e-3), "p": 1e5, "phi": 1.0}
+    solved = run(scene([law], SPRING, **loading), [0.0, 0.2])
+    assert solved.of("slip")[0].t == pytest.approx(0.7 * 1e5 / 1e8 / 5e-3, rel=1e-6)
+
+
+# -- smooth laws ----------------------------------------------------------------------------------------------------
+
+
+def test_films_relax_at_their_own_rates():
+    k, g, times = 1e6, 1e-6, np.linspace(0, 1, 21)
+    for law, (along, across) in (
+        (AnisotropicViscous(eta_1=0.5, eta_2=0.2), (0.5, 0.2)),
+        (Viscous(eta=0.4), (0.4, 0.4)),
+    ):
+        solved = run(scene([law], Mounting(k=k), g_n=g, w_t=1e-3, w_t2=-2e-3), times)
+        close(solved["u_t"], 1e-3 * (1 - np.exp(-k * g / along * times)))
+        close(solved["u_t2"], -2e-3 * (1 - np.exp(-k * g / across * times)))
+        close(solved["t_t2"], k * (-2e-3 - solved["u_t2"]), 1e-9)
+
+
+def test_two_oscillators_of_one_mass():
+    """Free vibration with viscous damping, along and across on springs of their own."""
+    m, g, times = 10.0, 1e-6, np.linspace(0, 0.1, 31)
+    along, across = Mounting(k=1e6, m=m, c_g=200.0), Mounting(k=3e6, c_g=50.0)
+    law = AnisotropicViscous(eta_1=1e-4, eta_2=3e-4)
+    solved = run(scene([law], along, {"v": 1.0, "u_t2": 2e-3}, across, g_n=g, w_t=0.0, w_t2=0.0), times)
+    for u, k, c, u_i, v_i in (("u_t", 1e6, 300.0, 0.0, 1.0), ("u_t2", 3e6, 350.0, 2e-3, 0.0)):
+        decay = c / (2 * m)
+        omega = math.sqrt(k / m - decay**2)
+        wave = u_i * np.cos(omega * times) + (v_i + decay * u_i) / omega * np.sin(omega * times)
+        close(solved[u], np.exp(-decay * times) * wave, 1e-8)
+    assert solved["E_kinetic_t2"][0] == 0
+    assert solved["E_spring_t2"][0] == pytest.approx(0.5 * 3e6 * 4e-6, rel=1e-14)
+
+
+def test_a_dead_load_drifts_on_a_film():
+    times = np.linspace(0, 1, 11)
+    law = AnisotropicViscous(eta_1=0.5, eta_2=0.2)
+    solved = run(scene([law], None, g_n=1e-6, F_t=5e5, F_t2=Ramp(rate=4e5)), times)
+    close(solved["u_t"], 5e5 * 1e-6 / 0.5 * times, 1e-12)
+    close(solved["u_t2"], 4e5 * 1e-6 / 0.2 * times**2 / 2, 1e-12)
+    close(solved["W_t2"], 4e5**2 * 1e-6 / 0.2 * times**3 / 3, 1e-10)
+
+
+# -- programmes, values, prescribed velocities ----------------------------------------------------------------------
+
+
+def test_a_programme_turns_the_pull():
+    stages = (Stage("along", {"w_t": 1e-3}, duration=0.3), Stage("across", {"w_t2": 1e-3}, event="slip"))
+    stages += (Stage("rest", {}),)
+    solved = run(scene([Coulomb(mu=0.4, mu_s=0.6)], SPRING, p=1e5, programme=stages), [0.0, 0.4, 2.0])
+    onset = 0.3 + math.sqrt(0.6**2 - 0.3**2)
+    assert events(solved) == ["end of along", "slip", "stop"]
+    assert solved.jumps[1].t == pytest.approx(onset, rel=1e-12)
+    # It springs along the pull, at 60 degrees to the first stage, until the spring pulls as much less as it did more.
+    assert (solved["t_t"][2], solved["t_t2"][2]) == pytest.approx((1e4, math.sqrt(3) * 1e4), rel=1e-9)
+    assert np.all(solved["v_2"][:2] == 0)
+
+
+def test_initial_velocities_can_be_changed():
+    model = Model(assemble(scene([Coulomb(mu=0.25)], initial={"v": 1.0}, p=3e4)))
+    assert "initial.v_2" not in model.system.changeable  # one direction only
+    model = Model(assemble(scene([Coulomb(mu=0.25)], initial={"v": 1.0, "v_2": 1.0}, p=3e4)))
+    solved = solve(model, [0.0, 1e-4, 2e-3], {"initial.v": -1.2, "initial.v_2": 1.6})
+    assert (solved["v"][0], solved["v_2"][0]) == pytest.approx((-1.2, 1.6), rel=1e-15)
+    assert solved.jumps[0].t == pytest.approx(5.0 * 2.0 / 7500, rel=1e-12)
+
+
+def test_isotropic_friction_opposes_a_prescribed_velocity():
+    times = [0.0, 1.0]
+    dry = run(scene([Coulomb(mu=0.3)], None, p=1e2, v=3.0, v_2=-4.0), times)
+    assert (dry["t_coulomb"][0], dry["t_2_coulomb"][0]) == pytest.approx((18.0, -24.0), rel=1e-14)
+    assert dry["D_coulomb"][-1] == pytest.approx(150.0, rel=1e-14)
+    film = run(scene([Viscous(eta=0.5)], None, g_n=1e-2, v=3.0, v_2=-4.0), times)
+    assert film["D_viscous"][-1] == pytest.approx(50 * 25.0, rel=1e-14)
+
+
+REFUSED = [
+    (scene([Coulomb(mu=0.3)], None, p=1, F_t=1, F_t2=1), "needs a stiffness along both"),
+    (
+        scene([Coulomb(mu=0.3)], Mounting(k=1e6, c_b=1.0), None, Mounting(k=1e6), p=1, w_t=0, w_t2=0),
+        "something resists sliding along one direction in proportion to its rate, and nothing does along the other",
+    ),
+    (
+        scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6), Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), p=1, w_t=0, w_t2=0),
+        "with a static limit of its own friction lets the springs jump",
+    ),
+    (
+        scene([Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), None, Mounting(k=2e6), p=1, w_t=0, w_t2=0),
+        "differ from direction to direction nothing says which way",
+    ),
+    (scene([Coulomb(mu=0.3)], SPRING, p=1, w_t=0, v_2=1), "v_2 is prescribed, but a mounting moves the interface"),
+    (scene([Coulomb(mu=0.3)], SPRING, transverse=Mounting(k=1.0, m=1.0), p=1), "a mass is the same in every direction"),
+    (scene([Coulomb(mu=0.3)], None, transverse=Mounting(k=1.0), p=1, v=1), "stands beside one along"),
+    (scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6)], SPRING, p=1, w_t=0), "Prescribe `w_t2` under `loading`"),
+    (
+        scene([Coulomb(mu=0.3)], SPRING, potentials=[TangentialStiffness(E_t=1e9)], p=1, w_t=0, w_t2=0),
+        "but the elastic gap g_t of its potential has one",
+    ),
+    (
+        scene(
+            [RateAndStateAging(mu_0=0.6, a=0.01, b=0.02, L=1e-5, v_0=1e-6)], SPRING, {"theta": 1.0}, p=1, w_t=0, w_t2=0
+        ),
+        "remembers sliding along one direction",
+    ),
+    (
+        scene([Coulomb(mu=varying(0.3, Linear(of="v", slope=1.0)))], SPRING, p=1, w_t=0, w_t2=0),
+        "mu varies with one component of the velocity",
+    ),
+    (scene([AnisotropicViscous(eta_1=1.0, eta_2=1.0)], None, g_n=1e-6, v=1), "nothing evolves or prescribes it"),
+]
+
+
+@pytest.mark.parametrize(("refused", "reason"), REFUSED, ids=[reason[:30] for _, reason in REFUSED])
+def test_what_is_refused_in_two_directions(refused, reason):
+    with pytest.raises(InputError) as error:
+        assemble(refused)
+    assert reason in str(error.value)

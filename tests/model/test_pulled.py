@@ -1,0 +1,231 @@
+"""The work of a prescribed force belongs to the affinity of pairs of rates, as their distances define it."""
+
+import math
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.contracts.terms import RateLaw
+from surfacechem.errors import InputError
+from surfacechem.laws import laws
+from surfacechem.mechanism import load_mechanism
+from surfacechem.quantities import BOLTZMANN
+from surfacechem.studies.mechanisms.rate_tables import Curves
+
+KT = BOLTZMANN * 298.15
+LENGTH = 3.8e-9  # 0.4 nm + 3.4 nm
+
+MECHANISM = """
+units: {{length: m, quantity: mol, activation-energy: kJ/mol}}
+phases:
+- {{name: clutch, thermo: ideal-surface, kinetics: surface, species: [free, a, b, c], reactions: all,
+   site-density: 1e-10 mol/m^2}}
+species:
+- {{name: free, composition: {{}}, thermo: {{model: constant-cp, h0: 0, s0: 0, cp0: 0}}}}
+- {{name: a, composition: {{}}, thermo: {{model: constant-cp, h0: 0, s0: 0, cp0: 0}}}}
+- {{name: b, composition: {{}}, thermo: {{model: constant-cp, h0: 0, s0: 0, cp0: 0}}}}
+- {{name: c, composition: {{}}, thermo: {{model: constant-cp, h0: 0, s0: 0, cp0: 0}}}}
+reactions:
+{reactions}
+"""
+STEP = "- {{equation: {0} => {1}, type: Bell, rate-constant: {{A: {2}, b: 0, Ea: 0}}, x-beta: {3} nm}}\n"
+CASE = """
+bodies:
+  lower: {{temperature: 298.15 K}}
+  upper: {{temperature: 298.15 K}}
+interface: {{temperature: 298.15 K, mechanism: {{file: bonds.yaml, bonds: [a, b, c]}}}}
+loading: {{f: {force}}}
+initial: {{coverages: {{a: 1}}}}
+run: {{until: 1 s}}
+"""
+
+
+def pairs(folder, *steps, force="10 pN", reversible="", duplicate=False):
+    """A case of pairs of rates: species, species, rates at no force, distances [nm]."""
+    mark = ", duplicate: true}" if duplicate else "}"
+    lines = [STEP.format(a, b, f"{k} 1/s", x).replace(" nm}", " nm" + mark) for a, b, k, x in steps]
+    (folder / "bonds.yaml").write_text(MECHANISM.format(reactions="".join(lines) + reversible))
+    path = folder / "case.yaml"
+    path.write_text(CASE.format(force=force))
+    return surfacechem.load(path)
+
+
+def both(a, b, x_f, x_r, k_f=1.0, k_r=1.0):
+    return (a, b, k_f, x_f), (b, a, k_r, x_r)
+
+
+@pytest.mark.parametrize("force", ["0 pN", "8 pN", "30 pN"])
+def test_vinculin_keeps_detailed_balance_under_any_force(force):
+    solution = surfacechem.load("vinculin-catch-bond", {"loading.f": force}).run()
+    data = solution.dataset
+    np.testing.assert_allclose(data["departure_R3_R4"], math.log(6.1 / 43) + 16.24 / 8.314462618, atol=1e-10)
+    assert solution.audit.violations == ()
+    assert all(verdict.consistent for verdict in solution.verdicts)
+
+
+def test_the_force_works_along_the_distances():
+    data = surfacechem.load("vinculin-catch-bond", {"run.outputs": 4001}).run().dataset.isel(time=slice(1, None))
+    rate = data["R_R3"] - data["R_R4"]
+    f, T = 8e-12, 298.15
+    entropy = -16.24 / 6.02214076e23
+    affinity = f * LENGTH - (-T * entropy + KT * np.log(data["theta_strong_s"] / data["theta_weak_s"]))
+    np.testing.assert_allclose(data["sigma_R3_R4"], rate * affinity / T, rtol=1e-9)
+    work = np.trapezoid(f * LENGTH * rate, data["time"])
+    assert float(data["W_f"][-1] - data["W_f"][0]) == pytest.approx(float(work), rel=1e-4)
+
+
+def test_a_ramp_that_jumps_needs_no_work_of_its_own(tmp_path):
+    force = "{table: {times: [0 s, 0.5 s, 0.5 s, 1 s], values: [0 pN, 5 pN, 20 pN, 20 pN]}}"
+    solution = pairs(tmp_path, *both("a", "b", 0.3, -0.7), force=force).run()
+    assert solution.audit.energy_error < 1e-10
+    assert solution.audit.violations == ()
+    assert float(np.abs(solution.dataset["departure_R1_R2"]).max()) < 1e-12
+
+
+def test_an_inconsistent_pair_is_found_with_the_size_of_its_error(tmp_path):
+    solution = pairs(tmp_path, *both("a", "b", 0.3, -0.7, k_f=10.0)).run()
+    (verdict,) = solution.verdicts
+    assert verdict.low == pytest.approx(math.log(10.0), abs=1e-12)
+    assert verdict.high == pytest.approx(math.log(10.0), abs=1e-12)
+    assert "by a factor exp(2.3) at most" in str(verdict)
+
+
+def test_around_a_cycle_distances_have_to_close(tmp_path):
+    """Three pairs of 1, 1 and -2 nm close; of 1, 1 and 1 nm they do not, by 3 nm that the three share."""
+    closed = [*both("a", "b", 0.4, -0.6), *both("b", "c", 0.5, -0.5), *both("c", "a", -1.0, 1.0)]
+    open_ones = [*closed[:4], *both("c", "a", 0.5, -0.5)]
+    for steps, expected in ((closed, 0.0), (open_ones, 1e-9 * 10e-12 / KT)):
+        data = pairs(tmp_path, *steps).run().dataset
+        for label in ("R1_R2", "R3_R4", "R5_R6"):
+            np.testing.assert_allclose(data[f"departure_{label}"], expected, atol=1e-10)
+
+
+def test_a_reaction_whose_reverse_knows_no_force_keeps_its_equilibrium(tmp_path):
+    """Between a and b one reversible reaction says that no length changes, so a pair that says otherwise departs."""
+    reversible = "- {equation: a <=> b, duplicate: true, rate-constant: {A: 2 1/s, b: 0, Ea: 0}}\n"
+    data = pairs(tmp_path, *both("a", "b", 0.4, -0.6), reversible=reversible, duplicate=True).run().dataset
+    np.testing.assert_allclose(data["departure_R1_R2"], 1e-9 * 10e-12 / KT, atol=1e-10)
+
+
+def test_ruptures_that_nothing_undoes_take_no_work(tmp_path):
+    data = pairs(tmp_path, ("a", "free", 1.0, 0.5)).run().dataset
+    assert "W_f" not in data
+
+
+def test_the_sheet_of_a_mechanism_says_the_same():
+    curves = Curves(load_mechanism("vinculin.yaml"))
+    (pair,) = curves.pairs
+    values = curves.departure(pair, np.array(298.15), np.linspace(0, 40e-12, 9))
+    np.testing.assert_allclose(values, math.log(6.1 / 43) + 16.24 / 8.314462618, atol=1e-9)
+    K = curves.log_equilibrium("R3", np.array(298.15), np.array([0.0, 1e-11]))
+    assert K[1] - K[0] == pytest.approx(1e-11 * LENGTH / KT, rel=1e-9)
+    free = curves.log_equilibrium("R2", np.array(298.15), np.array([0.0, 1e-11]))
+    assert free[1] == free[0]
+
+
+# -- laws of one kind of bond -----------------------------------------------------------------------------------------
+
+SITES = 1e16
+EPSILON = 4e-21
+HELD = """
+title: bonds under a prescribed load
+bodies: {{a: {{temperature: 300 K}}, b: {{temperature: 300 K}}}}
+interface:
+  temperature: 300 K
+  sites: 1e16 1/m^2
+  potential: [{{lattice-gas: {{epsilon: 4e-21 J}}}}{springs}]
+  bonding: [{laws}]
+{load}
+initial: {{phi: 0.6}}
+run: {{until: {until}}}
+"""
+RATIO = math.exp(EPSILON / (BOLTZMANN * 300.0))
+ELL = -0.7e-9
+BELL = f"{{bell: {{k_off: 1 1/s, x_off: 0.4 nm, k_on: {RATIO!r} 1/s, x_on: -0.3 nm}}}}"
+REVERSIBLE = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm, x_on: -0.3 nm}}"
+BESIDE = f"{REVERSIBLE}, {{linear-affinity: {{c_r: 1e20 1/J/s}}}}"
+
+
+PROGRAMME = "programme: [{{pull: {{f: 1 pN/s, for: {0}.5 s}}}}]"
+
+
+def held(folder, laws, load="loading: {f: 5 pN}", until="60 s", springs=""):
+    path = folder / "held.yaml"
+    path.write_text(HELD.format(laws=laws, load=load, until=until, springs=springs))
+    return surfacechem.load(path)
+
+
+def test_every_law_that_says_a_length_is_tried_below():
+    """A new law that a force drives to another equilibrium joins the list."""
+    assert {law.name() for law in laws(RateLaw).values() if "length" in vars(law)} == {"bell", "reversible-bell"}
+
+
+@pytest.mark.parametrize("law", [BELL, REVERSIBLE, BESIDE])
+@pytest.mark.parametrize("load", ["loading: {{f: {0} pN}}", "loading: {{t_n: {0} kPa}}", PROGRAMME])
+def test_the_equilibrium_feels_the_work_of_the_force(law, load, tmp_path):
+    """d ln(phi / (1 - phi)) / df = l / k_B T, with the force or the share of a traction that each bond bears."""
+    found = []
+    for level in (0, 4, 10):
+        solution = held(tmp_path, law, load.format(level), "90 s").run()
+        last = solution.dataset.isel(time=-1)
+        force = float(last["f"])
+        found.append((force, math.log(last["phi"] / (1 - last["phi"]))))
+        assert solution.audit.violations == ()
+        assert solution.audit.energy_error < 1e-9
+    for force, log_ratio in found:
+        assert log_ratio == pytest.approx((EPSILON + force * ELL) / (BOLTZMANN * 300.0), abs=1e-7)
+    assert found[2][0] > found[1][0] > 0
+
+
+def test_bells_rates_depart_from_no_equilibrium_under_a_force(tmp_path):
+    data = held(tmp_path, BELL, "loading: {f: {ramp: {rate: 1 pN/s}}}", "10 s").run().dataset
+    np.testing.assert_allclose(data["departure_bell"], 0.0, atol=1e-12)
+    rate, force = data["R_bell"], data["f"]
+    work = np.trapezoid(rate * force * ELL, data["time"])
+    assert float(data["W_f"][-1]) == pytest.approx(float(work), rel=1e-3)
+
+
+def test_both_ways_of_bell_run_alike(tmp_path):
+    """The reverse that follows from the potential and the force is that of the distance of formation."""
+    both = [held(tmp_path, law, "loading: {f: 8 pN}", "1 s").run().dataset["phi"] for law in (BELL, REVERSIBLE)]
+    np.testing.assert_allclose(both[0], both[1], rtol=1e-9)
+
+
+def test_without_a_length_a_prescribed_force_is_refused(tmp_path):
+    law = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm}}"
+    for load in ("loading: {f: 1 pN}", "loading: {f: {ramp: {rate: 0}}}", "loading: {t_n: 1 kPa}"):
+        with pytest.raises(
+            InputError, match=r"held.yaml:8: .* same equilibrium under any prescribed force.* Give `x_on`"
+        ):
+            held(tmp_path, law, load).run()
+
+
+def test_a_force_that_a_case_holds_at_zero_needs_no_length(tmp_path):
+    """It does no work, so that the equilibrium is that of the potential; another force is refused all the same."""
+    law = "{reversible-bell: {k_off: 1 1/s, x_off: 0.4 nm}}"
+    case = held(tmp_path, law, "loading: {f: 0 pN}")
+    length_given = held(tmp_path, REVERSIBLE, "loading: {f: 0 pN}").run().dataset["phi"]
+    np.testing.assert_allclose(case.run().dataset["phi"], length_given, rtol=1e-9)
+    for change in (lambda: case.run({"loading.f": "5 pN"}), lambda: case.sweep({"loading.f": ["0 pN", "5 pN"]})):
+        with pytest.raises(InputError, match="same equilibrium under any prescribed force"):
+            change()
+
+
+def test_a_length_beside_springs_is_refused(tmp_path):
+    with pytest.raises(InputError, match="the potential says what the force does to the equilibrium; leave it out"):
+        held(tmp_path, REVERSIBLE, "loading: {g_n: 1 nm}", springs=", {bond-springs: {k_b: 1e-3 N/m}}").run()
+
+
+def test_a_reversible_bell_reaction_under_a_prescribed_force_is_refused(tmp_path):
+    reversible = "- {equation: a <=> b, type: Bell, rate-constant: {A: 2 1/s, b: 0, Ea: 0}, x-beta: 0.4 nm}\n"
+    case = pairs(tmp_path, reversible=reversible)
+    with pytest.raises(InputError, match=r"same equilibrium under any prescribed force.* two reactions with `=>`"):
+        case.run()
+
+
+def test_sweeps_name_the_mechanism_as_the_case_does(tmp_path):
+    reversible = "- {equation: a <=> b, type: Bell, rate-constant: {A: 2 1/s, b: 0, Ea: 0}, x-beta: 0.4 nm}\n"
+    case = pairs(tmp_path, reversible=reversible, force="0 pN")
+    with pytest.raises(InputError, match=r"^bonds\.yaml:\d+: "):
+        case.sweep({"loading.f": ["0 pN", "5 pN"]})

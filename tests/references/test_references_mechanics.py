@@ -1,0 +1,344 @@
+"""The exact solutions of mechanics against every row of their tables, their own equations, and extreme parameters."""
+
+import json
+import math
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_references import assert_exact, effect_of_rounding
+
+from surfacechem.errors import InputError
+from surfacechem.references import get
+from surfacechem.references._energy import ConstantCapacity, QuadraticEnergy
+
+FOLDER = Path(__file__).parent
+EPS = np.finfo(float).eps
+FRICTION = {"m": 10.0, "k": 1e8, "t_s": 6e4, "t_k": 4e4}
+REBONDING = {"m": 10.0, "k": 1e8, "p": 1e5, "mu_b": 0.7, "mu_ub": 0.4, "mu_k": 0.4, "tau": 2.0}
+ZONE = {"t_max": 1e6, "g_0": 1e-8}
+FLATS = {"n_1": 2e19, "n_2": 3e19, "psi_0": 4e-21, "g_0": 3e-10}
+
+
+def read(name: str) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Columns of a table, those of words as words, and its scalars."""
+    content = json.loads((FOLDER / f"{name}.json").read_text())
+    columns = {}
+    for column, entries in zip(content["columns"], zip(*content["rows"], strict=True), strict=True):
+        try:
+            columns[column] = np.array(entries, dtype=float)
+        except ValueError:
+            columns[column] = np.array(entries)
+    return columns, {key: float(value) for key, value in content["expect"].items()}
+
+
+def rows(name: str) -> list[dict[str, float | str]]:
+    columns, _ = read(name)
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+class TestFriction:
+    def test_coulomb_stop(self):
+        columns, expect = read("g_coulomb_stop")
+        slider = get("coulomb-stop")(m=5.0, mu=0.25, p=3e4, v_i=2.0, C=100.0, T_0=300.0, T_i=300.0)
+        exact = slider.solution(columns["t"])
+        # The velocity is a difference near the stop: rounding of t moves it by its slope.
+        assert_exact(exact["v"], columns["v"], absolute=4 * EPS * 2.0)
+        assert_exact(exact["u_t"], columns["x"])
+        assert_exact(exact["T"], columns["T"])
+        assert (slider.stop_time, slider.stop_distance) == pytest.approx(
+            (expect["t_stop"], expect["x_stop"]), rel=1e-15
+        )
+        assert np.all(exact["v"][columns["t"] > expect["t_stop"]] == 0.0)
+        assert_exact(exact["heat"][-1], 0.5 * 5.0 * 2.0**2)
+
+    def test_stick_slip_motion(self):
+        columns, expect = read("g_stickslip_motion")
+        slider = get("stick-slip")(**FRICTION, V=1e-3)
+        exact = slider.solution(columns["t"])
+        assert np.all((exact["v"] == 0.0) == (columns["phase"] == "stick"))
+        for column, quantity in {"x": "u_t", "xdot": "v", "spring_traction": "spring_traction", "heat": "heat"}.items():
+            rounding = 4 * effect_of_rounding(slider, columns["t"], quantity)
+            assert np.all(np.abs(exact[quantity] - columns[column]) <= 1e-12 * np.abs(columns[column]) + rounding)
+        for name, value in expect.items():
+            assert getattr(slider, {"t_first_onset": "onset_time"}.get(name, name)) == pytest.approx(value, rel=1e-14)
+
+    @pytest.mark.parametrize("row", rows("g_stickslip_period_vs_V"), ids=lambda row: f"{row['V']:g}")
+    def test_stick_slip_over_decades_of_speed(self, row):
+        slider = get("stick-slip")(**FRICTION, V=float(row["V"]))
+        for name in ("period", "slip_time", "v_max", "heat_per_cycle"):
+            assert getattr(slider, name) == pytest.approx(row[name], rel=1e-14)
+
+    def test_mean_traction_is_that_of_sliding(self):
+        slider = get("stick-slip")(**FRICTION, V=0.3)
+        nodes, weights = np.polynomial.legendre.leggauss(60)
+        total, start = 0.0, slider.onset_time
+        for span in (slider.slip_time, slider.stick_time):
+            t = start + 0.5 * span * (1.0 + nodes)
+            total += 0.5 * span * float(weights @ slider.solution(t)["spring_traction"])
+            start += span
+        assert total / slider.period == pytest.approx(4e4, rel=1e-13)
+
+    @pytest.mark.parametrize("V", [1e-3, 0.3, 100.0])
+    def test_stick_slip_solves_newtons_law(self, V):
+        """Mass times acceleration is spring minus friction, while the spring follows V t - slip."""
+        slider = get("stick-slip")(**FRICTION, V=V)
+        t = slider.onset_time + slider.slip_time * np.linspace(0.1, 0.9, 9)
+        h = 1e-3 * slider.slip_time
+        before, now, after = (slider.solution(t + step) for step in (-h, 0.0, h))
+        acceleration = (after["v"] - before["v"]) / (2 * h)
+        scale = np.max(np.abs(now["spring_traction"])) + 4e4
+        assert_exact(10.0 * acceleration, now["spring_traction"] - 4e4, absolute=1e-5 * scale)
+        assert_exact(now["spring_traction"], 1e8 * (V * t - now["u_t"]), absolute=1e-8 * scale)
+
+    def test_equal_friction_never_rests(self):
+        slider = get("stick-slip")(m=10.0, k=1e8, V=1e-3, t_s=4e4, t_k=4e4)
+        assert slider.stick_time == 0.0
+        assert slider.slip_time == pytest.approx(2 * math.pi * math.sqrt(1e-7), rel=1e-15)
+        with pytest.raises(InputError, match="t_s must not be below"):
+            get("stick-slip")(m=10.0, k=1e8, V=1e-3, t_s=3e4, t_k=4e4)
+
+    @pytest.mark.parametrize("row", rows("g_stickslip_rebonding_steady"), ids=lambda row: f"{row['V_over_Vc']:g}")
+    def test_rebonding_in_the_steady_cycle(self, row):
+        slider = get("stick-slip-rebonding")(**REBONDING, V=float(row["V"]))
+        steady, near = slider.steady, 1.0 - row["V_over_Vc"]
+        # Rounding V by half a unit moves the stick time by that over the distance from the critical speed.
+        rounding = 1e-13 + 4 * EPS / near
+        assert steady.stick_time == pytest.approx(row["stick_time"], rel=rounding)
+        assert steady.phi == pytest.approx(row["phi_star"], rel=rounding)
+        assert steady.limit == pytest.approx(row["ts_star"], rel=1e-13)
+        assert steady.slip.duration == pytest.approx(row["slip_time"], rel=1e-13)
+        assert slider.heat(steady) == pytest.approx(row["heat_per_cycle"], rel=1e-13)
+
+    def test_rebonding_from_the_start(self):
+        slider = get("stick-slip-rebonding")(**REBONDING, V=7.5e-5)
+        assert slider.critical_speed == pytest.approx(3e-4, rel=1e-15)
+        for cycle, row in zip(islice(slider.cycles(), 20), rows("g_stickslip_rebonding_transient"), strict=True):
+            exact = [row[name] for name in ("stick_time", "ts_star", "slip_time", "slip_distance", "heat")]
+            slip = cycle.slip
+            found = [cycle.stick_time, cycle.limit, slip.duration, slip.distance, slider.heat(cycle)]
+            assert found == pytest.approx(exact, rel=1e-13)
+
+    def test_rebonding_in_time(self):
+        """The limit is reached when the stick ends; a sticking contact bonds, a sliding one has no bonds."""
+        slider = get("stick-slip-rebonding")(**REBONDING, V=7.5e-5)
+        first, second = islice(slider.cycles(), 2)
+        end = first.duration + second.stick_time
+        exact = slider.solution([0.5, first.stick_time + 1e-4, end * (1 - 1e-12), end + 1e-4])
+        assert_exact(exact["phi"][[0, 2]], [-math.expm1(-0.25), second.phi], relative=1e-10)
+        assert np.all(exact["phi"][[1, 3]] == 0.0)
+        assert_exact(exact["spring_traction"][[0, 2]], [1e8 * 7.5e-5 * 0.5, second.limit], relative=1e-10)
+        assert np.all(exact["v"] > 0.0) == np.all([False, True, False, True])
+        assert_exact(exact["u_t"][2], first.slip.distance)
+
+    def test_rebonding_without_bonds_is_stick_slip(self):
+        more = {"mu_b": 0.6, "mu_ub": 0.6, "mu_k": 0.4}
+        slider = get("stick-slip-rebonding")(**{**REBONDING, **more}, V=0.01)
+        plain = get("stick-slip")(**FRICTION, V=0.01)
+        t = np.linspace(0.0, 0.3, 50)
+        for name in ("u_t", "t_t", "heat"):
+            assert_exact(slider.solution(t)[name], plain.solution(t)[name], relative=1e-11, absolute=1e-13 * 6e4)
+
+    def test_what_slides_without_rest_is_refused(self):
+        with pytest.raises(InputError, match="no stick-slip above V"):
+            _ = get("stick-slip-rebonding")(**REBONDING, V=3.1e-4).steady
+        with pytest.raises(InputError, match="exact for mu_k <= mu_ub"):
+            get("stick-slip-rebonding")(**REBONDING | {"mu_k": 0.5}, V=1e-4)
+
+
+class TestCohesion:
+    @pytest.mark.parametrize("row", rows("h_pulloff_vs_stiffness"), ids=lambda row: f"{row['k_g0_over_tmax']:g}")
+    def test_folds(self, row):
+        bodies = get("cohesive-pull-off")(**ZONE, k=float(row["k_eff"]), w_dot=1.0)
+        opening, closing = bodies.opening, bodies.closing
+        # Where the folds meet, rounding the stiffness moves them by its part of the distance.
+        rounding = 1e-13 + 4 * EPS / (1.0 - bodies.bodies.severity)
+        exact = [row[name] for name in ("g_off", "w_off", "t_off", "g_after")]
+        assert [opening.g, opening.w, opening.t, opening.g_after] == pytest.approx(exact, rel=rounding)
+        exact = [row[name] for name in ("g_on", "w_on", "g_after_on")]
+        assert [closing.g, closing.w, closing.g_after] == pytest.approx(exact, rel=rounding)
+        for fold, release in ((opening, row["release_off"]), (closing, row["release_on"])):
+            size = 0.5 * fold.t**2 / float(row["k_eff"]) + math.e * 1e6 * 1e-8
+            assert fold.release == pytest.approx(release, rel=1e-13, abs=16 * EPS * size)
+
+    def test_stable_or_not(self):
+        limit = read("h_pulloff_vs_stiffness")[1]["limit_k_g0_over_tmax"] * 1e14
+        assert get("cohesive-pull-off")(**ZONE, k=limit * (1 + 1e-12), w_dot=1.0).stable
+        bodies = get("cohesive-pull-off")(**ZONE, k=limit * (1 - 1e-10), w_dot=1.0)
+        assert bodies.opening.g == pytest.approx(bodies.closing.g, rel=1e-4)
+        assert bodies.opening.g < 2e-8 < bodies.closing.g
+        with pytest.raises(InputError, match="there is no jump"):
+            _ = get("cohesive-pull-off")(**ZONE, k=1e14, w_dot=1.0).opening
+
+    @pytest.mark.parametrize("k", [1e2, 1e8, 1e13, 3.6e13, 3.67e13, 1e14, 1e20])
+    def test_the_gap_is_in_balance_and_the_energy_closes(self, k):
+        """Work of the far field is energy of spring and zone plus heat."""
+        bodies = get("cohesive-pull-off")(**ZONE, k=k, w_dot=1.0)
+        end = 3e-8 if bodies.stable else 1.2 * bodies.opening.w
+        t = np.linspace(0.0, end, 200)
+        exact = bodies.solution(t)
+        assert np.all(np.diff(exact["g_n"]) > 0.0)
+        assert_exact(k * (exact["w_n"] - exact["g_n"]), exact["t_n"], absolute=16 * EPS * k * end)
+        jumped = exact["heat"] > 0.0
+        assert jumped.any() != bodies.stable
+        if not bodies.stable:
+            assert np.all(jumped == (t > bodies.opening.w))
+
+    def test_heating_by_cycles_of_opening_and_closing(self):
+        bodies = get("cohesive-pull-off")(**ZONE, k=1e13, w_dot=1e-8)
+        off, on = bodies.opening, bodies.closing
+        for n, row in enumerate(rows("h_pulloff_heating")):
+            fold, cycles = (off, 0) if n == 0 else (on, n)
+            heat = off.release if n == 0 else cycles * (off.release + on.release)
+            assert fold.g_after == pytest.approx(row["g"], rel=1e-13)
+            for model, column in ((QuadraticEnergy(), "T_quadratic"), (ConstantCapacity(), "T_constC")):
+                assert 310.0 + model.rise(np.array(heat), 2e-4, 300.0, 310.0) == pytest.approx(row[column], rel=1e-13)
+        heated = get("cohesive-pull-off-heating")(**ZONE, k=1e13, w_dot=1e-8, C=2e-4, T_0=300.0, T_i=310.0)
+        exact = heated.solution([1.0, 20.0])
+        assert_exact(exact["T"], [310.0, rows("h_pulloff_heating")[0]["T_quadratic"]])
+
+    @pytest.mark.parametrize(
+        "row", rows("h_overdamped_bottleneck"), ids=lambda row: f"{row['w_over_woff_minus_1']:.2g}"
+    )
+    def test_bottleneck(self, row):
+        w_off = get("cohesive-pull-off")(**ZONE, k=1e13, w_dot=0.0).opening.w
+        gap = get("overdamped-pull-off")(**ZONE, k=1e13, c=2e5, delta_w=w_off * float(row["w_over_woff_minus_1"]))
+        assert gap.time(4e-8) == pytest.approx(row["t"], rel=1e-13)
+        assert gap.asymptotic_time == pytest.approx(row["t_asymptotic"], rel=1e-13)
+        reached = gap.solution(gap.time(4e-8))
+        # In the bottleneck a rounding of time is a small distance; beyond it, it is the speed.
+        assert reached["g_n"] == pytest.approx(4e-8, rel=1e-13 + 8 * EPS * gap.time(4e-8) * reached["v_n"] / 4e-8)
+
+    @pytest.mark.parametrize("delta_w", [1e-7, 1e-10, 1e-16])
+    def test_overdamped_gap_obeys_its_equation(self, delta_w):
+        gap = get("overdamped-pull-off")(**ZONE, k=1e13, c=2e5, delta_w=delta_w)
+        t = gap.end_time * np.array([1e-6, 0.1, 0.4, 0.7, 0.99])
+        h = 1e-4 * t
+        before, now, after = (gap.solution(np.minimum(t + s, gap.end_time)) for s in (-h, 0.0, h))
+        rate = (after["g_n"] - before["g_n"]) / (2 * h)
+        assert_exact(rate, now["v_n"], relative=1e-3)
+        force = 1e13 * (gap.w - now["g_n"]) - now["t_n"]
+        assert_exact(2e5 * now["v_n"], force, absolute=8 * EPS * 1e13 * gap.w)
+        assert gap.solution(0.0)["g_n"] == 0.0
+
+    def test_isentropic_cooling(self):
+        columns, expect = read("h_isentropic_cohesive_cooling")
+        zone = get("isentropic-cohesive-opening")(t_max=5e7, g_0=1e-8, C=0.02, T_0=300.0, T_i=300.0, g_dot=1e-8)
+        exact = zone.solution(columns["g"] / 1e-8)
+        assert_exact(exact["T"], columns["T"])
+        assert_exact(exact["t_n"], columns["t_n"], relative=1e-12)
+        assert_exact(exact["work"], columns["work"], absolute=1e-14)
+        assert zone.open_temperature == pytest.approx(expect["T_open"], rel=1e-14)
+        cold = get("isentropic-cohesive-opening")(t_max=5e9, g_0=1e-8, C=0.02, T_0=300.0, T_i=300.0, g_dot=1e-8)
+        assert cold.open_temperature < 0.0
+        T = cold.solution(np.linspace(0.0, 50.0, 20))["T"]
+        assert np.all(np.diff(T) < 0.0)
+        assert T[-1] > 0.0
+
+    def test_bond_springs_in_equilibrium(self):
+        columns, expect = read("h_damage_equilibrium")
+        bonds = get("bond-springs-in-equilibrium")(E_b=1e16, K_0=0.2, g_dot=1e-9)
+        exact = bonds.solution(columns["g"] / 1e-9)
+        assert_exact(exact["phi"], columns["phi"], absolute=2 * EPS)
+        assert_exact(exact["t_n"], columns["t_n"], absolute=2 * EPS * expect["t_peak"])
+        found = [bonds.peak_gap, bonds.strength, bonds.work_of_separation]
+        assert found == pytest.approx([expect[name] for name in ("g_peak", "t_peak", "work")], rel=1e-15)
+
+
+class TestLongRange:
+    def test_flats(self):
+        columns, expect = read("i_lj_flat_flat")
+        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
+        assert_exact(flats.energy(columns["g"]), columns["W"])
+        assert_exact(flats.traction(columns["g"]), columns["t_n"])
+        found = [flats.A, flats.equilibrium_gap, flats.strength_gap, flats.strength, flats.adhesion_energy]
+        assert found == pytest.approx(list(expect.values()), rel=1e-14)
+        assert list(expect) == ["A", "g_zero", "g_peak", "t_peak", "W_adh"]
+        moving = get("lennard-jones-flats")(**FLATS, g_i=1e-9, g_dot=-1e-10)
+        assert moving.end_time == pytest.approx(10.0)
+        assert_exact(moving.solution(5.0)["t_n"], flats.traction(np.array(5e-10)), relative=1e-12)
+
+    @pytest.mark.parametrize("row", rows("i_lj_snap"), ids=lambda row: f"{row['k_over_kmax']:g}")
+    def test_snap(self, row):
+        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
+        assert flats.largest_softening == pytest.approx(read("i_lj_snap")[1]["k_max"], rel=1e-14)
+        snap, pull = flats.snap_in(float(row["k_eff"])), flats.pull_off(float(row["k_eff"]))
+        rounding = 1e-14 + 8 * EPS / math.sqrt(1.0 - row["k_over_kmax"])
+        exact = [row[name] for name in ("g_snap_in", "w_snap_in", "g_pull_off", "w_pull_off")]
+        assert [snap.g, snap.w, pull.g, pull.w] == pytest.approx(exact, rel=rounding)
+
+    def test_a_stiff_spring_holds(self):
+        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
+        for k in (0.0, 1.5e19):
+            with pytest.raises(InputError, match="no jump with k"):
+                flats.snap_in(k)
+
+
+class TestContact:
+    def test_closing_film(self):
+        columns, _ = read("x05_closing_film")
+        film = get("closing-film")(eta=0.01, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
+        exact = film.at_gap(1e-5 * columns["one_minus_t_over_tc"])
+        assert_exact(exact["T"], columns["T"])
+        assert_exact(exact["D"], columns["D_mech"])
+        early = columns["one_minus_t_over_tc"] > 1e-3
+        assert_exact(film.solution(columns["t"][early])["T"], columns["T"][early])
+        assert film.solution(film.end_time)["T"] == math.inf
+        with pytest.raises(InputError, match="exact for 0 <= t"):
+            film.solution(10.1)
+
+    @pytest.mark.parametrize("row", rows("x09_penalty_limit"), ids=lambda row: f"{row['E_n']:g}")
+    def test_penalty_limit(self, row):
+        exact = get("elastic-contact")(k=1e12, E_n=float(row["E_n"]), w_i=1e-8).solution(0.0)
+        for column, quantity in {"g": "g_n", "t_n": "t_n", "U_el_bulk": "E_spring_n", "U_contact": "U_contact"}.items():
+            assert exact[quantity] == pytest.approx(row[column], rel=1e-14)
+
+    @pytest.mark.parametrize("row", rows("x13_negative_capacity_growth"), ids=lambda row: f"{row['Cc']:g}")
+    def test_growth_of_a_deviation(self, row):
+        given = {"K_2": 240.0, "phi": 0.0, "T": 300.0, "T_0": 300.0, "h_1": 500.0, "h_2": 300.0}
+        medium = get("endothermic-medium")(C_c=float(row["Cc"]), **given)
+        assert medium.capacity == pytest.approx(row["C_eff"], rel=1e-13)
+        assert medium.growth_rate == pytest.approx(row["growth_rate"], rel=1e-13)
+
+
+VERDICTS = {"ok": "admissible", "entropy-violating": "entropy-violating", "impossible": "impossible"}
+
+
+class TestSuddenDebonding:
+    @pytest.mark.parametrize("row", rows("S63_debonding"))
+    def test_final_temperature(self, row):
+        given = {"C": row["C_tot"], "T_0": row["T0"], "T_i": row["T_i"], "K_0": row["K0"], "phi_i": row["phi_i"]}
+        bonds = get("sudden-debonding")(**given, t_n=row["t_n"], k=row["k_eff"], compliance=1.0 / row["E_n"])
+        assert bonds.final_temperature == pytest.approx(row["T_f"], rel=1e-14)
+        assert bonds.entropy_change == pytest.approx(row["dS"], rel=1e-13)
+        assert bonds.released_energy == pytest.approx(row["Ediss"], rel=1e-13)
+        assert bonds.verdict == ("admissible" if row["dS"] >= 0 else "entropy-violating")
+        assert bonds.solution(0.0)["T"] == bonds.final_temperature
+
+    @pytest.mark.parametrize("row", rows("x14_debonding_gate"))
+    def test_verdicts(self, row):
+        bonds = get("sudden-debonding")(C=1.0, T_0=1.0, T_i=1.0, K_0=row["kappa"], t_n=row["t_over_t0"], k=1.0)
+        assert bonds.verdict == VERDICTS[str(row["verdict"])]
+        assert bonds.final_temperature == pytest.approx(row["T_f_over_T0"], rel=1e-14, nan_ok=True)
+        if bonds.verdict == "impossible":
+            with pytest.raises(InputError, match="no real value"):
+                bonds.solution(0.0)
+
+    def test_between_the_verdicts(self):
+        """At (t/t_0)^2 = kappa nothing changes; at kappa - 1 the bodies would be at zero temperature."""
+        given = {"C": 1.0, "T_0": 1.0, "T_i": 1.0, "k": 1.0}
+        for kappa, t, verdict in ((1.0, 1.0, "admissible"), (2.0, 1.0, "impossible")):
+            assert get("sudden-debonding")(**given, K_0=kappa, t_n=t).verdict == verdict
+        assert get("sudden-debonding")(**given, K_0=1.0, t_n=1.0).final_temperature == 1.0
+
+    def test_constant_capacity(self):
+        """The limit of small heating, and zero temperature at E = -C T_i."""
+        small = {"C": 2.0, "T_0": 300.0, "T_i": 300.0, "K_0": 1e-6, "t_n": 1e4, "k": 1e13}
+        rise = [
+            get(f"sudden-debonding{kind}")(**small).final_temperature - 300.0 for kind in ("", "-constant-capacity")
+        ]
+        assert rise[0] == pytest.approx(rise[1], rel=1e-6, abs=1e-12)
+        given = {"C": 1.0, "T_0": 1.0, "T_i": 1.0, "t_n": 0.0, "k": 1.0}
+        for K_0, verdict in ((1.9, "entropy-violating"), (2.0, "impossible"), (-1.0, "admissible")):
+            assert get("sudden-debonding-constant-capacity")(**given, K_0=K_0).verdict == verdict

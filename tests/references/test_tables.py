@@ -1,0 +1,75 @@
+"""Every exact table is met: 1e-8 where the solution is smooth, 1e-6 at the extremes, at default tolerances."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import tables
+
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.solve.run import Model, Run, Trajectory
+
+MAKERS = tables.makers()
+
+
+@cache
+def made(name: str) -> tables.Table:
+    return MAKERS[name]()
+
+
+@cache
+def at_default_tolerance(name: str) -> Trajectory:
+    return solved(made(name))
+
+
+SMOOTH = [name for name in MAKERS if not name.startswith("x")]
+smooth_tables = pytest.mark.parametrize("name", SMOOTH)
+each_table = pytest.mark.parametrize("name", MAKERS)
+
+
+def solved(table: tables.Table, model: Model | None = None, **settings) -> Trajectory:
+    times = table.times if table.times[0] == 0 else np.concatenate([[0.0], table.times])
+    return (model or Model(assemble(table.scene))).solve(Run(times=times, **settings))
+
+
+def errors(table: tables.Table, trajectory: Trajectory) -> dict[str, float]:
+    """Largest relative error of each tabulated variable."""
+    result, system = trajectory.result, trajectory.model.system
+    rows = slice(-len(table.times), None)
+    values = {state.name: result.outputs[rows, j] for j, state in enumerate(system.states)}
+    values |= {item.name: trajectory.outputs[rows, j] for j, item in enumerate(system.outputs)}
+    values |= {account.quantity.name: result.ledger_outputs[rows, j] for j, account in enumerate(system.ledger)}
+    return {name: worst(values[name], exact, table.floors.get(name, 0.0)) for name, exact in table.exact.items()}
+
+
+def worst(values, exact, floor: float) -> float:
+    scale = np.maximum(np.abs(exact), floor * np.max(np.abs(exact)))
+    error = np.abs(values - exact)
+    return float(np.max(np.divide(error, scale, out=error, where=scale > 0)))
+
+
+@each_table
+def test_exact_values_are_met(name):
+    table, trajectory = made(name), at_default_tolerance(name)
+    assert trajectory.status == "finished", trajectory.reason
+    assert max(errors(table, trajectory).values()) < table.tolerance
+
+
+@each_table
+def test_energy_closes_and_no_law_destroys_entropy(name):
+    books = audit(at_default_tolerance(name))
+    assert books.energy_error < 1e-9
+    assert books.violations == ()
+
+
+@smooth_tables
+def test_entropy_closes(name):
+    """At the extremes a temperature may rise by ten decades within a step, which its reciprocal does not forgive."""
+    assert audit(at_default_tolerance(name)).entropy_error < 1e-9
+
+
+@smooth_tables
+def test_tight_tolerance_gives_ten_digits(name):
+    table, model = made(name), at_default_tolerance(name).model
+    assert max(errors(table, solved(table, model, rtol=1e-12)).values()) < 1e-10

@@ -1,0 +1,268 @@
+"""Every exact table of mechanics, run as a scene: 1e-8 where motion is smooth, 1e-6 with events; verdicts exactly."""
+
+import math
+
+import numpy as np
+import pytest
+import tables_mechanics as scenes
+from scipy.special import lambertw
+from tables_mechanics import Solved, columns, expected, parameters, rows, solve
+
+from surfacechem.errors import InputError
+from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.model.assemble import assemble
+from surfacechem.runs.check import consistent_start, rates
+from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES
+from surfacechem.solve.run import Model
+
+SMOOTH, EVENTS = 1e-8, 1e-6
+VERDICTS = {"ok": ADMISSIBLE, "entropy-violating": VIOLATES, "impossible": IMPOSSIBLE}
+
+
+def each_row(name: str, label: str):
+    return pytest.mark.parametrize("row", rows(name), ids=lambda row: f"{row[label]}")
+
+
+def assert_close(found, exact, tolerance: float) -> None:
+    """Relative to the largest exact value."""
+    found, exact = np.asarray(found), np.asarray(exact)
+    assert np.max(np.abs(found - exact)) <= tolerance * np.max(np.abs(exact))
+
+
+def assert_each(found, exact, tolerance: float) -> None:
+    assert np.asarray(found) == pytest.approx(np.asarray(exact), rel=tolerance, abs=0.0)
+
+
+def assert_closed(solved: Solved, status: str = "finished") -> None:
+    assert solved.status == status, solved.reason
+    assert solved.findings == ()
+    assert solved.energy_error < 1e-9
+
+
+class TestDebonding:
+    @pytest.mark.parametrize("row", rows("S63_debonding"))
+    def test_temperatures_and_energies(self, row):
+        solved = scenes.debonded(row)
+        (jump,) = solved.jumps
+        assert jump.t == pytest.approx(1.0, rel=1e-12)
+        assert_each(
+            [solved.state(jump, "T"), jump.entropy, jump.released], [row["T_f"], row["dS"], row["Ediss"]], 1e-11
+        )
+        assert jump.verdict == (ADMISSIBLE if row["dS"] >= 0 else VIOLATES)
+        assert_closed(solved)
+
+    @each_row("x14_debonding_gate", "kappa")
+    @pytest.mark.parametrize("violation", ["warn", "accept", "refuse"])
+    def test_verdicts(self, row, violation):
+        """What cannot be stops the run; what destroys entropy does so where it is refused."""
+        T_0, C, k = 300.0, 2.0, 1e12
+        q = {"T0": T_0, "T_i": T_0, "C_tot": C, "K0": row["kappa"] * T_0 * C, "phi_i": 1.0, "k_eff": k}
+        solved = scenes.debonded(q | {"t_n": row["t_over_t0"] * math.sqrt(T_0 * C * k), "E_n": math.inf}, violation)
+        (jump,) = solved.jumps
+        assert jump.verdict == VERDICTS[row["verdict"]]
+        stops = jump.verdict == IMPOSSIBLE or (jump.verdict == VIOLATES and violation == "refuse")
+        assert_closed(solved, "stopped" if stops else "finished")
+        if stops:
+            assert jump.verdict in solved.reason
+        if jump.verdict != IMPOSSIBLE:
+            assert_each(solved.state(jump, "T") / T_0, row["T_f_over_T0"], 1e-12)
+
+
+class TestFriction:
+    def test_coulomb_stop(self):
+        solved, exact = scenes.coulomb_stop(), columns("g_coulomb_stop")
+        for name, column in {"v": "v", "u_t": "x", "T": "T"}.items():
+            assert_close(solved[name], exact[column], 1e-12)
+        stop = expected("g_coulomb_stop")["t_stop"]
+        assert np.all(solved["v"][exact["t"] > stop] == 0.0)
+        assert [jump.transition.name for jump in solved.jumps] == ["stop"]
+        assert solved.jumps[0].t == pytest.approx(stop, rel=1e-13)
+        assert_closed(solved)
+
+    def test_stick_slip_motion(self):
+        """A thousand cycles: the time of a slip is known to 1e-10 of a cycle, its velocity accordingly."""
+        exact = columns("g_stickslip_motion")
+        times, first = np.unique(exact["t"], return_index=True)
+        solved = solve(scenes.slider(), times)
+        rest = len(solved["v"]) - len(times)
+        assert_close(solved["u_t"][rest:], exact["x"][first], 1e-9)
+        assert_close(solved["heat_coulomb"][rest:], exact["heat"][first], 1e-9)
+        assert_close(solved["v"][rest:], exact["xdot"][first], EVENTS)
+        spring = parameters("g_stickslip_motion")["k"] * (solved["w_t"] - solved["u_t"])
+        assert_close(spring[rest:], exact["spring_traction"][first], EVENTS)
+        assert np.all(solved["v"][rest:][exact["phase"][first] == "stick"] == 0.0)
+        assert_closed(solved)
+
+    @each_row("g_stickslip_period_vs_V", "V")
+    def test_stick_slip_over_nineteen_decades_of_speed(self, row):
+        p = parameters("g_stickslip_period_vs_V")
+        onset = p["mu_s"] * p["p"] / (p["k"] * row["V"])
+        solved = solve(scenes.slider(), (0.0, onset + 3.5 * row["period"]), {"loading.w_t.rate": row["V"]})
+        names = [jump.transition.name for jump in solved.jumps]
+        assert names[:6] == ["slip forward", "stop"] * 3
+        assert set(names[6:]) <= {"slip forward", "stop"}
+        stick, slip = solved.jumps[2].since, solved.jumps[1].since
+        heat = solved.account("heat_coulomb", 3) - solved.account("heat_coulomb", 1)
+        assert_each(
+            [solved.jumps[0].t, slip, stick + slip, heat],
+            [onset, row["slip_time"], row["period"], row["heat_per_cycle"]],
+            1e-9,
+        )
+        assert_closed(solved)
+
+    @pytest.mark.parametrize("row", [row for row in rows("g_stickslip_period_vs_V") if row["V"] >= 1e-3])
+    def test_largest_velocity(self, row):
+        p = parameters("g_stickslip_period_vs_V")
+        middle = p["mu_s"] * p["p"] / (p["k"] * row["V"]) + row["slip_time"] / 2
+        solved = solve(scenes.slider(), (0.0, middle), {"loading.w_t.rate": row["V"]})
+        assert_each(solved["v"][-1], row["v_max"], SMOOTH)
+
+    def test_bonds_that_form_again_from_the_start(self):
+        solved = solve(scenes.rebonding_slider(), (0.0, 170.0))
+        slips, stops = solved.of("slip"), solved.of("stop")
+        for n, row in enumerate(rows("g_stickslip_rebonding_transient")):
+            strength = 1e5 * (0.4 + 0.3 * solved.state(slips[n], "phi", "before"))
+            distance = solved.state(stops[n], "u_t") - solved.state(slips[n], "u_t")
+            heat = solved.account("heat_bonded_coulomb", 2 * n + 1) - solved.account("heat_bonded_coulomb", 2 * n)
+            found = [slips[n].since, strength, stops[n].since, distance, heat]
+            exact = [row[name] for name in ("stick_time", "ts_star", "slip_time", "slip_distance", "heat")]
+            assert_each(found, exact, 1e-10)
+            assert solved.state(slips[n], "phi") == 0.0
+        assert_closed(solved)
+
+    @each_row("g_stickslip_rebonding_steady", "V_over_Vc")
+    def test_bonds_that_form_again_in_the_steady_cycle(self, row):
+        p = parameters("g_stickslip_rebonding_steady")
+        length = (row["ts_star"] - 2 * p["mu_k"] * p["p"]) / p["k"]
+        changes = {"loading.w_t.rate": row["V"], "initial.u_t": length}
+        solved = solve(scenes.rebonding_slider(), (0.0, 3.5 * (row["stick_time"] + row["slip_time"])), changes)
+        slip, stop = solved.of("slip")[1], solved.of("stop")[1]
+        phi = solved.state(slip, "phi", "before")
+        heat = solved.account("heat_bonded_coulomb", 3) - solved.account("heat_bonded_coulomb", 2)
+        exact = [row[name] for name in ("stick_time", "phi_star", "slip_time", "heat_per_cycle")]
+        assert_each([slip.since, phi, stop.since, heat], exact, EVENTS)
+        assert_closed(solved)
+
+
+class TestCohesion:
+    def test_dynamic_pull_off(self):
+        solved, exact = scenes.dynamic(), columns("h_pulloff_dynamic")
+        names = {"g_n": "g", "v_n": "gdot", "t_n": "t_n", "heat_bulk_damper_n": "heat", "T": "T"}
+        for name, column in names.items():
+            assert_close(solved[name][1:], exact[column], SMOOTH)
+        assert_closed(solved)
+
+    @each_row("h_pulloff_vs_stiffness", "k_g0_over_tmax")
+    def test_pull_off_and_pull_on(self, row):
+        solved, w = scenes.pull_off(row)
+        off, on = solved.of("snap")
+        found = [solved.state(off, "g_n", "before"), w[0], solved.state(off, "g_n"), off.released]
+        assert_each(found, [row[name] for name in ("g_off", "w_off", "g_after", "release_off")], EVENTS)
+        found = [solved.state(on, "g_n", "before"), w[1], solved.state(on, "g_n"), on.released]
+        assert_each(found, [row[name] for name in ("g_on", "w_on", "g_after_on", "release_on")], EVENTS)
+        assert (off.verdict, on.verdict) == (ADMISSIBLE, ADMISSIBLE)
+        assert off.heat_out == pytest.approx(off.released)
+        assert_closed(solved)
+
+    @pytest.mark.parametrize(("energy", "column"), [(Quadratic, "T_quadratic"), (Constant, "T_constC")])
+    def test_heating_by_cycles(self, energy, column):
+        solved = scenes.heating(energy)
+        temperatures = [solved.state(jump, "T") for jump in solved.of("snap")]
+        assert_each([*temperatures[:2], *temperatures[3::2]], columns("h_pulloff_heating")[column], EVENTS)
+        assert_closed(solved)
+
+    @each_row("h_overdamped_bottleneck", "w_over_woff_minus_1")
+    def test_overdamped_passage_of_the_fold(self, row):
+        p = parameters("h_overdamped_bottleneck")
+        g = p["g0"] * (1 - lambertw(-p["k_eff"] * p["g0"] / p["t_max"]).real)
+        w = g + p["t_max"] / p["k_eff"] * g / p["g0"] * math.exp(1 - g / p["g0"])
+        level = {"loading.w_n.level": w * (1 + row["w_over_woff_minus_1"])}
+        solved = solve(scenes.overdamped(), (0.0, 2 * row["t"]), level)
+        # The distance from the fold is known to the rounding of w.
+        assert_each(solved.jumps[0].t, row["t"], max(SMOOTH, 1e-15 / row["w_over_woff_minus_1"]))
+        assert_closed(solved)
+
+    def test_isentropic_cooling(self):
+        solved, exact = scenes.isentropic(), columns("h_isentropic_cohesive_cooling")
+        for name, column in {"T": "T", "t_n": "t_n", "W_g_n": "work"}.items():
+            assert_close(solved[name], exact[column], SMOOTH)
+        assert_close(solved["S_total"] - solved["S_total"][0] + 1.0, np.ones(len(solved["T"])), 1e-12)
+        assert_closed(solved)
+
+    def test_bonds_in_equilibrium_until_none_is_left(self):
+        solved, exact = scenes.damage(), columns("h_damage_equilibrium")
+        assert_close(solved["phi"], exact["phi"], SMOOTH)
+        assert_close(solved["t_n"], exact["t_n"], SMOOTH)
+        end = math.sqrt(2 * parameters("h_damage_equilibrium")["K"] / parameters("h_damage_equilibrium")["E"])
+        (unbonded,) = solved.of("unbonded")
+        assert unbonded.t * exact["g"][-1] == pytest.approx(end, rel=1e-8)
+        assert_closed(solved)
+
+
+class TestLongRange:
+    def test_flats(self):
+        exact = columns("i_lj_flat_flat")
+        solved = scenes.long_range("flat", exact["g"])
+        assert_each(solved["t_n"], exact["t_n"], 1e-12)
+        assert_each(solved["U_c"], exact["W"], 1e-12)
+        assert_close(solved["W_g_n"], exact["W"] - exact["W"][0], 1e-7)
+
+    @pytest.mark.parametrize(("kind", "column"), [("sphere", "F_exact"), ("derjaguin", "F_derjaguin")])
+    def test_sphere_and_plane(self, kind, column):
+        exact = columns("i_lj_sphere_plane")
+        assert_each(scenes.long_range(kind, exact["g"])["t_n"] * 1e-16, exact[column], 1e-12)
+
+    @each_row("i_lj_snap", "k_over_kmax")
+    def test_snap_in_and_pull_off(self, row):
+        solved, w = scenes.snap(row)
+        into, off = solved.of("snap")
+        found = [solved.state(into, "g_n", "before"), w[0], solved.state(off, "g_n", "before"), w[1]]
+        assert_each(found, [row[name] for name in ("g_snap_in", "w_snap_in", "g_pull_off", "w_pull_off")], EVENTS)
+        assert_closed(solved)
+
+
+class TestExtremes:
+    def test_closing_film(self):
+        """Heat grows like a logarithm until the film closes, which ends the run at its time."""
+        exact, p = columns("x05_closing_film"), parameters("x05_closing_film")
+        solved = solve(scenes.film(), (0.0, *exact["t"][1:8], 20.0))
+        assert_each(solved["T"][:8], exact["T"][:8], 1e-10)
+        assert (solved.status, solved.reason) == (
+            "stopped",
+            "g_n reached zero, where the law viscous ends near t = 10 s",
+        )
+        assert solved.trajectory.result.t == pytest.approx(p["g_i"] / p["a"], rel=1e-12)
+
+    def test_closing_film_over_nineteen_decades(self):
+        exact, p = columns("x05_closing_film"), parameters("x05_closing_film")
+        gaps = p["g_i"] * exact["one_minus_t_over_tc"]
+        for k in range(len(gaps) - 1):
+            changes = {"loading.g_n.start": gaps[k], "initial.T": exact["T"][k]}
+            solved = solve(scenes.film(), (0.0, (gaps[k] - gaps[k + 1]) / p["a"]), changes)
+            assert_each(solved["T"][-1], exact["T"][k + 1], 1e-11)
+            assert_each(solved["D_viscous"][-1], exact["D_mech"][k + 1], 1e-11)
+            assert_closed(solved)
+
+    @each_row("x09_penalty_limit", "E_n")
+    def test_penalty_over_thirty_eight_decades(self, row):
+        """The deflection of the body is the far field's displacement less the gap: known to the rounding of those."""
+        changes = {"interface.potential.normal-stiffness.E_n": row["E_n"]}
+        solved = solve(scenes.penalty(), (0.0, 1.0), changes)
+        assert_each([solved["g_n"][-1], solved["t_n"][-1]], [row["g"], row["t_n"]], 1e-12)
+        lost = 1e-15 * (1 + parameters("x09_penalty_limit")["k_eff"] / row["E_n"])
+        assert_each(solved["U_c"][-1], row["U_contact"], 1e-12)
+        assert_each(solved["E_spring_n"][-1], row["U_el_bulk"], max(SMOOTH, 4 * lost))
+
+    @each_row("x13_negative_capacity_growth", "Cc")
+    def test_interface_without_capacity_left(self, row):
+        """Disturbances grow the faster the less is missing; what has no capacity is refused, what has some decays."""
+        if row["Cc"] == 0:
+            pytest.skip("without a capacity term the scene is another one")
+        model = Model(assemble(scenes.light_interface(row["Cc"])))
+        start = consistent_start(model, model.values())
+        assert_each(rates(start).real, [row["growth_rate"]], 1e-12)
+        if row["C_eff"] > 0:
+            assert_closed(solve(model, (0.0, 1e-3)))
+        else:
+            with pytest.raises(InputError, match="heat capacity at T_c was lost"):
+                solve(model, (0.0, 1e-3))

@@ -1,0 +1,236 @@
+"""Every run carries its own error, and says where it is from."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import surfacechem
+from surfacechem.cli.main import app
+from surfacechem.errors import InputError
+from surfacechem.results.achieved import EVENTS, against_tighter, apart, difference, event_error
+from surfacechem.results.event_table import event_times
+from surfacechem.runs.report import run_summary, sweep_summary
+
+
+@pytest.fixture(scope="module")
+def stick_slip():
+    return surfacechem.load("stick-slip")
+
+
+@pytest.mark.parametrize(
+    ("way", "words"),
+    [
+        ("auto", "exact solution exothermic-bonding"),
+        ("estimate", "estimate: a second run at rtol 1e-13"),
+        ("balances", "balances only: what they miss is not seen"),
+    ],
+)
+def test_the_summary_says_where_the_error_is_from(way, words, tmp_path):
+    target = tmp_path / "run.nc"
+    done = CliRunner().invoke(app, ["run", "exothermic", "--error", way, "-o", str(target)])
+    assert done.exit_code == 0, done.output
+    line = next(line for line in done.output.splitlines() if line.strip().startswith("error"))
+    assert words in line
+    again = CliRunner().invoke(app, ["rerun", str(target)])
+    assert again.exit_code == 0, again.output
+
+
+def test_another_source_is_refused_before_anything_is_computed():
+    with pytest.raises(InputError, match=r"no source 'estimte' of an error\. Did you mean 'estimate'\?"):
+        surfacechem.load("exothermic").run(error="estimte")
+
+
+def test_the_balances_are_the_error_where_nothing_else_is_asked_for():
+    solution = surfacechem.load("exothermic").run(error="balances")
+    assert solution.accuracy.variables["energy"] == solution.audit.energy_error
+    assert solution.accuracy.error == max(solution.accuracy.variables.values())
+
+
+def test_an_estimate_looks_at_the_times_of_events(stick_slip):
+    run = replace(stick_slip.case.run, rtol=1e-6, times=(0.0, 3.0))
+    loose, tight = (stick_slip.model.solve(replace(run, rtol=rtol)) for rtol in (1e-6, 1e-12))
+    true = event_error(event_times(loose), event_times(tight), 3.0)
+    estimate = against_tighter(loose).variables[EVENTS]
+    assert estimate == pytest.approx(true, rel=0.1)
+    assert estimate > 0
+
+
+def test_other_events_in_the_second_run_are_said(stick_slip, monkeypatch):
+    trajectory = stick_slip.model.solve(stick_slip.case.run)
+    second = replace(trajectory, jumps=trajectory.jumps[:-1])
+    monkeypatch.setattr(type(stick_slip.model), "resolve", lambda *_: second)
+    accuracy = against_tighter(trajectory)
+    last = trajectory.jumps[-1].transition.name
+    count = len(event_times(trajectory)[last])
+    assert f"which had other events: {count - 1} {last} instead of {count}" in accuracy.source
+    assert EVENTS not in accuracy.variables
+    assert math.isnan(accuracy.error)  # one of the two went another way
+
+
+def test_a_second_run_that_ends_earlier_leaves_the_error_unknown(monkeypatch):
+    simulation = surfacechem.load("exothermic")
+    trajectory = simulation.model.solve(simulation.case.run)
+    short = simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0)))
+    monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: short)
+    accuracy = against_tighter(trajectory)
+    assert accuracy.source.startswith("unknown: a second run at rtol 1e-13 ended earlier")
+    assert np.isnan(accuracy.error)
+
+
+def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier(monkeypatch):
+    simulation = surfacechem.load("exothermic")
+    first, second = (simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0, 2.0)[:n])) for n in (2, 3))
+    first, second = (replace(each, status="failed") for each in (first, second))
+    monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: second)
+    assert against_tighter(first).source.startswith("unknown: a second run at rtol 1e-13 failed later")
+
+
+def test_the_end_of_a_stopped_run_is_an_event():
+    solution = surfacechem.load("cooling-to-zero").run()
+    assert solution.status == "stopped"
+    assert event_times(solution.trajectory)["end"] == [solution.trajectory.result.t]
+
+
+def test_differences_between_events_in_words():
+    assert difference({"slip": np.array([0.1])}, {"slip": np.array([0.2])}) == ""
+    assert difference({}, {"slip": np.array([0.2])}) == "other events: 1 slip instead of 0"
+
+
+@pytest.mark.parametrize("strength", [20, 55, 90])
+def test_an_output_at_the_time_of_a_jump_is_compared_on_the_side_on_which_it_lies(strength):
+    """The strength is reached at a whole multiple of the spacing of the outputs, but for the last digits."""
+    change = [f"interface.limits.tensile-strength.t_max={strength} MPa"]
+    run = surfacechem.load("debonding", change).run()
+    assert run.accuracy.source == "exact solution pulled-to-debonding"
+    assert run.accuracy.error < 1e-12
+    np.testing.assert_allclose(run.dataset.phi, run.dataset.phi_exact, atol=1e-15)
+
+
+def test_an_output_at_the_time_of_a_jump_is_no_error_of_the_states(tmp_path):
+    """Strength falls as heat comes in: the time of debonding is known to the tolerance alone."""
+    C, k, t_0, w, heat = 2000.0, 1e13, 20e6, 3.8e-6, 1e4
+    hottest = 300.0 * t_0 / (w * k / 2)
+    time = (hottest**2 - 300.0**2) * C / 600.0 / heat
+    case = tmp_path / "hot.yaml"
+    case.write_text(
+        f"""
+T_0: 300 K
+bodies:
+  a: {{temperature: T, C: 1 kJ/m^2/K}}
+  b: {{temperature: T, C: 1 kJ/m^2/K}}
+interface:
+  temperature: T
+  sites: 1e18
+  potential: [bonded-contact: {{E_n: 1e13}}, bond-energy: {{K_0: 1}}]
+  limits: [tensile-strength: {{t_max: {{value: 20 MPa, times: [power: {{exponent: -1}}]}}}}]
+mechanics: {{normal: {{k: 1e13}}}}
+loading: {{w_n: 3.8 um, Q_1: 10 kW/m^2}}
+initial: {{T: 300 K, phi: 1}}
+run: {{times: [0, 1, {time!r}, 5], rtol: 1e-6}}
+"""
+    )
+    run = surfacechem.load(case).run()
+    assert run.trajectory.jumps[0].t == pytest.approx(time, rel=1e-7)
+    assert run.accuracy.error < 1e-7
+
+
+@pytest.mark.parametrize("reference", [{}, {"reference": ""}])
+def test_a_run_that_ends_before_its_second_output_knows_its_end(reference):
+    """It reaches zero temperature at 300 s."""
+    solution = surfacechem.run("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}, **reference})
+    assert len(solution.trajectory.result.times) == 1
+    true = abs(solution.trajectory.result.t / 300.0 - 1)
+    assert set(solution.accuracy.variables) == {EVENTS}
+    assert true / 10 < solution.accuracy.error < 1e-9
+
+
+def test_balances_tell_nothing_of_a_run_that_ends_before_its_second_output():
+    solution = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}}).run(error="balances")
+    assert np.isnan(solution.accuracy.error)
+    assert "unknown: the run ended before its second output" in run_summary(solution, None)
+    assert np.isnan(solution.attributes["error"])
+
+
+def test_the_error_of_the_tightest_run_is_not_that_of_a_looser_one():
+    settings = {"run": {"until": "2.5 s", "rtol": 1e-13}}
+    exact = surfacechem.run("exothermic", settings).accuracy
+    estimate = surfacechem.run("exothermic", {**settings, "reference": ""}).accuracy
+    assert estimate.source == "estimate: a second run at rtol 3e-14 that sees what lasts 1/438 of it"
+    assert exact.error / 3 < estimate.error < 3 * exact.error
+
+
+@pytest.mark.parametrize("part", [1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_film_that_all_but_closes_is_known_to_the_last_digit_of_its_mean(tmp_path, part):
+    """Its heat is eta v^2 / sqrt(g^2 - a^2) per second; the last digit of g is a large part of what is left, g - a."""
+    g, eta, v, C = 1e-5, 0.01, 5e-4, 800.0
+    a = g * (1 - part)
+    case = tmp_path / "film.yaml"
+    case.write_text(f"""
+T_0: 300 K
+bodies:
+  lower: {{temperature: T, capacity: constant, C: {C / 2}}}
+  upper: {{temperature: T, capacity: constant, C: {C / 2}}}
+interface: {{temperature: T, friction: [viscous: {{eta: {eta}}}]}}
+loading: {{v: {v}, g_n: {{harmonic: {{mean: {g!r}, amplitude: {a!r}, frequency: 0.1}}}}}}
+initial: {{T: 300 K}}
+run: {{until: 20 s}}
+""")
+    solution = surfacechem.run(case)
+    T = 300 + 20 * eta * v**2 / math.sqrt((g - a) * (g + a)) / C
+    assert abs(float(solution.dataset["T"][-1]) / T - 1) < solution.accuracy.error < 1e-4
+
+
+def test_species_that_never_exceed_the_absolute_tolerance_are_no_error():
+    """A state of 1e-31 that two runs know to no digit is known as well as its tolerance asks."""
+    trajectory = surfacechem.run("exothermic").trajectory
+    first, second = (
+        replace(trajectory, result=replace(trajectory.result, outputs=trajectory.result.outputs * [part, 1.0]))
+        for part in (1e-31, 3e-31)
+    )
+    errors, _ = apart(first, second)
+    assert errors["phi"] < 1e-24
+
+
+STRENGTH = "interface.limits.tensile-strength.t_max"
+
+
+@pytest.mark.parametrize("error", ["auto", "estimate"])
+def test_an_event_that_falls_on_the_end_is_no_error(error):
+    """At 1 um/s the strength of 100 MPa is reached at the very end; rounding decides whether a run sees it."""
+    simulation = surfacechem.load("debonding")
+    assert simulation.run({STRENGTH: "100 MPa"}, error=error).accuracy.error < 1e-12
+    swept = simulation.sweep({STRENGTH: ["20 MPa", "60 MPa", "100 MPa"]})
+    assert swept.accuracy.source == "exact solution pulled-to-debonding"
+    assert np.all(swept.accuracy.errors < 1e-12)
+
+
+def test_an_exact_solution_with_parameters_of_its_own_is_of_the_scene_as_written():
+    """A separation that differs by 1e-15 of itself leaves the equations as they are, not the time of the passage."""
+    w_n = 1.1063772254722603e-07
+    simulation = surfacechem.load("slow-passage")
+    why = "is not of this scene: it is given with delta_w, and the scene was changed"
+    changed = surfacechem.run("slow-passage", {"loading.w_n": w_n * (1 + 1e-9)})
+    for accuracy in (
+        changed.accuracy,
+        simulation.run({"loading.w_n": w_n * (1 + 1e-9)}).accuracy,
+        simulation.sweep({"loading.w_n": [w_n, w_n * (1 + 1e-9)]}).accuracy,
+    ):
+        assert accuracy.source.startswith("estimate")
+        assert accuracy.source.endswith(why)
+    assert "g_n_exact" not in changed.dataset
+    for same in (simulation.run({"loading.w_n": w_n}), surfacechem.run("slow-passage", ["run.outputs=31"])):
+        assert same.accuracy.source == "exact solution overdamped-pull-off"
+
+
+def test_a_sweep_of_which_no_error_is_known_says_so(tmp_path):
+    """Runs that end before their second output have the error of their end; without it that of a sweep is unknown."""
+    swept = surfacechem.load("cooling-to-zero", {"run": {"until": "1e5 s", "outputs": 3}, "reference": ""}).sweep(
+        {"initial.T": [290.0, 300.0]}
+    )
+    assert np.all((swept.accuracy.errors > 0) & (swept.accuracy.errors < 1e-9))
+    nothing = replace(swept, accuracy=replace(swept.accuracy, errors=np.full(2, np.nan)))
+    assert "error      unknown (estimate: a second sweep at rtol 1e-13 that" in sweep_summary(nothing, None)
+    assert np.isnan(nothing.attributes["error"])

@@ -1,0 +1,70 @@
+"""What the audit says of laws that destroy entropy: judged by what each turns over, in runs and in sweeps alike."""
+
+import pytest
+
+import surfacechem
+from surfacechem.format import load_text
+from surfacechem.runs.simulation import Simulation
+
+BURST = """
+T_0: 300 K
+bodies:
+  lower: {{temperature: T, C: {C} J/m^2/K}}
+  upper: {{temperature: T, C: 1 kJ/m^2/K}}
+interface:
+  temperature: T
+  sites: 1e18 1/m^2
+  potential:
+    - bond-energy: {{K_0: {K_0} J/m^2, phi_eq: 0.5}}
+  bonding:
+    - exponential-affinity: {{C_r: {C_r}}}
+    - mass-action: {{k_on: 0 1/s, k_off: 1 1/s}}
+initial: {{T: 300 K, phi: 1}}
+run: {{until: 10 s}}
+"""
+"""Bonds break against their potential, held up by a law that first equilibrates them in an instant."""
+
+
+def burst(K_0=0.8, C_r=1e38, C=1e3) -> Simulation:
+    return Simulation(load_text(BURST.format(K_0=K_0, C_r=C_r, C=C)))
+
+
+@pytest.mark.parametrize(("K_0", "peak"), [(0.8, 4e38), (2.4, 1e123), (2.76, 1e129)])
+def test_the_first_instant_of_one_law_hides_no_other(K_0, peak):
+    simulation = burst(K_0)
+    solution = simulation.run()
+    assert solution.dataset.sigma_exponential_affinity.max() > peak
+    assert solution.audit.violations == ("mass_action",)
+    assert "the law mass action destroys entropy" in solution.warnings
+    assert solution.dataset.entropy_mass_action[-1] < 0
+    swept = simulation.sweep({"initial.T": [300.0, 310.0]})
+    assert swept.dataset.destroys_entropy.values.tolist() == [1.0, 1.0]
+
+
+def test_a_large_body_hides_no_law():
+    """The rounding of its heat content, added up over the steps, is more than what is destroyed."""
+    solution = burst(C_r=1e38, C=1e11).run()
+    assert -solution.dataset.entropy_mass_action[-1] < solution.audit.entropy_rounding
+    assert solution.audit.violations == ("mass_action",)
+
+
+def test_a_law_that_another_holds_in_equilibrium_destroys_nothing():
+    """At C_r = 1e142 the potential differs from its equilibrium by 1e-104 of a bond's energy, which no digit shows."""
+    solution = burst(C_r=1e142).run()
+    assert solution.audit.violations == ()
+    assert any("the balance of sites is open" in warning for warning in solution.warnings)
+
+
+def test_what_is_destroyed_is_the_part_of_what_the_law_turns_over():
+    """Without the other law bonds fall from 1 to nothing: they lose energy down to the middle and gain it below."""
+    solution = burst(C_r=0.0).run()
+    assert solution.audit.destroyed["mass_action"] == pytest.approx(0.5, abs=0.01)
+    assert solution.audit.destroyed_together == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["exothermic", "two-way-linear", "dna-adhesive", "three-temperatures", "stick-slip"])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
+def test_laws_that_dissipate_are_not_accused(name, rtol):
+    solution = surfacechem.run(name, [f"run.rtol={rtol}"])
+    assert solution.audit.violations == ()
+    assert solution.audit.destroyed_together == 0.0

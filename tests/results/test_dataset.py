@@ -1,0 +1,182 @@
+"""The dataset: conventions, units, attributes, and files that appear whole or not at all."""
+
+import errno
+import os
+import stat
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray
+from case_runs import solved
+
+import surfacechem
+from surfacechem.errors import InputError, OutputError
+from surfacechem.format import names
+from surfacechem.results.netcdf import cf_unit, write_netcdf
+
+pytestmark = pytest.mark.around
+
+SKIPPED = ["check_spatiotemporal_dims_have_coordinate_vars"]
+"""Wants a calendar date of every coordinate called time; a run has elapsed seconds."""
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return solved("exothermic")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Every shipped case as it is in memory and as a file."""
+    folder = tmp_path_factory.mktemp("datasets")
+
+    @cache
+    def run(name):
+        solution = solved(name)
+        return solution.dataset, solution.write(folder / f"{name}.nc")
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def suite():
+    runner = pytest.importorskip("compliance_checker.runner")
+    suite = runner.CheckSuite()
+    suite.load_all_available_checkers()
+    return suite
+
+
+@pytest.mark.parametrize("name", names())
+def test_follows_the_cf_conventions(written, suite, name):
+    _, file = written(name)
+    data = suite.load_dataset(str(file))
+    results, problems = suite.run_all(data, ["cf:1.11"], skip_checks=SKIPPED)["cf:1.11"]
+    assert problems == {}
+    assert [message for result in results for message in result.msgs] == []
+
+
+@pytest.mark.parametrize("name", names())
+def test_opens_plainly_and_is_the_dataset_in_memory(written, name):
+    memory, file = written(name)
+    with xarray.open_dataset(file) as opened:
+        xarray.testing.assert_identical(opened, memory)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_variable_has_a_unit_and_a_meaning(written, name):
+    _, file = written(name)
+    with xarray.open_dataset(file) as data:
+        for variable in data.variables.values():
+            assert variable.attrs["units"]
+            assert variable.attrs["long_name"]
+        assert all(isinstance(value, str | float | int | np.number) for value in data.attrs.values())
+
+
+def test_says_what_was_run_and_how_it_went(solution):
+    attributes = solution.dataset.attrs
+    assert attributes["status"] == "finished"
+    assert attributes["reason"] == "reached the end at t = 2.5 s"
+    assert attributes["error"] < 1e-9
+    assert attributes["error_source"] == "exact solution exothermic-bonding"
+    assert attributes["energy_error"] < 1e-9
+    assert attributes["run_seconds"] > 0
+    assert attributes["count_steps"] > 0
+    assert "bond-energy" in attributes["case"]
+
+
+def test_carries_the_exact_solution_and_the_residuals(solution):
+    data = solution.dataset
+    assert float(abs(data["T"] - data["T_exact"]).max()) < 1e-6
+    for name in ("energy_residual", "entropy_residual", "site_residual", "least_sigma_linear_affinity"):
+        assert name in data
+
+
+def test_what_the_scene_does_not_have_is_not_there():
+    data = surfacechem.run("sliding-dry").dataset
+    assert not [name for name in data.variables if name.startswith(("phi", "g_n", "J_c", "mu", "site", "event"))]
+
+
+def test_a_file_is_replaced_whole(solution, tmp_path):
+    path = tmp_path / "out.nc"
+    path.write_text("old")
+    solution.write(path)
+    assert [file.name for file in tmp_path.iterdir()] == ["out.nc"]
+    assert xarray.open_dataset(path)["T"].size == 201
+
+
+def full_disk(folder):
+    """Writing of netCDF that finds no room in a folder."""
+
+    def write(path, columns, attributes):
+        if path.parent == folder:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_netcdf(path, columns, attributes)
+
+    return write
+
+
+def test_what_has_no_room_is_kept_elsewhere(solution, tmp_path, monkeypatch):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "other").mkdir()
+    monkeypatch.setattr("surfacechem.results.netcdf.write_netcdf", full_disk(tmp_path / "full"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "other"))
+    with pytest.raises(OutputError, match=r"out\.nc: cannot be written: No space left on device\. The results"):
+        solution.write(tmp_path / "full" / "out.nc")
+    assert list((tmp_path / "full").iterdir()) == []
+    (kept,) = (tmp_path / "other").iterdir()
+    assert xarray.open_dataset(kept)["T"].size == 201
+
+
+def test_where_there_is_no_room_at_all_nothing_stays_behind(solution, tmp_path, monkeypatch):
+    monkeypatch.setattr("surfacechem.results.netcdf.write_netcdf", full_disk(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.raises(OutputError, match="There is no room in"):
+        solution.write(tmp_path / "out.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
+def test_permissions_follow_the_umask_and_the_file_that_is_replaced(solution, tmp_path, umask):
+    usual = os.umask(umask)
+    try:
+        solution.write(tmp_path / "new.nc")
+        (tmp_path / "old.nc").touch()
+        (tmp_path / "old.nc").chmod(0o664)
+        solution.write(tmp_path / "old.nc")
+    finally:
+        os.umask(usual)
+    assert stat.S_IMODE((tmp_path / "new.nc").stat().st_mode) == 0o666 & ~umask
+    assert stat.S_IMODE((tmp_path / "old.nc").stat().st_mode) == 0o664
+
+
+@pytest.mark.parametrize("target", ["", "missing/out.nc"])
+def test_an_unwritable_target_is_refused(solution, tmp_path, target):
+    with pytest.raises(InputError, match=r"is a directory|cannot be written"):
+        solution.write(tmp_path / target)
+
+
+def test_units_in_the_notation_of_the_conventions():
+    assert cf_unit("1/(J s m^2)") == "J-1 s-1 m-2"
+    assert cf_unit("Pa s") == "Pa s"
+
+
+def test_a_link_is_followed_and_what_is_no_file_is_left_alone(solution, tmp_path):
+    real = tmp_path / "real.nc"
+    real.write_text("old")
+    (tmp_path / "link.nc").symlink_to(real)
+    solution.write(tmp_path / "link.nc")
+    assert (tmp_path / "link.nc").is_symlink()
+    assert xarray.open_dataset(real)["T"].size == 201
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is no regular file"):
+        solution.write(tmp_path / "pipe")
+    real.chmod(0o444)
+    with pytest.raises(InputError, match="it is read-only"):
+        solution.write(real)
+
+
+def test_a_solution_says_itself_in_a_line(solution):
+    assert repr(solution).startswith(
+        "<Solution 'Exothermic bonding, kappa = 0.5': finished, reached the end at t = 2.5 s"
+    )

@@ -1,0 +1,128 @@
+"""Running a loaded case with changed parameters, times and tolerances."""
+
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.runs import rerun
+
+K_0 = "interface.potential.bond-energy.K_0"
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return surfacechem.load("exothermic")
+
+
+def test_a_changed_run_can_be_run_again_from_its_file(simulation, tmp_path):
+    settings = dataclasses.replace(simulation.case.run, times=(0.0, 0.3, 0.7, 2.0), atol=1e-14, rtol=1e-9)
+    solution = simulation.run({K_0: "600 J/m^2", "initial.phi": 0.1}, settings)
+    record = rerun.read(solution.write(tmp_path / "changed.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+    assert rerun.differences(record, simulation.run()) != []
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"bodies.lower.C": -1}, r"bodies\.lower\.C = -1 is outside its range: > 0"),
+        ({"bodies.lower.C": "1 m"}, r"1 m is a length; bodies\.lower\.C needs a heat capacity per area"),
+        ({"bodies.lower.c": 1}, r"no parameter 'bodies\.lower\.c' to change\. Did you mean 'bodies\.lower\.C'\?"),
+        ({"initial.T": float("nan")}, r"initial\.T must be finite"),
+        ({"initial.T": -3.0}, r"at the start the temperature T reached zero"),
+        ({"T_0": 0.0}, r"T_0 = 0 is outside its range: > 0"),
+        ({"interface.sites": 0.0}, r"interface\.sites = 0 is outside its range: > 0"),
+        ({"run.slack": 10.0}, r"no parameter 'run\.slack' to change"),
+        ({"phi_max": 5.0}, r"no parameter 'phi_max' to change"),
+        ({"initial.phi": 1.5}, r"at the start phi rose above its bound 1"),
+    ],
+)
+def test_a_change_that_makes_no_sense_is_refused(simulation, changes, message):
+    with pytest.raises(InputError, match=message):
+        simulation.run(changes)
+
+
+@pytest.mark.parametrize("times", [(), (0.0,), (0.5, 1.0), (0.0, 1.0, 1.0), (0.0, 2.0, 1.0)])
+def test_output_times_start_at_zero_and_increase(simulation, times):
+    with pytest.raises(InputError, match="output times must start at 0 and increase"):
+        dataclasses.replace(simulation.case.run, times=times)
+
+
+def test_output_times_never_change_the_answer(simulation):
+    few, many = ((0.0, 2.5), tuple(2.5 * i / 1000 for i in range(1001)))
+    ends = [simulation.run(run=dataclasses.replace(simulation.case.run, times=times)) for times in (few, many)]
+    first, second = (solution.trajectory.result for solution in ends)
+    assert (first.y == second.y).all()
+    assert first.counters.steps == second.counters.steps
+
+
+def test_a_constant_history_is_changed_by_its_name_in_any_unit():
+    sliding = surfacechem.load("sliding-dry")
+    changed = [sliding.run({"loading.v": v}) for v in ("50 mm/s", 0.05, np.float32(0.05), np.int64(1))]
+    speeds = [float(solution.dataset["v"][0]) for solution in changed]
+    assert speeds == pytest.approx([0.05, 0.05, 0.05, 1.0], rel=1e-7)
+
+
+def test_a_table_has_no_numbers_to_change():
+    case = surfacechem.load("sliding-dry", {"loading.v": {"table": {"times": [0, 1], "values": [0, 1]}}})
+    with pytest.raises(InputError, match=r"no parameter 'loading\.v\.table\.slope' to change"):
+        case.run({"loading.v.table.slope": 2.0})
+
+
+def test_a_case_may_drop_its_exact_solution():
+    assert surfacechem.run("exothermic", ["reference="]).accuracy.source.startswith("estimate")
+
+
+M = "interface.bonding.kamal-sourour.m"
+
+
+@pytest.fixture(scope="module")
+def cure():
+    """A cure whose case gives the default of the order m."""
+    return surfacechem.load("epoxy-cure-isothermal", {M: 1.0, "reference": ""})
+
+
+def test_a_parameter_at_its_default_is_changed(cure):
+    changed = cure.run({M: 1.3})
+    given = surfacechem.run("epoxy-cure-isothermal", {M: 1.3, "reference": ""})
+    assert np.array_equal(changed.dataset.phi, given.dataset.phi)
+    assert np.array_equal(cure.run({M: 1.0}).dataset.phi, cure.run().dataset.phi)
+    assert not np.array_equal(changed.dataset.phi, cure.run().dataset.phi)
+
+
+def test_a_parameter_at_its_default_is_swept(cure, tmp_path):
+    swept = cure.sweep({M: [1.0, 1.3]}, changes={"interface.bonding.kamal-sourour.E_1": "1 kJ/mol"})
+    singly = [cure.run({M: m}).dataset.phi for m in (1.0, 1.3)]
+    np.testing.assert_allclose(swept.dataset.phi, singly, rtol=1e-9)
+    assert [c.sweep({M: [1.0]}).dataset.phi.shape for c in (cure,)] == [(1, len(cure.case.run.times))]
+    record = rerun.read(swept.write(tmp_path / "swept.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+@pytest.mark.parametrize("name", ["exothermic", "stick-slip", "rate-and-state-stick-slip", "sudden-contact"])
+def test_a_solution_comes_back_from_a_pickle_as_it_was(name):
+    solution = surfacechem.run(name, ["run.outputs=21"])
+    again = pickle.loads(pickle.dumps(solution))
+    assert again.dataset.drop_attrs().identical(solution.dataset.drop_attrs())
+    assert {**again.attributes, "compile_seconds": 0} == {**solution.attributes, "compile_seconds": 0}
+    repeated = again.trajectory.model.solve(again.trajectory.run)
+    assert np.array_equal(repeated.result.outputs, solution.trajectory.result.outputs)
+
+
+@pytest.mark.parametrize(("name", "over"), [("force-spectroscopy", None), ("debonding", {"initial.T": [300, 310]})])
+def test_a_sweep_comes_back_from_a_pickle_as_it_was(name, over):
+    swept = surfacechem.load(name).sweep(over)
+    again = pickle.loads(pickle.dumps(swept))
+    assert again.dataset.drop_attrs().identical(swept.dataset.drop_attrs())
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".txt"])
+def test_a_dataset_is_written_under_the_name_of_its_format_only(simulation, tmp_path, suffix):
+    target = tmp_path / f"run{suffix}"
+    with pytest.raises(InputError, match=r"written as netCDF, not as '\.\w+': \.nc, \.nc4, \.cdf\. Give run\.nc"):
+        simulation.run().write(target)
+    assert not target.exists()

@@ -1,0 +1,332 @@
+"""Sweeps: many runs of one compiled model, force spectra against the exact formulas, refusals."""
+
+import numpy as np
+import pytest
+import xarray
+from test_references import bell, build, table
+from typer.testing import CliRunner
+
+import surfacechem
+from surfacechem import format as cases
+from surfacechem.cli.main import app
+from surfacechem.errors import InputError
+from surfacechem.plots import sweep as sweep_plots
+from surfacechem.references import get
+from surfacechem.runs import rerun
+from surfacechem.runs.report import sweep_summary
+from surfacechem.solve import run as integrate
+
+RATE = "loading.f.ramp.rate"
+K_0 = "interface.potential.bond-energy.K_0"
+
+
+@pytest.fixture(scope="module")
+def spectrum():
+    return surfacechem.sweep("force-spectroscopy")
+
+
+@pytest.fixture(scope="module")
+def bonding():
+    return surfacechem.load("exothermic")
+
+
+def test_six_decades_of_loading_rates_meet_the_exact_formulas(spectrum):
+    data = spectrum.dataset
+    assert data.sizes == {"rate": 61, "f": 201}
+    assert data["rate"].values[-1] / data["rate"].values[0] == pytest.approx(1e6)
+    for rate, one in zip(data["rate"].values, data["rate"], strict=True):
+        bond, found = get("bell-ramp")(k_off=0.1, x_off=4e-10, T=300.0, rate=rate), data.sel(rate=one)
+        for which in ("mode", "median", "mean"):
+            exact = getattr(bond, which)
+            assert found[f"f_{which}_exact"] == pytest.approx(exact, rel=1e-12)
+            assert abs(found[f"f_{which}"].item() - exact) <= 1e-11 * exact + 1e-24
+    assert data.attrs["error"] < 1e-11
+    assert data.attrs["error_source"] == "exact solution bell-ramp"
+    assert set(data["status"].values) == {"stopped"}
+    assert "all bonds broke" in data["reason"].values[0]
+
+
+def test_spectrum_meets_the_table():
+    data = table("c_bell_ramp")
+    p, rates = bell(data.parameters), data.columns["r"]
+    assert (p["k_off"], p["x_off"], data.parameters["T"]) == (0.1, 4e-10, 300.0)
+    found = surfacechem.sweep("force-spectroscopy", {RATE: rates}, {"f": "250 pN"}).dataset
+    for which, column in (("mode", "F_mode"), ("median", "F_median"), ("mean", "F_mean")):
+        np.testing.assert_allclose(found[f"f_{which}"], data.columns[column], rtol=1e-10, atol=1e-24)
+
+
+def test_outputs_of_a_spectrum_are_at_equal_forces(spectrum):
+    data = spectrum.dataset
+    np.testing.assert_allclose(data["f"], np.linspace(0, 2e-10, 201), rtol=1e-12)
+    one = data.isel(rate=30)
+    np.testing.assert_allclose(one["time"] * one["rate"], data["f"], rtol=1e-12)
+    bond = build("bell-ramp", {}, k_off=0.1, x_off=4e-10, T=300.0, rate=one["rate"].item())
+    reached = np.isfinite(one["phi"].values)
+    exact = bond.solution(one["time"].values[reached])["phi"]
+    np.testing.assert_allclose(one["phi"].values[reached], exact, rtol=1e-8, atol=1e-16)
+    np.testing.assert_allclose(
+        one["density_f"].values[reached], np.exp(bond.log_density(one["f"].values[reached])), rtol=1e-8, atol=1e-4
+    )
+
+
+def test_bonds_of_a_mechanism_have_a_spectrum():
+    data = surfacechem.sweep("l-selectin-tether").dataset
+    for one in data["rate"]:
+        bond, found = get("bell-ramp")(k_off=3.0, x_off=4e-10, T=298.15, rate=one.item()), data.sel(rate=one)
+        for which in ("mode", "median", "mean"):
+            assert found[f"f_{which}"].item() == pytest.approx(getattr(bond, which), rel=1e-9, abs=1e-24)
+
+
+def test_biotin_breaks_near_the_forces_that_were_measured():
+    """200 pN at 1.5 nN/s and 230 pN at 110 nN/s, Sedlak et al. (2017); the off-rate is known to a power of ten."""
+    data = surfacechem.sweep("biotin-streptavidin").dataset
+    assert data.attrs["error"] < 1e-10
+    slow, fast = (data["f_mode"].sel(rate=rate, method="nearest").item() for rate in (1.5e-9, 110e-9))
+    assert (slow, fast) == (pytest.approx(200e-12, rel=0.02), pytest.approx(230e-12, rel=0.1))
+
+
+def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
+    solution = bonding.sweep({K_0: [100.0, "0.3 kJ/m^2"], "initial.phi": [0.0, 0.2, 0.4]})
+    data = solution.dataset
+    assert data["T"].dims == ("K_0", "initial_phi", "time")
+    single = bonding.run({K_0: 300.0, "initial.phi": 0.2}).dataset
+    one = data.sel(K_0=300.0, initial_phi=0.2)
+    for name in ("phi", "T", "q_1", "U_1", "E_total", "S_total"):
+        assert one[name].values.tobytes() == single[name].values.tobytes()
+    for name in ("energy_error", "entropy_error", "site_error"):
+        assert one[name].item() == pytest.approx(single.attrs[name], abs=1e-13)
+        assert data.attrs[name] == data[name].values.max() < 1e-8
+    assert not data["destroys_entropy"].any()
+    assert one["time_reached"] == single.attrs["time_reached"]
+
+
+def test_the_number_of_threads_changes_nothing(bonding):
+    one, two = (bonding.sweep({K_0: np.linspace(1, 300, 600)}, threads=n).sweep.batch for n in (1, 2))
+    assert one.outputs.tobytes() == two.outputs.tobytes()
+
+
+def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):
+    simulation = surfacechem.load("force-spectroscopy")
+    first = simulation.sweep().dataset
+    monkeypatch.setattr(integrate, "compile_program", lambda *_: pytest.fail("compiled"))
+    again = simulation.sweep({RATE: ["1 pN/s", "1 nN/s"]}).dataset
+    assert again.sizes["rate"] == 2
+    assert first["f_mode"].values.tobytes() == spectrum.dataset["f_mode"].values.tobytes()
+
+
+def test_errors_against_an_exact_solution_of_each_run(bonding):
+    data = bonding.sweep({K_0: [100.0, 300.0]}).dataset
+    assert data.attrs["error_source"].startswith("exact solution exothermic-bonding")
+    assert np.all(data["error"] < 1e-8)
+
+
+def test_a_sweep_can_be_run_again_from_its_file(spectrum, tmp_path):
+    record = rerun.read(spectrum.write(tmp_path / "spectrum.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+def test_ruptures_are_statuses_with_their_time():
+    case = surfacechem.load("shared-load-rupture")
+    tractions = [200.0, 517.743, 1000.0]
+    data = case.sweep({"loading.t_n": tractions}).dataset
+    given = {"k_off": 0.5, "x_off": 4e-10, "T": 300.0, "n_c": 1e14}
+    exact = [get("shared-load-cluster")(**given, t_n=t_n).end_time for t_n in tractions]
+    assert exact[0] > 2.0
+    assert list(data["status"].values) == ["finished", "stopped", "stopped"]
+    assert "the bonds ruptured" in data["reason"].values[1]
+    np.testing.assert_allclose(data["time_reached"].values[1:], exact[1:], rtol=1e-8)
+    assert data.attrs["reason"] == "1 finished, 2 stopped"
+
+
+@pytest.mark.parametrize("excess", [1e-1, 1e-2, 1e-4])
+def test_lifetime_above_the_critical_load(excess):
+    kind = get("rebinding-cluster")
+    given = {"k_off": 0.5, "k_on": 0.5, "x_off": 4e-10, "T": 300.0, "n_c": 1e14}
+    t_n = kind(**given, t_n=1.0).critical_traction * (1 + excess)
+    case = surfacechem.load("adhesion-cluster", {"loading.t_n": t_n, "run.until": "1000 s"})
+    reached = case.run().trajectory.result.t
+    assert reached == pytest.approx(kind(**given, t_n=t_n).end_time, rel=1e-8)
+
+
+def test_survival_down_to_1e_282():
+    case = surfacechem.load("bond-constant-force", {"run.atol": 1e-300, "run.until": "358 s"})
+    data = case.run().dataset
+    phi = data["phi"].values
+    exact = get("bell-constant-force")(k_off=0.1, x_off=4e-10, T=300.0, f=3e-11).solution(data["time"].values)
+    assert phi[-1] < 1e-281
+    np.testing.assert_allclose(np.log(phi), exact["ln_phi"], rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 10.0, 100.0, 300.0, 700.0, 1000.0, 1e4, 1e6])
+def test_forces_that_overflow(exponent):
+    """Half of the bonds are gone within the lifetime, or at once where no run can resolve it; nothing is infinite."""
+    force = exponent * get("bell-constant-force")(k_off=0.1, x_off=4e-10, T=300.0, f=0.0).force_scale
+    bond = get("bell-constant-force")(k_off=0.1, x_off=4e-10, T=300.0, f=force)
+    data = surfacechem.run("bond-constant-force", {"loading.f": force, "run.until": "1 s"}).dataset
+    assert data.attrs["status"] == "finished"
+    assert all(np.isfinite(values).all() for values in data.variables.values() if values.dtype.kind == "f")
+    np.testing.assert_allclose(data["phi"], bond.solution(data["time"].values)["phi"], rtol=1e-6, atol=1e-12)
+
+
+def test_scenes_with_jumps_are_swept_run_by_run():
+    case = surfacechem.load("press-hold-pull")
+    data = case.sweep({"programme.approach.until.p": ["8 kPa", "10 kPa"]}).dataset
+    single = case.run({"programme.approach.until.p": 8e3})
+    for name in ("g_n", "t_n", "theta_bond_s", "E_total"):
+        assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
+    for name in ("energy_error", "entropy_error", "site_error"):
+        assert data[name].values[0] == single.dataset.attrs[name]
+
+
+def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
+    t_max = "interface.limits.tensile-strength.t_max"
+    case = surfacechem.load("debonding")
+    solution = case.sweep({t_max: ["20 MPa", "77.46 MPa", "1 GPa"]})
+    data, single = solution.dataset, case.run({t_max: 20e6})
+    assert data["destroys_entropy"].values.tolist() == [1, 0, 0]
+    assert data["entropy_destroyed"].values.tolist() == [-single.dataset["event_entropy"].item(), 0, 0]
+    assert "debond" in single.dataset.attrs["entropy_violations"]
+    assert data["event_name"].values.tolist() == [["debond"], ["debond"], [""]]
+    for name in ("event_time", "event_released", "T_before", "T_after"):
+        assert data[name].dims == ("t_max", "event")
+        assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
+        assert np.isnan(data[name].values[2]).all()
+    (events,) = (line for line in sweep_summary(solution, None).splitlines() if line.startswith("  events"))
+    assert "2 debond; destroys entropy in 1 of 3 runs, at worst -0." in events
+    assert events.endswith("at t_max = 2e+07")
+    refused = surfacechem.load("debonding", {"interface.limits.tensile-strength.violation": "refuse"})
+    data = refused.sweep({t_max: ["20 MPa", "77.46 MPa"]}).dataset
+    assert not data["destroys_entropy"].any()
+    assert "destroys entropy" in data["reason"].values[0]
+
+
+@pytest.mark.parametrize(
+    ("case", "path", "value", "written"),
+    [
+        ("press-hold-pull", "programme.hold.for", 3.0, "programme.hold.for"),
+        ("press-hold-pull", "programme.approach.w_n", -2e-7, "programme.approach.w_n"),
+        ("press-hold-pull", "programme.pull.until.theta_bond_s.falls-to", 1e-5, None),
+        ("press-hold-pull", "programme.approach.until.p.rises-to", 2e3, "programme.approach.until.p"),
+        ("debonding", "interface.limits.tensile-strength.t_max.value", 5e7, "interface.limits.tensile-strength.t_max"),
+        ("debonding", "mechanics.normal.k", 2e13, None),
+        ("sliding-dry", "loading.v", 0.01, "loading.v.level"),
+        ("exothermic", "bodies.lower.C", 1e3, None),
+    ],
+)
+def test_paths_of_a_sweep_are_those_of_the_case(case, path, value, written):
+    simulation = surfacechem.load(case)
+    assert simulation._plan({path: [value]}, None).axes[0].path == (written or path)
+    if path != "mechanics.normal.k":
+        changed = surfacechem.load(case, {path: value}).model.values()
+        assert changed == simulation.model.values(simulation._values({path: value}))
+
+
+@pytest.mark.parametrize(
+    ("case", "path"),
+    [
+        ("stick-slip", "mechanics.tangential.m"),
+        ("slow-passage", "mechanics.normal.c_g"),
+        ("cohesive-pull-off", "mechanics.normal.k"),
+    ],
+)
+def test_what_makes_a_gap_move_as_it_does_cannot_vanish(case, path):
+    with pytest.raises(InputError, match=f"{path} = 0 is outside its range: > 0"):
+        surfacechem.sweep(case, {path: [1.0, 0.0]})
+
+
+def test_an_output_at_a_jump_is_compared_on_its_side():
+    """The first two debond at a multiple of the spacing of the outputs."""
+    path = "interface.limits.tensile-strength.t_max"
+    assert surfacechem.sweep("debonding", {path: ["20 MPa", "55 MPa", "80.01 MPa"]}).dataset.error.max() < 1e-12
+
+
+def test_fitted_media_are_swept_run_by_run():
+    case = surfacechem.load("closing-gas-gap")
+    data = case.sweep({"initial.T_2": [500.0, 600.0]}).dataset
+    assert data["T_2"].values[1].tobytes() == case.run().dataset["T_2"].values.tobytes()
+
+
+def test_a_run_that_ends_at_its_start_leaves_the_others_alone(tmp_path):
+    limit = "interface.limits.tensile-strength"
+    case = surfacechem.load("debonding-cooling", {f"{limit}.violation": "refuse", "loading.w_n.ramp.start": "1 um"})
+    swept = case.sweep({f"{limit}.t_max": ["1 kPa", "1 GPa"]})
+    data = swept.dataset
+    assert list(data["status"].values) == ["stopped", "finished"]
+    assert data["reason"].values[0].endswith("which destroys entropy at t = 0 s")
+    assert np.isnan(data["T"].values[0]).all()
+    assert np.isnan(data["error"].values[0])
+    assert np.isfinite(data["error"].values[1])
+    assert swept.write(tmp_path / "swept.nc").exists()
+
+
+REFUSED = [
+    ({"nothing": [1.0]}, None, r"no parameter 'nothing' to sweep. Known"),
+    ({RATE: {"from": 1e-12, "to": 1e-9}}, None, r"a range needs `points`"),
+    ({RATE: {"from": "-1 pN/s", "to": "1 pN/s", "points": 3, "spacing": "logarithmic"}}, None, r"ends above zero"),
+    ({RATE: {"from": "1 pN", "to": "2 pN", "points": 3}}, None, r"1 pN is a force"),
+    ({RATE: {"from": 1, "to": 2, "points": 3, "step": 4}}, None, r"unknown key 'step'"),
+    ({RATE: []}, None, r"needs finite values, at least one"),
+    ({RATE: [1e-12, 1e-12]}, None, r"has a value twice"),
+    ({RATE: [-1e-12]}, None, r"f never reaches 2e-10"),
+    ({}, None, r"a sweep needs `over`"),
+    ({"initial.phi": [1.0, 2.0]}, None, r"phi rose above its bound 1"),
+    (None, {"T_c": "310 K"}, r"T_c is no ramp"),
+    (None, {"v": "1 m/s"}, r"no law reads a prescribed v"),
+    (None, {"x": "1 m/s"}, r"no variable 'x'"),
+    (None, {"f": "1 pN", "t_n": "1 Pa"}, r"`until` is one prescribed variable"),
+]
+
+
+@pytest.mark.parametrize(("over", "until", "message"), REFUSED)
+def test_bad_sweeps_are_refused(over, until, message):
+    with pytest.raises(InputError, match=message):
+        surfacechem.sweep("force-spectroscopy", over, until)
+
+
+def test_a_case_without_a_sweep(bonding):
+    with pytest.raises(InputError, match=r"a sweep needs `sweep: {over: ...}` in the case"):
+        bonding.sweep()
+    with pytest.raises(InputError, match="unknown key 'ovr'"):
+        cases.load("exothermic", {"sweep": {"ovr": {}}})
+
+
+def test_figure_of_a_spectrum(spectrum):
+    plot = sweep_plots.figure(spectrum.dataset)
+    (ax,) = plot.axes
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
+    assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Rate of change [N s$^{-1}$]")
+    assert ax.get_ylabel() == "$f$ at rupture [pN]"
+
+
+def test_figure_of_final_values(bonding):
+    plot = sweep_plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
+    assert [ax.get_ylabel() for ax in plot.axes] == ["final [K]", "final [1]"]
+    ax = plot.axes[0]
+    assert len(ax.get_lines()) == 3
+    assert ax.get_legend().get_texts()[0].get_text() == "$T$ K 0 = 100 J m$^{-2}$"
+    with pytest.raises(InputError, match="no variable 'x' in the sweep"):
+        sweep_plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
+
+
+def test_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [
+        "sweep",
+        "force-spectroscopy",
+        "--over",
+        f"{RATE}=[1 pN/s, 1 nN/s]",
+        "--until",
+        "f=150 pN",
+        "-o",
+        "s.nc",
+    ]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    labels = ["swept", "solved", "ended", "error", "time", "balances", "written"]
+    assert [line.split()[0] for line in done.stdout.splitlines()[1:]] == labels
+    assert "rate (1e-12 to 1e-09, 2 values)" in done.stdout
+    with xarray.open_dataset("s.nc") as data:
+        assert data["phi"].dims == ("rate", "f")
+    assert CliRunner().invoke(app, ["plot", "s.nc", "-o", "s.svg"]).exit_code == 0
+    again = CliRunner().invoke(app, ["rerun", "s.nc"])
+    assert again.exit_code == 0, again.output

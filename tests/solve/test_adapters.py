@@ -1,0 +1,87 @@
+"""Solvers by name, and the honesty of the adapters: what a library gets wrong must not be reported as a success."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import symengine as se
+from solver_problems import problem
+
+from surfacechem import load
+from surfacechem.compile.program import compile_program
+from surfacechem.results.event_table import event_times
+from surfacechem.solve import names, solver
+from surfacechem.solve.contract import Problem
+
+
+def test_unknown_name() -> None:
+    with pytest.raises(ValueError, match="Did you mean 'cvode'"):
+        solver("cvodes")
+
+
+@pytest.mark.parametrize("name", names)
+def test_equations_that_stop_being_finite(name: str) -> None:
+    """y' = -sqrt(y) - 1 has no real right-hand side once y falls below zero."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + se.sqrt(y) + 1])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-6, max_steps=5_000))
+    assert not result.success
+    assert np.isfinite(result.y[0])
+    assert result.t < 0.7
+
+
+@pytest.mark.parametrize("name", names)
+def test_outputs_right_after_the_start(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-10, times=[2e-10, 1.0]))
+    np.testing.assert_allclose(1.0 - result.outputs[0], 2e-10, rtol=1e-4)
+
+
+def test_problem_is_checked() -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y])
+    with pytest.raises(ValueError, match="output times must lie within"):
+        Problem(program, np.ones(1), np.array([3.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-6, np.ones(1))
+
+
+@pytest.mark.parametrize("name", ["bdf", "scipy-radau"])
+def test_factorizations_are_counted_where_the_library_tells(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + 1e4 * (y - se.cos(t))])
+    assert solver(name).solve(problem(program, [1.0], [0.0, 1.0], 1e-6)).counters.factorizations > 1
+
+
+@pytest.mark.parametrize("name", names)
+def test_a_state_at_rest_may_do_work(name: str) -> None:
+    """Nothing asks for short steps; what is booked on the way is exact all the same."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy], [2 * t * y, 5 * t**4])
+    result = solver(name).solve(problem(program, [3.0], [0.0, 2.0], 1e-6, times=[0.0, 0.1, 0.7, 2.0]))
+    times = result.times
+    np.testing.assert_allclose(
+        result.ledger_outputs, np.stack([3 * times**2, times**5], axis=1), rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_array_equal(result.ledger, result.ledger_outputs[-1])
+
+
+@pytest.mark.parametrize("name", names)
+def test_what_is_booked_is_as_accurate_as_the_state(name: str) -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + y], [y, -2 * y * dy])
+    result = solver(name).solve(problem(program, [1.0], [0.0, 5.0], 1e-8, times=[0.0, 1.0, 5.0]))
+    exact = np.exp(-result.times)
+    found = result.ledger_outputs
+    np.testing.assert_allclose(found[:, 0], 1 - result.outputs[:, 0], atol=1e-8)
+    np.testing.assert_allclose(found, np.stack([1 - exact, 1 - exact**2], axis=1), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_a_peak_before_an_event_is_seen(name: str) -> None:
+    """Attachment peaks at touch, in the last hundredths of a long approach: a step may go on to where it is over."""
+    simulation = load("press-hold-pull")
+    run = replace(simulation.case.run, rtol=1e-7, solver=name, accuracy=None)
+    trajectory = simulation.model.solve(run)
+    times = event_times(trajectory)
+    np.testing.assert_allclose(times["touch"], [0.5], rtol=1e-8)
+    np.testing.assert_allclose(times["release"], [21.15942147473261], rtol=1e-5)

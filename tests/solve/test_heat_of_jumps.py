@@ -1,0 +1,316 @@
+"""The heat of a jump goes where that of the same process goes if it takes some time, in every temperature."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surfacechem.format import load_text
+from surfacechem.reactor import InterfaceReactor, ReactorNet
+from surfacechem.runs.check import warnings
+from surfacechem.runs.simulation import Simulation
+
+CASE = """
+T_0: 300 K
+bodies:
+  slider: {{temperature: {T_1}, capacity: constant, C: {C_1} J/m^2/K{cells}}}
+  base: {{temperature: {T_2}, capacity: constant, C: 700 J/m^2/K}}
+interface:
+{interface}
+  friction: [coulomb: {{mu: 0.5{static}}}]
+{heat}
+mechanics: {{{mechanics}}}
+loading: {{{loading}}}
+initial: {{{initial}}}
+run: {{until: 4 s, outputs: 5}}
+"""
+
+
+def paths(**ends):
+    return "heat: [" + ", ".join(f"conductance: {{between: [{e}, interface], h: {h}}}" for e, h in ends.items()) + "]"
+
+
+APART = {"T_1": "T_1", "T_2": "T_2"}
+THERMAL = {
+    "slider": APART | {"interface": "  partition: {slider: 1, base: 0}"},
+    "base": APART | {"interface": "  partition: {slider: 0, base: 1}"},
+    "surroundings": APART
+    | {
+        "interface": "  partition: {slider: 0.2, base: 0.5, surroundings: 0.3}",
+        "heat": "surroundings: {temperature: 280 K}",
+    },
+    "paths": APART | {"interface": "  temperature: T_c", "heat": paths(slider=9, base=1)},
+    "paths outward": APART
+    | {
+        "interface": "  temperature: T_c",
+        "heat": "surroundings: {temperature: 280 K}\n" + paths(slider=2, base=1, surroundings=5),
+    },
+    "mean": APART
+    | {
+        "interface": "  temperature: T_c",
+        "heat": "heat: [conductance: {between: [slider, base], h: 3, closure: mean}]",
+    },
+    "stores": APART
+    | {
+        "interface": "  temperature: T_c\n  potential: [constant-interface-capacity: {C_c: 20}]",
+        "heat": paths(slider=9, base=1),
+        "initial": "T_c: 300",
+    },
+    "perfect": {"T_1": "T", "T_2": "T", "interface": "  temperature: T"},
+    "one-sided": {"T_1": "T_1", "T_2": "T_2", "interface": "  temperature: T_1"},
+    "held": {"T_1": "T_1", "T_2": "310 K", "interface": "  partition: {slider: 0.3, base: 0.7}"},
+    "cells": APART
+    | {
+        "interface": "  partition: {slider: 0.8, base: 0.2}",
+        "cells": ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}",
+    },
+    "area": APART
+    | {
+        "interface": "  temperature: T_c",
+        "heat": "surroundings: {temperature: 280 K}\n" + paths(slider=2, base=1, surroundings=5),
+        "loading": "J_c: 2",
+    },
+}
+
+
+def text(thermal, loading, mechanics, potential="", static="", **more):
+    given = {"cells": "", "heat": "", "C_1": 1000, "static": static, "initial": ""} | THERMAL[thermal] | more
+    interface = given["interface"]
+    if potential:
+        interface = (
+            interface.replace("potential: [", f"potential: [{potential}, ")
+            if "potential" in interface
+            else f"{interface}\n  potential: [{potential}]"
+        )
+    temperatures = {given[name] for name in ("T_1", "T_2") if given[name].startswith("T")}
+    initial = ", ".join([*(f"{name}: 300" for name in sorted(temperatures)), given["initial"]]).rstrip(", ")
+    loading = ", ".join(filter(None, (loading, given.pop("loading", ""))))
+    return CASE.format(**{**given, "interface": interface, "initial": initial}, loading=loading, mechanics=mechanics)
+
+
+def initial(thermal, gaps):
+    return ", ".join(filter(None, (gaps, THERMAL[thermal].get("initial"))))
+
+
+def solved(case):
+    solution = Simulation(load_text(case)).run(error="balances")
+    assert solution.trajectory.status == "finished", solution.trajectory.reason
+    assert solution.audit.energy_error < 1e-9
+    assert solution.audit.violations == ()
+    return solution
+
+
+def temperatures(solution):
+    system = solution.trajectory.model.system
+    found = dict(zip((s.name for s in system.states), solution.trajectory.result.y, strict=True))
+    return {name: T for name, T in found.items() if name.startswith("T")}
+
+
+def same(one, other, exact):
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        assert value == pytest.approx(other[name], rel=0, abs=exact), name
+
+
+def table(name, levels, unit, jump):
+    """A level from 0 to 2 s and another one until 4 s, with a jump or a steep ramp between."""
+    return f"{name}: {{table: {{times: [0, 2, {2 + jump}, 4], values: [{', '.join(f'{x} {unit}' for x in levels)}]}}}}"
+
+
+SLIDER = {
+    "rigid": ("tangential: {k: 1e9, beta_1: 0.9}", ""),
+    "elastic": ("tangential: {k: 1e9, beta_1: 0.9}", "tangential-stiffness: {E_t: 4e9}"),
+    "pressed": ("normal: {k: 1e12, beta_1: 0}, tangential: {k: 1e9, beta_1: 0.9}", "penalty: {E_n: 1e15}"),
+    "plane": ("tangential: {k: 1e9, beta_1: 0.9}, transverse: {k: 1e9, beta_1: 0.3}", ""),
+}
+
+
+SCENES = [(thermal, "rigid") for thermal in THERMAL]
+SCENES += [(thermal, slider) for thermal in ("slider", "paths", "stores") for slider in list(SLIDER)[1:]]
+
+
+def pressure_falls(thermal, slider, jump):
+    mechanics, potential = SLIDER[slider]
+    normal = table("p", [2, 2, 0.2, 0.2], "MPa", jump)
+    if slider == "pressed":
+        normal = "w_n: -2 um, " + table("F_n", [0, 0, 1.8, 1.8], "MPa", jump)
+    across = ", w_t2: 0.3 mm" if slider == "plane" else ""
+    return text(thermal, f"{normal}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}{across}", mechanics, potential)
+
+
+@pytest.mark.parametrize(("thermal", "slider"), SCENES)
+def test_a_pressure_that_jumps_is_one_that_falls_fast(thermal, slider):
+    jumped, swift = (solved(pressure_falls(thermal, slider, jump)) for jump in (0, 1e-6))
+    assert max(jump.released for jump in jumped.trajectory.jumps) > 100
+    same(temperatures(jumped), temperatures(swift), 1e-5)
+
+
+def test_libraries_and_sweeps_heat_the_same():
+    case = load_text(pressure_falls("paths outward", "rigid", 0).replace("outputs: 5", "outputs: 5, rtol: 1e-9"))
+    simulation = Simulation(case)
+    run = simulation.run(error="balances").dataset
+    for method in ("lsoda", "bdf"):
+        other = Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances").dataset
+        np.testing.assert_allclose(other["T_1"], run["T_1"], atol=1e-6)
+    partition = Simulation(load_text(pressure_falls("slider", "rigid", 0)))
+    swept = partition.sweep({"interface.partition": [1.0, 0.75, 0.0]}).dataset
+    rise, other = (swept[name].isel(time=-1).values - 300 for name in ("T_1", "T_2"))
+    np.testing.assert_allclose(rise / rise[0], [1, 0.75, 0], atol=1e-12)
+    np.testing.assert_allclose(1000 * rise + 700 * other, 1000 * rise[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("thermal", ["surroundings", "paths", "stores"])
+def test_a_network_heats_the_same(thermal):
+    case = load_text(pressure_falls(thermal, "rigid", 0))
+    solution = solved(pressure_falls(thermal, "rigid", 0))
+    interface = InterfaceReactor(case)
+    net = ReactorNet([interface])
+    net.rtol, net.atol = 1e-10, 1e-16
+    net.advance(4.0)
+    for name, T in temperatures(solution).items():
+        assert interface[name] == pytest.approx(T, abs=1e-5)
+
+
+# -- what gives way by itself
+
+
+@pytest.mark.parametrize("thermal", THERMAL)
+def test_slips_without_a_mass_are_heat_of_friction(thermal):
+    """Each joule of a slip from a static limit goes where one of a slip under a falling pressure goes."""
+    falls = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
+    rises = []
+    for loads, static in (("p: 1 MPa, w_t: {ramp: {rate: 0.4 mm/s}}", ", mu_s: 0.6"), (falls, "")):
+        trajectory = solved(text(thermal, loads, "tangential: {k: 1e9, beta_1: 0.9}", static=static)).trajectory
+        jump = trajectory.jumps[0]
+        assert jump.released > 50
+        change = (jump.after.y - jump.before.y) / jump.released
+        rises.append([x for x, s in zip(change, trajectory.model.system.states, strict=True) if s.quantity.unit == "K"])
+    np.testing.assert_allclose(*rises, atol=1e-9 * max(rises[0]))
+
+
+FRICTION = "  friction: [coulomb: {mu: 0.5}]"
+ZONE = "exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}"
+SOFTENING = "bond-stiffness: {E_b: 1e13, E_n: 1e15}, linear-enthalpy: {H_r: 1}"
+TEARING = "  sites: 1e18\n  bonding: [compliant-debonding: {t_max: 10 MPa, E_b: 1e13, g_f: 4 um}]"
+TOUCHED = ("slider", "paths", "stores", "perfect", "held", "cells")
+
+
+@pytest.mark.parametrize("law", ["snap", "tear"])
+@pytest.mark.parametrize("thermal", TOUCHED)
+def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
+    """A faint damper in parallel with the interface turns the same energy into heat there."""
+    potential, laws = (ZONE, "") if law == "snap" else (SOFTENING, TEARING)
+    ends = []
+    for damper in ("", ", c_g: 1e6"):
+        mechanics = f"normal: {{k: 1e12, beta_1: 0.9{damper}}}"
+        started = initial(thermal, "g_n: 0, phi: 1" if laws else "g_n: 0")
+        given = text(thermal, "w_n: {ramp: {rate: 5 um/s}}", mechanics, potential, initial=started)
+        ends.append(solved(given.replace(FRICTION, laws)))
+    snapped, moved = ends
+    (jump,) = (jump for jump in snapped.trajectory.jumps if jump.transition.name == law)
+    assert jump.released > 1
+    same(temperatures(snapped), temperatures(moved), 1e-3 * max(jump.after.y - jump.before.y))
+
+
+# -- what the supports dissipate
+
+
+@pytest.mark.parametrize("axis", ["n", "t"])
+@pytest.mark.parametrize("thermal", TOUCHED)
+def test_what_follows_a_traction_that_jumps_is_damped_by_its_own_support(thermal, axis):
+    potential, support = "penalty: {E_n: 1e15}, tangential-stiffness: {E_t: 3e9}", "k: 1e9, beta_1: 0.25"
+    loads = table(f"F_{axis}", [0, 0, 3, 3], "MPa", 0) + f", w_{axis}: 0, "
+    loads += "w_t: 0" if axis == "n" else "w_n: -10 um"
+    ends = []
+    for damper in ("", ", c_b: 1e5"):
+        if axis == "n":
+            mechanics = f"normal: {{{support}{damper}}}, tangential: {{k: 1e9, beta_1: 0.9}}"
+            laws = potential.replace("penalty: {E_n: 1e15}", "normal-stiffness: {E_n: 3e9}")
+        else:
+            mechanics, laws = f"normal: {{k: 1e12, beta_1: 0.9}}, tangential: {{{support}{damper}}}", potential
+        started = {"initial": initial(thermal, "g_n: 0")} if axis == "n" else {}
+        given = text(thermal, loads, mechanics, laws, **started)
+        ends.append(solved(given if axis == "t" else given.replace(FRICTION, "")))
+    jumped, moved = ends
+    assert sum(jump.released for jump in jumped.trajectory.jumps) == pytest.approx(9e12 / 8e9, rel=1e-9)
+    same(temperatures(jumped), temperatures(moved), 1e-3)
+
+
+def test_gaps_that_move_together_are_damped_each_by_its_own_support():
+    """The traction that presses falls and the slider slips: the one is damped in the base, the other is friction."""
+    case = pressure_falls("slider", "pressed", 0).replace("k: 1e12, beta_1: 0", "k: 1e8, beta_1: 0")
+    trajectory = solved(case.replace("w_n: -2 um", "w_n: -20 mm").replace("E_n: 1e15", "E_n: 3e8")).trajectory
+    jump = next(jump for jump in trajectory.jumps if jump.transition.name == "load")
+    rises = dict(zip((s.name for s in trajectory.model.system.states), jump.after.y - jump.before.y, strict=True))
+    assert 700 * rises["T_2"] == pytest.approx((1.8e6) ** 2 / (2 * 4e8), rel=1e-9)
+    assert 1000 * rises["T_1"] == pytest.approx(jump.released - (1.8e6) ** 2 / (2 * 4e8), rel=1e-9)
+
+
+@pytest.mark.parametrize("jumps", [True, False])
+def test_check_says_that_the_parts_of_a_support_matter_only_where_it_makes_heat(jumps):
+    """A support without a damper makes heat only as the gap follows a load that jumps."""
+    case = CASE.format(
+        **APART,
+        cells="",
+        C_1=1000,
+        interface="  potential: [penalty: {E_n: 1e13 Pa/m}]",
+        static=", mu_s: 0.6",
+        heat="",
+        mechanics="normal: {k: 1e9 Pa/m, beta_1: 1}, tangential: {k: 1e9 Pa/m}",
+        loading="F_n: {table: {times: [0, 2, %s, 4], values: [-2 MPa, -2 MPa, -1 MPa, -1 MPa]}}, w_n: 0, "
+        "w_t: {ramp: {rate: 0.25 mm/s}}" % ("2" if jumps else "3"),
+        initial="T_1: 300, T_2: 300",
+    )
+    simulation = Simulation(load_text(case))
+    idle = [text for text in warnings(simulation.model.system) if "beta_1 = 1 has no effect" in text]
+    moved = [
+        part.run().dataset.T_2[-1]
+        for part in (simulation, Simulation(load_text(case.replace("beta_1: 1", "beta_1: 0"))))
+    ]
+    assert bool(idle) != jumps
+    assert (abs(float(moved[0] - moved[1])) > 1e-6) == jumps
+
+
+def test_check_knows_that_a_snap_heats_by_the_partition():
+    case = CASE.format(
+        **APART,
+        cells="",
+        C_1=1000,
+        interface="  partition: {slider: 0, base: 1}\n"
+        "  potential: [exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}]",
+        static="",
+        heat="",
+        mechanics="normal: {k: 1e12 Pa/m, beta_1: 1}",
+        loading="w_n: {ramp: {rate: 8 um/s}}",
+        initial="T_1: 300, T_2: 300, g_n: 0",
+    ).replace("  friction: [coulomb: {mu: 0.5}]\n", "")
+    simulation = Simulation(load_text(case))
+    (idle,) = warnings(simulation.model.system)
+    assert "normal.beta_1" in idle
+    end = simulation.run().dataset.isel(time=-1)
+    assert end.T_1 == 300
+    assert end.T_2 > 300.01
+
+
+@pytest.mark.parametrize("method", ["radau", "lsoda"])
+def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
+    """The limit rises faster than the spring pulls: sliding stops, as if the pressure had jumped."""
+    runs = []
+    for rise in (0, 1e-3):
+        case = load_text(
+            CASE.format(
+                **THERMAL["paths"],
+                cells="",
+                C_1=1000,
+                static="",
+                mechanics="tangential: {k: 1e9 Pa/m}",
+                loading=f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}, "
+                "w_t: {ramp: {rate: 0.25 mm/s}}",
+                initial="T_1: 300, T_2: 300",
+            )
+        )
+        runs.append(Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances"))
+    assert [run.status for run in runs] == ["finished", "finished"]
+    assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
+    for name in ("u_t", "T_1", "T_2", "T_c"):
+        np.testing.assert_allclose(runs[1].dataset[name][-1], runs[0].dataset[name][-1], rtol=1e-8)

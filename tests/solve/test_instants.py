@@ -1,0 +1,207 @@
+"""What happens at one instant counts once, and nothing happens where nothing could."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import SITES, bodies, perfect_contact, varying
+
+import surfacechem
+from surfacechem.contracts.terms import Friction, parameter
+from surfacechem.errors import InputError
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.contact import BondStiffness, Penalty, TangentialStiffness
+from surfacechem.laws.factors import Proportional
+from surfacechem.laws.films import Film
+from surfacechem.laws.friction import Stribeck
+from surfacechem.laws.kinetics import LinearAffinity, Relaxation
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.longrange import VanDerWaalsFlatFlat
+from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.scene import Body, Interface, Medium, Mounting, Scene
+from surfacechem.solve.equilibria import Point
+from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES
+from surfacechem.solve.run import Model, Run
+
+TOLERANCES = [10.0**-k for k in range(5, 14)]
+COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
+
+
+def solved(scene, until, rtol=1e-11, outputs=21):
+    return Model(assemble(scene)).solve(Run(np.linspace(0.0, until, outputs).tolist(), rtol))
+
+
+def names(trajectory):
+    return [jump.transition.name for jump in trajectory.jumps]
+
+
+def test_bodies_touch_and_come_apart_once_at_any_tolerance():
+    press = surfacechem.load("thermal-press")
+    for rtol in TOLERANCES:
+        trajectory = press.model.solve(replace(press.case.run, rtol=rtol))
+        assert names(trajectory) == ["touch", "end of press", "end of hold", "release", "end of leave"], rtol
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+def test_a_contact_under_a_swinging_load_touches_once_in_each_period(rtol):
+    loading = {"w_n": Harmonic(amplitude=1e-7, frequency=1.0, phase=0.3)}
+    scene = Scene(COLD, Interface(None, [Penalty(E_n=1e14)]), (), loading, T_0=300.0, normal=Mounting(k=1e13))
+    trajectory = solved(scene, 5.0, rtol)
+    assert names(trajectory) == ["touch", "release"] * 5
+    exact = (np.arange(1, 11) / 2) - 0.3 / (2 * np.pi)
+    assert [jump.t for jump in trajectory.jumps] == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_film_that_fades_never_stops():
+    """Without pressure the traction relaxes on c_v / E_t; its velocity falls to rounding of what it has been."""
+    friction = Stribeck(mu_s=0.3, mu_k=0.1, v_s=1e-9, delta=2.0, c_v=1e9)
+    loading = {"p": Hold(level=0.0), "w_t": Table(times=[0.0, 1.0, 100.0], values=[0.0, 1e-6, 1e-6])}
+    interface = Interface(Hold(level=300.0), [TangentialStiffness(E_t=1e10)], [friction])
+    scene = Scene(COLD, interface, (), loading, T_0=300.0, tangential=Mounting(k=1e10))
+    trajectory = solved(scene, 10.0)
+    assert names(trajectory) == ["slip forward"]
+    assert audit(trajectory).energy_error < 1e-9
+    rate = 5e9 / 1e9  # half of the stiffness, in series
+    u, g = trajectory.result.outputs[:, :2].T
+    exact = 1e-6 / rate * (1 - np.exp(-rate)) * np.exp(-rate * (trajectory.result.times[2:] - 1))
+    assert u[2:] - g[2:] == pytest.approx(1e-6 - exact, rel=1e-9)
+
+
+def test_what_a_start_settles_to_has_to_be_admissible():
+    interface = Interface("T", [Penalty(E_n=1e14)], medium=Medium(None, {"k_m": 0.026}))
+    film = Film(between=("lower", "upper"))
+    pair = Body("lower", "T", Constant(C=1.0)), Body("upper", "T_2", Constant(C=1.0))
+    loading, initial = {"w_n": Hold(level=-1e-8)}, {"T": 300.0, "T_2": 310.0, "g_n": 1e-8}
+    scene = Scene(pair, interface, [film], loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    with pytest.raises(InputError, match="at the start d_m reached zero, where the law film ends"):
+        solved(scene, 1.0)
+
+
+def test_a_start_is_judged_in_the_modes_that_hold_there():
+    """In contact the energy is not convex in phi, while its continuation from beyond touch is."""
+    adhesion = VanDerWaalsFlatFlat(A_H=varying(1e-19, Proportional(of="phi", about=1.0)), D_0=1e-9)
+    interface = Interface("T", [adhesion, Penalty(E_n=1e12)], reactions=[Relaxation(tau=1.0)], sites=SITES)
+    initial = {"T": 300.0, "phi": 0.5, "g_n": -5e-10}
+    mount, loading = Mounting(k=1e12, c_b=1e10), {"w_n": Hold(level=0.0)}
+    with pytest.raises(InputError, match="relaxation"):
+        solved(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=mount), 1.0)
+
+
+def test_a_jump_to_where_a_law_has_no_energy_is_impossible():
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=varying(1e-7, Proportional(of="phi", about=1.0)), E_n=1e14)
+    interface = Interface("T", [zone], sites=SITES, limits=[TensileStrength(t_max=1e5)])
+    loading, initial = {"w_n": Ramp(rate=1e-8)}, {"T": 300.0, "phi": 1.0}
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    trajectory = solved(scene, 10.0)
+    assert trajectory.jumps[-1].verdict == IMPOSSIBLE
+    assert "which is impossible: the energy of the interface is not finite after it" in trajectory.reason
+
+
+@pytest.mark.parametrize("mount", [Mounting(k=2e9, m=100.0), Mounting(k=2e9, m=100.0, c_b=1e3)])
+@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
+def test_a_block_that_friction_brings_to_rest_creeps_on(law, mount):
+    """From 1 um/s it stops in 40 ps, within 1e-20 of a run; then it creeps by 1e-39 m/s, as the spring makes it."""
+    a, b, L, v_0, mu_0, p = 0.008, 0.014, 5e-6, 1e-6, 0.6, 5e6
+    friction = law(mu_0=mu_0, a=a, b=b, L=L, v_0=v_0)
+    loading, initial = {"p": Hold(level=p), "w_t": Ramp(rate=2e-6)}, {"theta": 1.0, "v": 1e-6}
+    scene = Scene(
+        COLD, Interface(Hold(level=300.0), (), [friction]), (), loading, None, 300.0, initial, tangential=mount
+    )
+    trajectory = solved(scene, 20.0)
+    assert trajectory.status == "finished", trajectory.reason
+    u, _, ln_theta = trajectory.result.y
+    v = trajectory.everywhere["v"][-1]
+    assert np.exp(ln_theta) == pytest.approx(21.0 if law is RateAndStateAging else 1.0, rel=1e-9)
+    pull = mount.k * (4e-5 - u) + mount.c_b * 2e-6
+    at_rest = np.exp(-(mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a)
+    assert v == pytest.approx(2 * v_0 * at_rest * np.sinh(pull / (a * p)), rel=1e-9)
+
+
+class Reluctant(Friction):
+    r"""Friction that drives what is slower than v_1.
+
+    .. math:: t_t = c (v - v_1)
+
+    Source: none; it breaks the second law. Any v.
+
+    >>> Reluctant(c=1.0, v_1=1.0).traction(v=0.5)
+    -0.5
+    """
+
+    abstract = True
+
+    c: float = parameter("Pa s/m", "resistance", at_least=0)
+    v_1: float = parameter("m/s", "velocity below which it drives")
+
+    def traction(self, v):
+        return self.c * (v - self.v_1)
+
+
+@pytest.mark.parametrize(("v_1", "rtol"), [(0.5, 1e-4), (0.5, 1e-12), (0.1, 1e-6), (0.01, 1e-9), (0.01, 1e-12)])
+def test_a_law_that_destroys_entropy_is_named_at_any_tolerance(v_1, rtol):
+    """Accelerated from rest to 1 m/s it destroys v_1^3 / 6 of what it produces, 1/3 - v_1 / 2 but for that."""
+    loading = {"v": Ramp(rate=1.0)}
+    scene = perfect_contact([], frictions=[Reluctant(c=1e3, v_1=v_1)], loading=loading)
+    books = audit(solved(scene, 1.0, rtol, outputs=201))
+    assert books.violations == ("reluctant",)
+    whole = 1 / 3 - v_1 / 2 + v_1**3 / 3
+    assert books.destroyed["reluctant"] == pytest.approx(v_1**3 / 6 / whole, rel=0.5)
+
+
+def test_less_than_the_last_digits_of_the_total_is_no_destruction():
+    scene = perfect_contact([], frictions=[Reluctant(c=1e-30, v_1=2.0)], loading={"v": Ramp(rate=1.0)})
+    assert audit(solved(scene, 1.0)).violations == ()
+
+
+@pytest.mark.parametrize(("phi", "verdict"), [(1e-14, ADMISSIBLE), (-1e-14, ADMISSIBLE), (1e-3, VIOLATES)])
+def test_the_rounding_of_a_bound_destroys_no_entropy(phi, verdict):
+    """Bodies and bonds cancel to a total of none, so that the last bonds are all there is to compare with."""
+    K_1, C = 0.5, 1e3
+    interface = Interface(
+        "T", [BondStiffness(E_b=1e12, E_n=1e12), BondEnergy(K_1=K_1)], (), [LinearAffinity(c_r=1e19)], SITES
+    )
+    pair, loading = bodies("T", "T", C_1=C / 2, C_2=C / 2), {"g_n": Ramp(rate=1e-6)}
+    scene = Scene(pair, interface, loading=loading, T_0=300.0, initial={"T": 300.0 + K_1 / (2 * C), "phi": 0.5})
+    model = Model(assemble(scene))
+    index = [item.name for item in model.system.transitions].index("unbonded")
+    states = [{"phi": phi, "T": 300.0 + K_1 / (2 * C)}[state.name] for state in model.system.states]
+    values = np.array([parameter.value for parameter in model.system.parameters], dtype=float)
+    point = Point(0.0, np.array(states), np.zeros(len(states)), values)
+    assert model.jumper.make(index, point, 0.0, noise=1e-13).verdict == verdict
+
+
+def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
+    """Pressed together, opposite surfaces are held where they are least at rest: on top of the shear potential."""
+    zone = XuNeedleman(Phi_n=1.0, g_0=1e-7, g_t0=1e-7, q=1.0, r=0.0)
+    loading, mount = {"w_t": Hold(level=0.0), "g_n": Hold(level=-3e-7)}, Mounting(k=1e10)
+    scene = Scene(bodies("T", "T"), Interface("T", [zone]), (), loading, None, 300.0, {"T": 300.0}, tangential=mount)
+    trajectory = solved(scene, 1.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith(
+        "the quasi-static equilibrium of the gap was lost (mechanical fold), but nothing"
+    )
+    assert names(trajectory) == ["snap"]
+
+
+@pytest.mark.parametrize("start", [0.0, 1.2e-3, -1.0e-3])
+@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
+def test_creep_without_inertia_starts_from_any_pull(law, start):
+    """A slack spring leaves no velocity, a taut one tens of decades less than the first guess."""
+    a, b, L, v_0, mu_0, p, mount = 0.008, 0.014, 5e-6, 1e-6, 0.6, 5e6, Mounting(k=2e9, c_b=5e6)
+    friction = law(mu_0=mu_0, a=a, b=b, L=L, v_0=v_0)
+    loading, initial = {"p": Hold(level=p), "w_t": Ramp(start=start, rate=2e-6)}, {"theta": 1.0, "v": 1e-6}
+    scene = Scene(
+        COLD, Interface(Hold(level=300.0), (), [friction]), (), loading, None, 300.0, initial, tangential=mount
+    )
+    trajectory = solved(scene, 20.0)
+    assert trajectory.status == "finished", trajectory.reason
+    u, _, ln_theta = trajectory.result.y
+    v = trajectory.everywhere["v"][-1]
+    pull = mount.k * (start + 4e-5 - u) + mount.c_b * (2e-6 - v)
+    at_rest = np.exp(-(mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a)
+    assert v == pytest.approx(2 * v_0 * at_rest * np.sinh(pull / (a * p)), rel=1e-8)

@@ -1,0 +1,172 @@
+"""Jumps: the work of dead loads, gaps that share pressure, areas, and what an interface bears after it has debonded."""
+
+import numpy as np
+import pytest
+from scenes import SITES, bodies, varying
+
+from surfacechem.errors import InputError
+from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.contact import NormalStiffness
+from surfacechem.laws.factors import Linear
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb
+from surfacechem.laws.kinetics import LinearAffinity
+from surfacechem.laws.limits import TensileStrength
+from surfacechem.laws.loading import Hold, Ramp, Table
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.solve.run import Model, Run
+
+ZONE = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e13)
+LIMIT = TensileStrength(t_max=1e6)
+K = 1e11
+
+
+def solve(potentials=(), *, until, loading, J_c=None, **scene):
+    interface = Interface(
+        "T",
+        potentials,
+        scene.pop("frictions", ()),
+        scene.pop("reactions", ()),
+        sites=SITES,
+        limits=scene.pop("limits", ()),
+    )
+    loads = loading | ({"J_c": Hold(level=J_c)} if J_c else {})
+    initial = {"T": 300.0} | scene.pop("initial", {})
+    whole = Scene(bodies("T", "T"), interface, loading=loads, T_0=300.0, initial=initial, **scene)
+    return Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21)))
+
+
+def jumps(trajectory, name):
+    return [jump for jump in trajectory.jumps if jump.transition.name == name]
+
+
+def test_a_dead_load_does_its_work_in_a_snap():
+    """Driven by F = k w in place of w the tractions are the same, and so is what the snap releases."""
+    mount = Mounting(k=K)
+    driven = solve([ZONE], until=30.0, loading={"w_n": Ramp(rate=1e-6)}, normal=mount)
+    loaded = solve([ZONE], until=30.0, loading={"w_n": Hold(level=0.0), "F_n": Ramp(rate=1e-6 * K)}, normal=mount)
+    (first,), (second,) = jumps(driven, "snap"), jumps(loaded, "snap")
+    assert second.released == pytest.approx(first.released, rel=1e-9)
+    assert (first.verdict, second.verdict) == ("admissible", "admissible")
+    assert max(audit(run).energy_error for run in (driven, loaded)) < 1e-9
+
+
+def test_a_rigid_interface_under_dead_load_releases_its_work():
+    loading = {"w_n": Hold(level=0.0), "F_n": Ramp(rate=1e6)}
+    trajectory = solve(
+        [BondEnergy(K_0=1.0)], until=2.0, loading=loading, normal=Mounting(k=1e12), limits=[LIMIT], initial={"phi": 1.0}
+    )
+    (jump,) = jumps(trajectory, "debond")
+    assert jump.released == pytest.approx(0.5 * 1e6**2 / 1e12 - 0.5, rel=1e-9)
+    assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize("w_t", [0.0, 1e-3])
+def test_a_snap_beside_a_sticking_or_sliding_contact(w_t):
+    """The other direction takes part with the pressure that the snap leaves."""
+    loading = {"w_n": Ramp(rate=1e-6), "w_t": Ramp(start=w_t, rate=1e-7)}
+    friction = MohrCoulomb(mu=0.5, t_n_max=2e6)
+    mounts = {"normal": Mounting(k=K), "tangential": Mounting(k=1e10)}
+    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e13, shear="none")
+    trajectory = solve([zone], until=15.0, loading=loading, frictions=[friction], **mounts)
+    assert trajectory.status == "finished", trajectory.reason
+    assert len(jumps(trajectory, "snap")) == 1
+    assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize("J_c", [0.5, 1.0, 2.0])
+def test_sticking_bears_friction_on_the_current_area(J_c):
+    loading = {"p": Hold(level=1e5), "w_t": Ramp(rate=1e-6)}
+    trajectory = solve(until=5.0, loading=loading, J_c=J_c, frictions=[Coulomb(mu=0.5)], tangential=Mounting(k=5e10))
+    assert jumps(trajectory, "slip forward")[0].t == pytest.approx(J_c * 0.5 * 1e5 / (5e10 * 1e-6), rel=1e-12)
+    assert audit(trajectory).energy_error < 1e-9
+
+
+@pytest.mark.parametrize("J_c", [1.0, 2.0])
+def test_strength_is_a_traction_on_the_current_area(J_c):
+    trajectory = solve(
+        [BondEnergy(K_0=0.1)],
+        until=3.0,
+        loading={"w_n": Ramp(rate=1e-6)},
+        J_c=J_c,
+        normal=Mounting(k=1e12),
+        limits=[LIMIT],
+        initial={"phi": 1.0},
+    )
+    assert jumps(trajectory, "debond")[0].t == pytest.approx(J_c, rel=1e-12)
+
+
+def test_a_rigid_interface_that_has_debonded_bears_no_tension():
+    drive = Table(times=[0.0, 2.0, 4.0, 6.0], values=[0.0, 2e-6, -2e-6, 2e-6])
+    trajectory = solve(
+        [BondEnergy(K_0=0.1)],
+        until=6.0,
+        loading={"w_n": drive},
+        normal=Mounting(k=1e12),
+        limits=[LIMIT],
+        initial={"phi": 1.0},
+    )
+    first, second = jumps(trajectory, "debond")
+    assert (first.t, second.t) == pytest.approx((1.0, 5.0), rel=1e-9)
+    assert second.released == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_sticks_slides_both_ways():
+    loading = {"p": Hold(level=1e5), "w_t": Ramp(rate=1e-6)}
+    trajectory = solve(until=1e-3, loading=loading, frictions=[Coulomb(mu=0.5)], tangential=Mounting(k=1e8, m=1.0))
+    (slip,) = (mode for mode in trajectory.model.system.modes if mode.name == "slip")
+    assert slip.words == {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+
+
+def test_a_gap_in_equilibrium_follows_bonds_that_sliding_breaks():
+    """The slider has a mass, the gap has none: as the bonds and their stiffness go, it goes with them."""
+    E, w_n = 1e13, -1e-6
+    stiffness = varying(E, Linear(of="phi", slope=0.5, about=0.0))
+    trajectory = solve(
+        [NormalStiffness(E_n=stiffness), BondEnergy(K_0=1.0)],
+        until=10.0,
+        loading={"w_n": Hold(level=w_n), "w_t": Ramp(rate=1e-6)},
+        frictions=[BondedCoulomb(mu=0.3, mu_b=0.6, mu_ub=0.5)],
+        reactions=[LinearAffinity(c_r=0.0)],
+        normal=Mounting(k=1e12),
+        tangential=Mounting(k=1e11, m=1e9, c_b=1e10),
+        initial={"phi": 1.0},
+    )
+    slip = jumps(trajectory, "slip forward")[0]
+    gaps = [point.y[trajectory.model.jumper.states.index("g_n")] for point in (slip.before, slip.after)]
+    np.testing.assert_allclose(gaps, [1e12 * w_n / (1e12 + 1.5 * E), 1e12 * w_n / (1e12 + E)], rtol=1e-12)
+    p = np.array(gaps) * np.array([1.5 * E, E])
+    stored = p**2 / 2 * (1 / 1e12 + 1 / np.array([1.5 * E, E]))
+    assert slip.released == pytest.approx(stored[0] - stored[1] - 0.5, rel=1e-9)
+    assert audit(trajectory).energy_error < 1e-9
+
+
+def test_a_dead_shear_load_sticks_up_to_the_limit_and_ends_there():
+    loading = {"p": Hold(level=1e5), "F_t": Ramp(rate=1e4)}
+    trajectory = solve(until=10.0, loading=loading, frictions=[Coulomb(mu=0.5)])
+    assert trajectory.status == "stopped"
+    assert "dead load" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(5.0, rel=1e-12)
+
+
+def test_a_quasi_static_gap_without_heat_capacity_but_with_thermal_traction_is_refused():
+    from surfacechem.contracts.terms import Varying
+    from surfacechem.laws.contact import NormalStiffness
+    from surfacechem.laws.factors import LinearInTemperature
+    from surfacechem.laws.heat import Conductance
+
+    spring = NormalStiffness(E_n=Varying(1e12, (LinearInTemperature(slope=-1e-3),)))
+    heat = [Conductance(between=(end, "interface"), h=100.0) for end in ("lower", "upper")]
+    scene = Scene(
+        bodies(),
+        Interface("T_c", [spring]),
+        heat,
+        loading={"w_n": Ramp(rate=1e-9)},
+        T_0=300.0,
+        initial={"T_1": 300.0, "T_2": 310.0},
+        normal=Mounting(k=1e12),
+    )
+    with pytest.raises(InputError, match="no capacity"):
+        assemble(scene)

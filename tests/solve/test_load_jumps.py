@@ -1,0 +1,355 @@
+"""Loads that jump: where gaps without inertia come to rest, whether what slides sticks, what works and what is heat."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from surfacechem.errors import InputError
+from surfacechem.format import load_text
+from surfacechem.reactor import InterfaceReactor, ReactorNet
+from surfacechem.runs.simulation import Simulation
+
+OWN, LIBRARY = "radau", "lsoda"
+
+NORMAL = """
+T_0: 300 K
+bodies:
+  a: {{temperature: T, capacity: constant, C: 10 J/m^2/K}}
+  b: {{temperature: T, capacity: constant, C: 10 J/m^2/K}}
+interface:
+  temperature: T
+  potential:
+    - {potential}
+mechanics: {{normal: {{{mount}}}}}
+loading: {{{loading}}}
+initial: {{T: 300 K{initial}}}
+run: {{until: 4 s, outputs: 9, solver: {solver}}}
+"""
+STEP = "F_n: {table: {times: [0, 1, 1, 2, 4], values: [0, 1 MPa, 5 MPa, 5 MPa, -1 MPa]}}"
+ELASTIC = "normal-stiffness: {E_n: 3e12 Pa/m}"
+
+SLIDER = """
+T_0: 300 K
+bodies:
+  a: {{temperature: T, C: 1000 J/m^2/K}}
+  b: {{temperature: T, C: 1000 J/m^2/K}}
+interface:
+  temperature: T
+{potential}
+  friction:
+    - coulomb: {{mu: 0.5{static}}}
+mechanics: {{tangential: {{k: 1e9 Pa/m}}}}
+loading: {{{loading}}}
+initial: {{T: 300 K}}
+run: {{until: 6 s, outputs: {outputs}, solver: {solver}}}
+"""
+SPRING = "  potential: [tangential-stiffness: {E_t: %s Pa/m}]"
+PULLED = "w_t: {ramp: {rate: 0.25 mm/s}}"
+
+
+def normal_text(loading, potential=ELASTIC, mount="k: 1e12", initial=", g_n: 0", solver=OWN):
+    return NORMAL.format(potential=potential, mount=mount, loading=loading, initial=initial, solver=solver)
+
+
+def normal(*args, **rest):
+    return solved(normal_text(*args, **rest))
+
+
+def slider(loading, potential="", static="", outputs=25, solver=OWN):
+    return solved(
+        SLIDER.format(loading=loading, potential=potential, static=static, outputs=outputs, solver=solver),
+        exact=1e-9 if solver == OWN else 1e-7,
+    )
+
+
+def solved(text, exact=1e-9):
+    solution = Simulation(load_text(text)).run(error="balances")
+    assert solution.trajectory.status == "finished", solution.trajectory.reason
+    assert solution.audit.energy_error < exact
+    assert solution.audit.violations == ()
+    assert solution.warnings == ()
+    return solution
+
+
+def pressure(times, values):
+    return f"p: {{table: {{times: {times}, values: [{', '.join(f'{value} MPa' for value in values)}]}}}}"
+
+
+def at(solution, name, t):
+    return float(solution.dataset[name].sel(time=t, method="nearest", tolerance=1e-9))
+
+
+def events(solution):
+    return [(jump.transition.name, jump.t) for jump in solution.trajectory.jumps]
+
+
+def released(solution, name="load"):
+    return [jump.released for jump in solution.trajectory.jumps if jump.transition.name == name]
+
+
+# -- normal gap
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+@pytest.mark.parametrize("k", [1e12, 0.0])
+def test_a_traction_that_jumps_moves_an_elastic_gap(k, solver):
+    text = normal_text(f"w_n: 0, {STEP}" if k else STEP, mount=f"k: {k:g}", solver=solver)
+    solution = solved(text if k else text.replace("mechanics: {normal: {k: 0}}\n", ""))
+    E = 3e12 + k
+    for t, F in ((0.5, 0.5e6), (1.5, 5e6), (3.0, 2e6), (4.0, -1e6)):
+        assert at(solution, "g_n", t) == pytest.approx(F / E, rel=1e-11)
+        assert at(solution, "t_n", t) == pytest.approx(3e12 * F / E, rel=1e-11)
+    assert events(solution) == [("load", 1.0)]
+    assert released(solution) == pytest.approx([(4e6) ** 2 / (2 * E)], rel=1e-11)
+    assert at(solution, "T", 4.0) == pytest.approx(300 + 8e12 / E / 20, rel=1e-12)
+
+
+def test_a_traction_that_jumps_opens_a_cohesive_zone():
+    zone = "exponential-cohesive-zone: {t_max: 9 MPa, g_0: 1 um, E_n: 3e13 Pa/m}"
+    solution = normal(f"w_n: 0, {STEP}", zone)
+
+    def gap(F):
+        return brentq(lambda g: F - 1e12 * g - 9e6 * g / 1e-6 * np.exp(1 - g / 1e-6), 0.0, 0.5e-6, xtol=1e-24)
+
+    for t, F in ((0.5, 0.5e6), (1.5, 5e6), (3.0, 2e6)):
+        assert at(solution, "g_n", t) == pytest.approx(gap(F), rel=1e-10)
+    assert at(solution, "g_n", 4.0) == pytest.approx(-1e6 / 3.1e13, rel=1e-10)
+
+
+def test_a_traction_beyond_the_strength_ends_the_run_where_it_jumps():
+    zone = "exponential-cohesive-zone: {t_max: 3 MPa, g_0: 1 um, E_n: 3e13 Pa/m}"
+    text = normal_text(STEP, zone, "k: 0").replace("mechanics: {normal: {k: 0}}\n", "")
+    trajectory = Simulation(load_text(text)).run(error="balances").trajectory
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith("F_n jumps, which is impossible: no gap follows")
+    assert trajectory.result.t == 1.0
+
+
+JUMPS = "w_n: {table: {times: [0, 1, 1, 4], values: [0, 1 um, 5 um, 5 um]}}"
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+@pytest.mark.parametrize("F", [0.0, 1e6])
+def test_a_displacement_that_jumps_works_on_the_spring_before_the_gap_moves(F, solver):
+    both = f"{JUMPS}, F_n: {{table: {{times: [0, 1, 1, 2], values: [0, 0, {F}, {F}]}}}}"
+    solution = normal(both if F else JUMPS, solver=solver)
+    before, after, k, E = 1e6 / 4e12, (5e6 + F) / 4e12, 1e12, 3e12
+    assert at(solution, "g_n", 0.5) == pytest.approx(before / 2, rel=1e-11)
+    assert at(solution, "g_n", 4.0) == pytest.approx(after, rel=1e-11)
+    assert released(solution) == pytest.approx([(k + E) / 2 * (after - before) ** 2], rel=1e-11)
+    (jump,) = solution.trajectory.jumps
+    lift = k / 2 * ((5e-6 - before) ** 2 - (1e-6 - before) ** 2)
+    assert jump.work["W_n"] == pytest.approx(lift + F * (after - before), rel=1e-11)
+
+
+def test_a_displacement_that_jumps_sets_a_mass_in_motion():
+    loading = "w_n: {table: {times: [0, 1, 1, 4], values: [0, 0, 5 um, 5 um]}}"
+    solution = normal(loading, "normal-stiffness: {E_n: 0.75e9 Pa/m}", "k: 0.25e9, m: 1e9")
+    g, w = 5e-6 / 4, 1.0
+    for t in (1.5, 2.0, 3.5, 4.0):
+        assert at(solution, "g_n", t) == pytest.approx(g * (1 - np.cos(w * (t - 1))), rel=1e-8)
+    assert at(solution, "work_n", 4.0) == pytest.approx(0.125e9 * 25e-12, rel=1e-10)
+    assert released(solution) == [0.0]
+
+
+@pytest.mark.parametrize("F", [0.0, 1e6, -9e6])
+def test_an_open_rigid_gap_follows_a_jump_or_closes(F):
+    """It has no traction, so that all the work is heat but what bends the spring."""
+    loading = f"{JUMPS}, F_n: {{table: {{times: [0, 1, 1, 2], values: [0, 0, {F}, {F}]}}}}"
+    solution = solved(normal_text(loading, "", initial="").replace("  potential:\n    - \n", ""))
+    after = max(5e-6 + F / 1e12, 0.0)
+    assert at(solution, "g_n", 0.5) == pytest.approx(0.5e-6, rel=1e-12)
+    assert at(solution, "g_n", 4.0) == pytest.approx(after, rel=1e-12)
+    assert events(solution) == [("open", 0.0), ("load", 1.0)]
+    heat = 1e12 / 2 * 4e-6**2 + F * (after - 1e-6) - 1e12 / 2 * (5e-6 - after) ** 2
+    assert released(solution) == pytest.approx([heat], rel=1e-11)
+
+
+def test_a_damper_bears_no_jump_of_the_displacement():
+    with pytest.raises(InputError, match="w_n cannot jump"):
+        normal(JUMPS, mount="k: 1e12, c_b: 1e12")
+
+
+def test_nothing_is_listed_where_nothing_moves():
+    solution = slider(f"{pressure([0, 1, 1, 6], [1, 1, 2, 2])}, w_t: {{ramp: {{rate: 0.01 mm/s}}}}")
+    assert events(solution) == []
+
+
+# -- friction
+
+RISES, FALLS = pressure([0, 3, 3, 10], [1, 1, 2, 2]), pressure([0, 5, 5, 10], [2, 2, 1, 1])
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+@pytest.mark.parametrize(("static", "start", "again"), [("", 2.0, 5.0), (", mu_s: 0.6", 2.4, 5.8)])
+def test_what_slides_sticks_where_the_pressure_jumps_up(static, start, again, solver):
+    """k = 1 GPa/m at 0.25 mm/s: the traction grows by 0.25 MPa/s, the limit jumps from 0.5 to 1 MPa."""
+    solution = slider(f"{RISES}, {PULLED}", static=static, solver=solver)
+    assert [name for name, _ in events(solution)] == ["slip forward", "load", "slip forward"]
+    assert [t for _, t in events(solution)] == pytest.approx([start, 3.0, again], rel=1e-9)
+    for t, u in ((1.0, 0.0), (2.5, 0.125e-3), (3.5, 0.25e-3), (4.75, 0.25e-3), (6.0, 0.5e-3)):
+        assert at(solution, "u_t", t) == pytest.approx(u, rel=1e-9, abs=1e-16)
+        assert at(solution, "t_t", t) == pytest.approx(1e9 * (0.25e-3 * t - u), rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+def test_what_slides_jumps_on_where_the_pressure_jumps_down(solver):
+    solution = slider(f"{FALLS}, {PULLED}", solver=solver)
+    assert events(solution) == [("slip forward", pytest.approx(4.0)), ("load", 5.0)]
+    assert released(solution) == pytest.approx([(1e6**2 - 0.5e6**2) / 2e9], rel=1e-9)
+    for t, u in ((4.5, 0.125e-3), (5.25, 0.8125e-3), (6.0, 1e-3)):
+        assert at(solution, "u_t", t) == pytest.approx(u, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+def test_what_sticks_elastically_keeps_its_elastic_gap(solver):
+    solution = slider(f"{RISES}, {PULLED}", SPRING % "4e9", solver=solver)
+    slip = 2.5  # where 0.8 of k w reaches 0.5 MPa
+    assert [name for name, _ in events(solution)] == ["slip forward", "load", "slip forward"]
+    assert [t for _, t in events(solution)] == pytest.approx([slip, 3.0, 3.0 + 0.5e-3 / 0.8 / 0.25e-3], rel=1e-9)
+    assert at(solution, "u_t", 3.25) == pytest.approx(0.25e-3 + 0.2 * 0.0625e-3, rel=1e-9)
+    assert at(solution, "g_t", 3.25) == pytest.approx(0.125e-3 + 0.2 * 0.0625e-3, rel=1e-9)
+    assert at(solution, "g_t", 6.0) == pytest.approx(0.25e-3, rel=1e-9)
+    assert at(solution, "u_t", 6.0) == pytest.approx(0.5e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", [OWN, LIBRARY])
+def test_a_shear_traction_that_jumps_moves_what_sticks_elastically(solver):
+    shear = "p: 1 MPa, w_t: 0, F_t: {table: {times: [0, 3, 3, 10], values: [0, 0.1 MPa, 0.6 MPa, 0.6 MPa]}}"
+    solution = slider(shear, SPRING % "1e9", outputs=7, solver=solver)
+    assert at(solution, "u_t", 4.0) == pytest.approx(300e-6, rel=1e-11)
+    assert at(solution, "t_t", 4.0) == pytest.approx(0.3e6, rel=1e-11)
+    assert released(solution) == pytest.approx([62.5], rel=1e-11)
+
+
+def test_a_displacement_that_jumps_drags_a_slider():
+    drag = "w_t: {table: {times: [0, 1, 1, 3, 3, 6], values: [0, 0, 0.9 mm, 0.9 mm, 0.2 mm, 0.2 mm]}}"
+    solution = slider(f"p: 1 MPa, {drag}")
+    assert [name for name, _ in events(solution)] == ["load", "slip forward", "load"]
+    assert at(solution, "u_t", 2.0) == pytest.approx(0.4e-3, rel=1e-12)
+    assert at(solution, "u_t", 6.0) == pytest.approx(0.4e-3, rel=1e-12)
+    assert at(solution, "t_t", 6.0) == pytest.approx(-0.2e6, rel=1e-12)
+    assert at(solution, "work_t", 6.0) == pytest.approx(0.5e9 * (0.9e-3**2 + 0.2e-3**2 - 0.5e-3**2), rel=1e-11)
+
+
+def test_a_debonding_that_raises_the_limit_lets_what_slides_stick():
+    text = """
+T_0: 300 K
+bodies:
+  a: {temperature: T, C: 100 J/m^2/K, stiffness: 1e12 Pa/m}
+  b: {temperature: T, C: 100 J/m^2/K}
+interface:
+  temperature: T
+  sites: 1e18 1/m^2
+  potential:
+    - bond-energy: {K_0: 1e-3 J/m^2}
+  limits:
+    - tensile-strength: {t_max: 1 MPa}
+  friction:
+    - mohr-coulomb: {mu: 0.5, t_n_max: 3 MPa}
+mechanics: {tangential: {k: 1e12 Pa/m}}
+loading: {w_n: {ramp: {rate: 1 um/s}}, w_t: {ramp: {rate: 1 um/s}}}
+initial: {T: 300 K, phi: 1}
+run: {until: 2 s}
+"""
+    solution = solved(text)
+    assert [name for name, _ in events(solution)] == ["slip forward", "debond", "slip forward"]
+    (jump,) = [jump for jump in solution.trajectory.jumps if jump.transition.name == "debond"]
+    assert jump.released == pytest.approx(0.4995, rel=1e-11)
+    assert jump.verdict == "admissible"
+    np.testing.assert_array_equal(jump.after.y[1], 0.0)
+    assert solution.trajectory.jumps[2].t == pytest.approx(1.5, rel=1e-12)
+    assert at(solution, "u_t", 2.0) == pytest.approx(0.5e-6, rel=1e-11)
+
+
+def test_a_gap_that_snaps_off_does_not_pull_back_what_is_dragged():
+    text = """
+T_0: 300 K
+bodies:
+  a: {temperature: T, capacity: constant, C: 10 J/m^2/K, stiffness: 4e16 Pa/m}
+  b: {temperature: T, capacity: constant, C: 10 J/m^2/K}
+interface:
+  temperature: T
+  potential:
+    - van-der-waals-flat-flat: {A_H: 1.2e-19 J}
+    - penalty: {E_n: 8e19 Pa/m}
+  friction:
+    - mohr-coulomb: {mu: 0.3, t_n_max: 50 MPa, c: 1 kPa}
+mechanics: {tangential: {k: 1e13 Pa/m}}
+loading: {w_n: {table: {times: [0, 5, 12], values: [10 nm, 0.5 nm, 80 nm]}}, w_t: {ramp: {rate: 1 um/s}}}
+initial: {T: 300 K, g_n: 10 nm}
+run: {until: 12 s}
+"""
+    solution = solved(text, exact=1e-8)
+    states = [state.name for state in solution.trajectory.model.system.states]
+    for jump in solution.trajectory.jumps:
+        assert jump.after.y[states.index("u_t")] >= jump.before.y[states.index("u_t")] * (1 - 1e-9)
+        assert jump.verdict == "admissible"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_steps_of_the_loads(seed):
+    """Rate-independent friction against its own rule: the traction is brought back to the limit, and no further."""
+    draw = np.random.default_rng(seed)
+    k, E = 1e9, draw.choice([0.0, 2e9])
+    p, w, F = draw.uniform(0.5, 2, 6), draw.uniform(-2, 2, 6), draw.uniform(-1, 1, 6)
+
+    def steps(values, unit):
+        times = [t for j in range(6) for t in (j, j + 1)]
+        return (
+            f"{{table: {{times: {times}, values: [{', '.join(f'{x!r} {unit}' for x in values.repeat(2).tolist())}]}}}}"
+        )
+
+    loading = f"p: {steps(p, 'MPa')}, w_t: {steps(w, 'mm')}, F_t: {steps(F, 'MPa')}"
+    solution = slider(loading, SPRING % E if E else "", outputs=13)
+    slipped, share = 0.0, E / (k + E) if E else 1.0
+    for j in range(6):
+        needed = share * (k * (w[j] * 1e-3 - slipped) + F[j] * 1e6)
+        limit = 0.5e6 * p[j]
+        slipped += np.sign(needed) * max(abs(needed) - limit, 0.0) / (share * k)
+        t = share * (k * (w[j] * 1e-3 - slipped) + F[j] * 1e6)
+        assert at(solution, "t_t", j + 0.5) == pytest.approx(t, rel=1e-9, abs=1e-6)
+        u = slipped + (t / E if E else 0.0)
+        assert at(solution, "u_t", j + 0.5) == pytest.approx(u, rel=1e-9, abs=1e-15)
+    assert all(jump.entropy >= -1e-12 for jump in solution.trajectory.jumps)
+
+
+@pytest.mark.parametrize("high", [1, 3])
+def test_an_elastic_gap_on_a_given_displacement_slips_where_the_pressure_falls(high):
+    """The displacement is held at 0.5 mm from 2 s on; the limit falls to 0.25 MPa at 3 s and rises again at 4 s."""
+    text = SLIDER.format(
+        loading=f"{pressure([0, 3, 3, 4, 4, 6], [high, high, 0.5, 0.5, 2, 2])}, "
+        "u_t: {table: {times: [0, 2, 6], values: [0, 0.5 mm, 0.5 mm]}}",
+        potential=SPRING % "4e9",
+        static="",
+        outputs=13,
+        solver=OWN,
+    )
+    solution = solved(text.replace("mechanics: {tangential: {k: 1e9 Pa/m}}\n", ""))
+    held = min(2.0, 0.5 * high) / 4 * 1e-3
+    for t, g in ((2.5, held), (3.5, 0.0625e-3), (6.0, 0.0625e-3)):
+        assert at(solution, "g_t", t) == pytest.approx(g, rel=1e-9)
+    heat = 4e9 / 2 * (held**2 - 0.0625e-3**2)
+    assert sum(jump.released for jump in solution.trajectory.jumps) == pytest.approx(heat, rel=1e-9)
+
+
+@pytest.mark.parametrize("loading", [f"{RISES}, {PULLED}", f"{FALLS}, {PULLED}"])
+def test_loads_jump_in_a_reactor_network(loading):
+    case = load_text(SLIDER.format(loading=loading, potential="", static="", outputs=25, solver=OWN))
+    solution = Simulation(case).run(error="balances")
+    interface = InterfaceReactor(case)
+    net = ReactorNet([interface])
+    net.rtol, net.atol = 1e-10, 1e-16
+    net.advance(6.0)
+    ours, theirs = interface.scene.moments.jumps, solution.trajectory.jumps
+    assert [jump.transition.name for jump in ours] == [jump.transition.name for jump in theirs]
+    assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
+    assert interface["u_t"] == pytest.approx(at(solution, "u_t", 6.0), rel=1e-9)
+    assert interface.dataset.attrs["energy_error"] < 1e-6
+
+
+def test_loads_jump_in_a_sweep():
+    case = load_text(SLIDER.format(loading=f"{RISES}, {PULLED}", potential="", static="", outputs=7, solver=OWN))
+    sweep = Simulation(case).sweep({"mechanics.tangential.k": [1e9, 2e9, 1e12]})
+    u = sweep.dataset["u_t"].isel(time=-1).values
+    np.testing.assert_allclose(u, 1.5e-3 - 1e6 / np.array([1e9, 2e9, 1e12]), rtol=1e-11)

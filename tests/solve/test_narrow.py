@@ -1,0 +1,243 @@
+"""What is brief in a run is seen, whatever makes it so, and by the estimate of the error too."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import symengine as se
+from narrow_scenes import FAMILIES, Array, integral, scene
+from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
+from scipy.special import erf
+from solver_problems import problem
+
+from surfacechem.compile.program import compile_program
+from surfacechem.contracts.terms import HeatTransfer, parameter
+from surfacechem.format import load_text
+from surfacechem.laws.loading import Harmonic, Ramp
+from surfacechem.runs.simulation import Simulation
+from surfacechem.solve import names, solver
+from surfacechem.solve.passing import Passing
+
+CLOSE = 1e-8
+"""Relative error of scenes in which only the time of what is brief is rounded: to 1e-16 of a run, of 1e-8 of it."""
+
+
+def ends(simulation, run=None):
+    """What a run ends with, by name, and its accuracy."""
+    solution = simulation.run(run=run)
+    result, system = solution.trajectory.result, simulation.system
+    found = dict(zip((state.name for state in system.states), result.y, strict=True))
+    found |= dict(zip((account.quantity.name for account in system.ledger), result.ledger, strict=True))
+    return found, solution
+
+
+def check_scene(seed):
+    """A random scene ends where it should, or says how far from there it may be."""
+    case = scene(seed)
+    found, solution = ends(Simulation(load_text(case.text)))
+    assert solution.trajectory.status == "finished", case.text
+    for name, value in case.expected.items():
+        error = abs(found[name] - value) / (case.size or abs(value) or 1.0)
+        assert error <= CLOSE + case.rounded + 10 * solution.accuracy.error, (name, found[name], value, case.text)
+
+
+@pytest.mark.parametrize("seed", range(2 * len(FAMILIES)))
+def test_no_narrow_layer_is_passed_over(seed):
+    check_scene(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(20))
+def test_none_of_many_narrow_layers_is_passed_over(block):
+    for seed in range(1000 + 30 * block, 1030 + 30 * block):
+        check_scene(seed)
+
+
+PLATES = """
+T_0: 300 K
+bodies:
+  lower: {temperature: T_1, C: 1 kJ/m^2/K, capacity: constant}
+  upper: {temperature: T_2, C: 1 kJ/m^2/K, capacity: constant}
+initial: {T_1: 300 K, T_2: 400 K}
+"""
+
+TAPPING = f"""title: A hot plate that taps on a cold one once a second
+{PLATES}
+heat:
+  - gap-conductance: {{between: [lower, upper], h_0: 3e5, C_trans: 1e8, k_gas: 0, g_0: 1 um, epsilon_1: 0.05,
+                      epsilon_2: 0.05}}
+loading: {{g_n: {{harmonic: {{mean: 1 mm, amplitude: 1 mm, frequency: 1, phase: 1}}}}}}
+run: {{until: 3 s}}
+"""
+
+LAYER = f"""title: A conductance that is high in a part of the gap
+{PLATES}
+heat:
+  - gap-table: {{between: [lower, upper], gaps: [0, 485 um, 500 um, 515 um, 1 mm],
+                conductances: [0.01, 0.01, 3333, 0.01, 0.01]}}
+loading: {{g_n: {{ramp: {{start: 1 mm, rate: -10 um/s}}}}}}
+run: {{until: 100 s}}
+"""
+
+
+def tapped():
+    """Both temperatures after three taps, by an integration that ends and begins at each."""
+
+    def rates(t: float, y: Array) -> list[float]:
+        held = np.exp(-1e8 * 1e-3 * (1 + np.sin(2 * np.pi * t + 1)))
+        black = 5.670374419e-8 * (y[0] ** 2 + y[1] ** 2) * (y[0] + y[1]) / (2 / 0.05 - 1)
+        heat = (3e5 * held + black * (1 - held)) * (y[1] - y[0]) / 1e3
+        return [heat, -heat]
+
+    taps = [(1.5 * np.pi - 1) / (2 * np.pi) + k for k in range(3)]
+    near = [tap + side * d for tap in taps for side in (-1, 1) for d in (0.0, 5e-4, 2e-3, 2e-2)]
+    times, y = sorted({0.0, 3.0, *near}), [300.0, 400.0]
+    for a, b in pairwise(times):
+        y = solve_ivp(rates, (a, b), y, "DOP853", rtol=1e-12, atol=1e-10, max_step=(b - a) / 40).y[:, -1]
+    return y
+
+
+@pytest.mark.parametrize("name", names)
+def test_taps_are_felt(name):
+    """They are where the gap turns; 5 K are missed with one of them."""
+    simulation = Simulation(load_text(TAPPING))
+    found, _ = ends(simulation, replace(simulation.case.run, solver=name, rtol=1e-9, accuracy=None))
+    np.testing.assert_allclose([found["T_1"], found["T_2"]], tapped(), rtol=1e-6 if name != "radau" else 1e-10)
+
+
+@pytest.mark.parametrize("name", names)
+def test_a_layer_is_felt(name):
+    """The temperatures of the plates are all but equal then."""
+    simulation = Simulation(load_text(LAYER))
+    found, _ = ends(simulation, replace(simulation.case.run, solver=name, rtol=1e-9, accuracy=None))
+    table = PchipInterpolator([0, 485, 500, 515, 1000], [0.01, 0.01, 3333, 0.01, 0.01])
+    exposure = integral(lambda t: table(1000 - 10 * t), 100.0, [48.5, 50.0, 51.5])
+    left = 100 * np.exp(-2 * exposure / 1e3)
+    assert found["T_2"] - found["T_1"] == pytest.approx(left, rel=2e-3 if name != "radau" else 1e-7)
+
+
+def test_an_accuracy_is_kept_where_something_is_brief():
+    found, solution = ends(Simulation(load_text(TAPPING.replace("until: 3 s", "until: 3 s, accuracy: 1e-8"))))
+    np.testing.assert_allclose([found["T_1"], found["T_2"]], tapped(), rtol=1e-8)
+    assert solution.accuracy.error <= 1e-8
+
+
+class Resonance(HeatTransfer):
+    r"""A conductance that is high around one gap, of which it does not tell.
+
+    .. math:: h = h_0 e^{-(g_n - g_0)^2 / w^2}
+
+    Source: made up for a test.
+    """
+
+    h_0: float = parameter("W/(m^2 K)", "highest conductance", at_least=0)
+    g_0: float = parameter("m", "gap of the highest conductance")
+    w: float = parameter("m", "half of its width", above=0)
+
+    def conductance(self, g_n):
+        """Conductance [W/(m^2 K)]."""
+        return self.h_0 * se.exp(-(((g_n - self.g_0) / self.w) ** 2))
+
+
+def resonant(h_0, w, g_0=4.373e-4):
+    """A ramp through a resonance, and the temperatures at its end."""
+    case = load_text(LAYER)
+    law = Resonance(between=("lower", "upper"), h_0=h_0, g_0=g_0, w=w)
+    left = 50 * np.exp(-2 * np.sqrt(np.pi) * h_0 * w / 1e-5 / 1e3)
+    return Simulation(replace(case, scene=replace(case.scene, heat=(law,)))), [350 - left, 350 + left]
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-2])
+def test_what_no_law_tells_of_is_seen_by_looking(width):
+    """A peak of a few per cent of a run has a point at which the equations are looked at."""
+    simulation, expected = resonant(10 / width, width * 1e-3)
+    found, solution = ends(simulation)
+    np.testing.assert_allclose([found["T_1"], found["T_2"]], expected, rtol=1e-9)
+    assert solution.accuracy.error < 1e-8
+
+
+def test_the_second_run_looks_closer():
+    """What the first one misses is told by the second, which looks elsewhere."""
+    simulation, expected = resonant(5e4, 1e-7, g_0=3.9e-4)
+    found, solution = ends(simulation)
+    assert abs(found["T_1"] - expected[0]) > 1
+    assert abs(found["T_1"] - expected[0]) <= 1.001 * expected[0] * solution.accuracy.error
+
+
+def test_a_sweep_ends_pieces_where_each_run_needs_it():
+    """The layer lies at another time for each speed; some do not reach it."""
+    simulation = Simulation(load_text(LAYER))
+    rates = [-10e-6, -7e-6, -4e-6, -20e-6]
+    swept = simulation.sweep({"loading.g_n.ramp.rate": rates})
+    singly = [simulation.run({"loading.g_n.ramp.rate": rate}).trajectory.result.y for rate in rates]
+    np.testing.assert_array_equal(swept.sweep.batch.y, singly)
+
+
+def test_gaps_that_touch_often_are_paid_for():
+    """The work on a gap that passes a zone 600 times is what its energy changes by."""
+    text = """title: often
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
+  upper: {temperature: T}
+interface: {temperature: T, potential: [{exponential-cohesive-zone: {t_max: 1 MPa, g_0: 10 nm, E_n: 1e12 Pa/m}}]}
+loading: {g_n: {harmonic: {mean: 0.2 um, amplitude: 10 um, frequency: 3000 1/s, phase: 1}}}
+initial: {T: 300 K}
+run: {until: 0.1 s}
+"""
+    found, solution = ends(Simulation(load_text(text)))
+
+    def energy(t):
+        g = 2e-7 + 1e-5 * np.sin(2 * np.pi * 3000 * t + 1)
+        return -1e6 * (g + 1e-8) * np.exp(1 - g / 1e-8) if g > 0 else 0.5e12 * g**2 - np.e * 1e-2
+
+    exchanged = 0.5e12 * (1e-5 - 2e-7) ** 2
+    assert abs(found["W_g_n"] - (energy(0.1) - energy(0.0))) < 1e-7 * exchanged
+    assert sum(solution.trajectory.result.events.index == 0) == 600
+
+
+def test_the_second_run_is_looked_at_at_other_points():
+    simulation = Simulation(load_text(LAYER))
+    first = simulation.model.solve(simulation.case.run)
+    second = simulation.model.resolve(first, 1e-13)
+    ratio = first.result.problem.spacing / second.result.problem.spacing
+    assert ratio > 5
+    assert ratio != pytest.approx(round(ratio))
+
+
+@pytest.mark.parametrize("h", [0.02, 0.2])
+def test_a_step_is_held_against_the_equations_between_its_stages(h):
+    """y' = a bell of time; without a look the first step is the whole run."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - se.exp(-(((t - 0.437) / h) ** 2))], [y * dy])
+    asked = problem(program, [1.0], [0.0, 1.0], 1e-9)
+    exact = 1.0 + h * np.sqrt(np.pi) / 2 * (erf(0.563 / h) + erf(0.437 / h))
+    found = solver("radau").solve(replace(asked, spacing=1 / 60))
+    assert found.y[0] == pytest.approx(exact, rel=1e-8)
+    assert found.ledger[0] == pytest.approx(0.5 * (exact**2 - 1), rel=1e-8)
+
+
+def test_passages_are_found_in_any_number():
+    """A gap that passes a place twice a period, and turns twice."""
+    text = TAPPING.replace("mean: 1 mm", "mean: 0.5 mm").replace("frequency: 1,", "frequency: 1000,")
+    system = Simulation(load_text(text)).system
+    values = {p.path: p.at(0.0) for p in system.parameters}
+    table = np.array([[values[p.path] for p in system.parameters]])
+    pieces, _ = Passing(system).pieces(np.array([0.0, 3.0]), table, 1000.0, 100_000)
+    turns = [(k + 0.5) * np.pi for k in range(6002)]
+    touches = [np.pi + np.arcsin(0.5) + 2 * k * np.pi for k in range(3001)] + [
+        2 * np.pi - np.arcsin(0.5) + 2 * k * np.pi for k in range(3001)
+    ]
+    expected = np.sort([(x - 1) / (2000 * np.pi) for x in (*turns, *touches)])
+    expected = expected[(expected > 0) & (expected < 3)]
+    np.testing.assert_allclose(pieces[1:-1], expected, rtol=1e-13)
+
+
+def test_histories_that_pass_nothing_are_left_whole():
+    assert Harmonic.cycle
+    assert Ramp(rate=1.0).breakpoints() == ()
+    text = LAYER.replace("start: 1 mm, rate: -10 um/s", "start: 2 mm, rate: 10 um/s")
+    simulation = Simulation(load_text(text))
+    assert len(simulation.model.solve(simulation.case.run).result.problem.segments) == 2

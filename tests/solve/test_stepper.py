@@ -1,0 +1,391 @@
+"""The compiled stepper: hard problems with known answers, events, batches, failures."""
+
+import mpmath
+import numpy as np
+import pytest
+import symengine as se
+from solver_problems import (
+    CONDUCTANCE,
+    coupled_nodes,
+    exothermic,
+    exothermic_exact,
+    exothermic_problem,
+    linear_decay,
+    problem,
+    robertson,
+    robertson_dae,
+)
+
+from surfacechem.compile.program import compile_program
+from surfacechem.solve import names, solver
+from surfacechem.solve.adapters.rates import output_rates
+from surfacechem.solve.contract import Margin, Problem, Status
+from surfacechem.solve.radau.solver import Radau, consistent, solve_many
+from surfacechem.solve.radau.tables import COLLOCATION, GAMMA, INVERSE, NODES, PAIR_VALUES, STAGES
+
+radau = Radau()
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_order_conditions(k: int) -> None:
+    """C(s): A c^(q-1) = c^q / q, and B(2s-1): b c^(q-1) = 1 / q."""
+    s = STAGES[k]
+    a, c = COLLOCATION[k, :s, :s], NODES[k, :s]
+    for q in range(1, s + 1):
+        np.testing.assert_allclose(a @ c ** (q - 1), c**q / q, rtol=1e-13, atol=1e-16)
+    for q in range(1, 2 * s):
+        assert a[-1] @ c ** (q - 1) == pytest.approx(1 / q, rel=1e-14)
+    np.testing.assert_allclose(a @ INVERSE[k, :s, :s], np.eye(s), atol=1e-13)
+    pairs = PAIR_VALUES[k, : (s - 1) // 2]
+    values = np.concatenate(([GAMMA[k]], pairs, pairs.conj()))
+    np.testing.assert_allclose(
+        np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize("name", names)
+def test_every_solver_on_exothermic_bonding(name: str) -> None:
+    result = solver(name).solve(exothermic_problem(1e-8))
+    assert result.status == Status.FINISHED
+    assert result.t == 2.5
+    assert len(result.times) == 200
+    np.testing.assert_allclose(result.outputs, exothermic_exact(result.times), rtol=1e-6)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_error_follows_the_tolerance(rtol: float) -> None:
+    result = radau.solve(exothermic_problem(rtol))
+    error = np.max(np.abs(result.outputs / exothermic_exact(result.times) - 1))
+    assert error < 3 * rtol + 2e-15
+
+
+def test_output_rates_come_from_the_equations() -> None:
+    result = radau.solve(exothermic_problem(1e-10))
+    np.testing.assert_allclose(output_rates(result)[:, 1], 2.0 * np.exp(-2.0 * result.times), rtol=1e-7)
+
+
+def follower(times) -> Problem:
+    """A variable that follows another within 1e-9 s, and its ledger."""
+    t, x, y, dx, dy = se.symbols("t x y dx dy")
+    program = compile_program(t, [x, y], [dx, dy], [], [dx + x, dy - 1e9 * (1 / (1 + x**4) - y)], ledger=[y])
+    return problem(program, [3.0, 1 / 82], [0.0, 3.0], 1e-11, times=times)
+
+
+def test_outputs_are_as_good_as_step_ends_where_a_variable_follows_another() -> None:
+    times = np.linspace(0.0, 3.0, 61)
+    result = radau.solve(follower(times))
+    exact = 1 / (1 + (3.0 * np.exp(-times)) ** 4)
+    lag = 4 * exact**2 * (3.0 * np.exp(-times)) ** 4 * 1e-9
+    np.testing.assert_allclose(result.outputs[5:, 1], (exact - lag)[5:], rtol=1e-10)
+    integral = np.log((np.exp(4 * times) + 81) / 82) / 4 - 1e-9 * (exact - exact[0])
+    np.testing.assert_allclose(result.ledger_outputs[:, 0], integral, rtol=1e-10, atol=1e-12)
+    assert result.counters.factorizations > result.counters.steps
+
+
+def test_outputs_do_not_change_the_steps() -> None:
+    with_outputs, without = (radau.solve(follower(times)) for times in (np.linspace(0.0, 3.0, 61), ()))
+    assert with_outputs.counters.steps == without.counters.steps
+    np.testing.assert_array_equal(with_outputs.y, without.y)
+    np.testing.assert_array_equal(with_outputs.ledger, without.ledger)
+
+
+@pytest.mark.parametrize("make", [robertson, robertson_dae])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+def test_robertson(make, rtol: float) -> None:
+    """Reference: Hairer & Wanner II, IV.10, at t = 1e11, where cancelling rates of 1e-9 over 1e11 s leave eight
+    digits."""
+    result = radau.solve(problem(make(), [1.0, 0.0, 0.0], [0.0, 1e11], rtol, atol=rtol * 1e-10))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.y[:2], [2.083340149701255e-08, 8.333360770334713e-14], rtol=20 * rtol)
+    assert result.counters.steps < 500
+
+
+def test_van_der_pol() -> None:
+    """Reference: Hairer & Wanner II, IV.10, eps = 1e-6, t = 2."""
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    program = compile_program(t, [x, v], [dx, dv], [], [dx - v, 1e-6 * dv - ((1 - x**2) * v - x)])
+    result = radau.solve(problem(program, [2.0, -0.66], [0.0, 2.0], 1e-9))
+    np.testing.assert_allclose(result.y, [1.706167732170483, -0.8928097010247975], rtol=1e-6)
+
+
+@pytest.mark.parametrize("conductance", CONDUCTANCE)
+def test_sum_row_keeps_the_mean_temperature(conductance: float) -> None:
+    """Two nodes, capacities 1e-15 and 2, heated with 3 W: the total energy is exact whatever the conductance."""
+    result = radau.solve(problem(coupled_nodes(conductance), [300.0, 300.0], [0.0, 10.0], 1e-10))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.y, [315.0, 315.0], rtol=1e-9)
+
+
+def test_initial_layer_far_below_rounding() -> None:
+    """y' = -(y - cos t) / 1e-200: the first step is of the layer's own size."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy + 1e200 * (y - se.cos(t))])
+    result = radau.solve(
+        Problem(
+            program,
+            np.array([2.0]),
+            np.zeros(0),
+            np.array([0.0, 1.0]),
+            np.zeros((1, 0)),
+            1e-8,
+            np.array([1e-10]),
+            record_steps=True,
+        )
+    )
+    assert result.status == Status.FINISHED
+    assert result.steps is not None
+    assert result.steps.t[1] < 1e-199
+    assert result.y[0] == pytest.approx(np.cos(1.0), rel=1e-8)
+
+
+def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
+    """y' = 1e30 y (1 - y) + 1e-3 from y = 0: a long implicit step would rest on the unstable equilibrium."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y) - 1e-3])
+    end = 7.6e-29
+    times = np.array([end, 1.0])
+    problem = Problem(program, np.zeros(1), times, np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, np.array([1e-14]))
+    result = radau.solve(problem)
+    assert result.status == Status.FINISHED
+    grown = np.exp(1e30 * end - np.log(1e33))
+    # Close to the absolute tolerance it is known to a few per cent, which last as it grows.
+    np.testing.assert_allclose(result.outputs[:, 0], [grown / (1 + grown), 1.0], rtol=1e-2)
+
+
+def test_what_is_nothing_and_is_driven_by_nothing_does_not_grow() -> None:
+    """y' = 1e30 y (1 - y) from y = 0 rests there, in no more steps than anything at rest."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y)])
+    problem = Problem(
+        program, np.zeros(1), np.array([1.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, 1e-14 * np.ones(1)
+    )
+    result = radau.solve(problem)
+    assert result.status == Status.FINISHED
+    assert result.outputs[0, 0] == 0.0
+    assert result.counters.steps < 20
+
+
+def test_vanishing_capacity_ends_at_zero_temperature() -> None:
+    """C T / T0 T' = -Q: T = T0 sqrt(1 - 2 t / tau) reaches zero with infinite slope."""
+    t, temperature, rate = se.symbols("t T dT")
+    program = compile_program(
+        t, [temperature], [rate], [], [2.0 * temperature / 300 * rate + 600.0], margins=[temperature]
+    )
+    result = radau.solve(problem(program, [300.0], [0.0, 2.0], 1e-10, margins=(Margin.stop(),)))
+    assert result.status in (Status.EVENT, Status.STEP_UNDERFLOW)
+    assert result.t == pytest.approx(0.5, rel=1e-9)
+    assert abs(result.y[0]) < 1e-2
+
+
+def test_algebraic_variable_and_ledger() -> None:
+    """y' = -z, 0 = z^3 + z - y - y^3 has z = y; the ledger of z is 1 - y."""
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**3 + z - y - y**3], ledger=[z])
+    assert program.algebraic == (False, True)
+    for name in names:
+        result = solver(name).solve(problem(program, [1.0, 5.0], [0.0, 2.0], 1e-8, times=np.linspace(0, 2, 21)))
+        assert result.status == Status.FINISHED
+        np.testing.assert_allclose(result.outputs, np.exp(-result.times)[:, None] * [1, 1], rtol=2e-6)
+        np.testing.assert_allclose(result.ledger_outputs[:, 0], 1 - np.exp(-result.times), atol=2e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_segments_change_parameters(name: str) -> None:
+    t, y, dy, rate = se.symbols("t y dy rate")
+    program = compile_program(t, [y], [dy], [rate], [dy - rate])
+    case = Problem(
+        program,
+        np.array([0.0]),
+        np.array([0.5, 1.0, 1.5, 3.0]),
+        np.array([0.0, 1.0, 3.0]),
+        np.array([[1.0], [-2.0]]),
+        1e-8,
+        np.array([1e-10]),
+    )
+    np.testing.assert_allclose(solver(name).solve(case).outputs[:, 0], [0.5, 1.0, 0.0, -3.0], atol=1e-8)
+
+
+@pytest.mark.parametrize("name", names)
+def test_terminal_event(name: str) -> None:
+    result = solver(name).solve(
+        problem(linear_decay(), [1.0], [0.0, 10.0], 1e-9, margins=(Margin.stop(),), times=np.arange(11.0))
+    )
+    assert result.status == Status.EVENT
+    assert result.t == pytest.approx(np.log(2), rel=1e-6 if name != "radau" else 1e-11)
+    assert list(result.times) == [0.0]
+    assert list(result.events.index) == [0]
+    assert "margin 0" in result.message
+
+
+def oscillator(*margins):
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    values = [margin(t, x, v) for margin in margins]
+    return compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + x], margins=values)
+
+
+def test_double_crossing_between_steps_is_seen() -> None:
+    """cos t dips below -0.99 between 3.0 and 3.28 only."""
+    case = problem(oscillator(lambda t, x, v: x + 0.99), [1.0, 0.0], [0.0, 20.0], 1e-5, margins=(Margin.stop(),))
+    assert radau.solve(case).t == pytest.approx(np.arccos(-0.99), rel=1e-5)
+
+
+def test_coincident_events_are_both_reported() -> None:
+    case = problem(
+        oscillator(lambda t, x, v: x, lambda t, x, v: 3 * x),
+        [1.0, 0.0],
+        [0.0, 3.0],
+        1e-10,
+        margins=(Margin.restart(), Margin.stop()),
+    )
+    result = radau.solve(case)
+    assert result.status == Status.EVENT
+    assert sorted(result.events.index) == [0, 1]
+    assert result.t == pytest.approx(np.pi / 2, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", names)
+def test_margin_zero_at_the_start_does_not_fire(name: str) -> None:
+    case = problem(oscillator(lambda t, x, v: x), [0.0, 1.0], [0.0, 4.0], 1e-8, margins=(Margin.stop(),))
+    assert solver(name).solve(case).t == pytest.approx(np.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", names)
+def test_kinks_restart(name: str) -> None:
+    """x' = v, v' = -sign(x): parabolas of period 4 sqrt(2), exact between kinks."""
+    t, x, v, dx, dv = se.symbols("t x v dx dv")
+    sign = se.Piecewise((1.0, x > 0), (-1.0, True))
+    program = compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + sign], margins=[x])
+    result = solver(name).solve(problem(program, [1.0, 0.0], [0.0, 9.0], 1e-9, margins=(Margin.restart(),)))
+    assert result.status == Status.FINISHED
+    np.testing.assert_allclose(result.events.t, np.sqrt(2) * np.array([1.0, 3.0, 5.0]), rtol=1e-6)
+    assert len(result.events.t) == 3
+    phase = 9.0 - 5 * np.sqrt(2)
+    np.testing.assert_allclose(result.y[0], -(np.sqrt(2) * phase - phase**2 / 2), rtol=1e-5)
+
+
+def test_blow_up_ends_with_a_status() -> None:
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - y**2])
+    for name in names:
+        result = solver(name).solve(problem(program, [1.0], [0.0, 2.0], 1e-6, max_steps=20_000))
+        assert not result.success, name
+        assert result.t <= 1.0 + 1e-5
+        assert np.all(np.isfinite(result.y))
+
+
+def test_no_consistent_state() -> None:
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**2 + 1 + y**2])
+    for name in names:
+        assert not solver(name).solve(problem(program, [1.0, 1.0], [0.0, 1.0], 1e-6)).success, name
+
+
+def test_singular_capacity() -> None:
+    t, x, y, dx, dy = se.symbols("t x y dx dy")
+    program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
+    result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
+    assert result.status == Status.SINGULAR
+    assert "singular" in result.message
+
+
+def test_steps_and_seconds_are_limited() -> None:
+    case = oscillator()
+    assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e9], 1e-10, max_steps=50)).status == Status.MAX_STEPS
+    assert (
+        radau.solve(problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)).status
+        == Status.STOPPED
+    )
+
+
+def test_recorded_steps_are_consistent() -> None:
+    case = problem(
+        exothermic(), [300.0, 0.0], [0.0, 2.5], 1e-8, parameters=[2.0, 300.0, 300.0, 1.0, 0.5], record_steps=True
+    )
+    steps = radau.solve(case).steps
+    assert steps is not None
+    assert steps.t[0] == 0.0
+    assert steps.t[-1] == 2.5
+    np.testing.assert_allclose(steps.ydot[:, 1], 2.0 * np.exp(-2.0 * steps.t), rtol=1e-5)
+
+
+def test_batch_is_deterministic_and_equals_single_runs() -> None:
+    rng = np.random.default_rng(1)
+    parameters = np.array([2.0, 300.0, 300.0, 1.0, 0.5]) * rng.uniform(0.5, 1.5, (600, 1, 5))
+    y0 = np.stack([parameters[:, 0, 2], np.zeros(600)], axis=1)
+    one, two = (
+        solve_many(exothermic(), y0, parameters, [0.0, 2.5], 1e-8, [1e-8, 1e-10], times=[1.0, 2.5], threads=threads)
+        for threads in (1, 2)
+    )
+    assert one.y.tobytes() == two.y.tobytes()
+    assert one.outputs.tobytes() == two.outputs.tobytes()
+    assert np.all(one.status == Status.FINISHED)
+    single = radau.solve(
+        Problem(
+            exothermic(),
+            y0[7],
+            np.array([1.0, 2.5]),
+            np.array([0.0, 2.5]),
+            parameters[7],
+            1e-8,
+            np.array([1e-8, 1e-10]),
+        )
+    )
+    assert single.y.tobytes() == one.y[7].tobytes()
+    for i in (0, 599):
+        np.testing.assert_allclose(one.y[i], exothermic_exact(2.5, parameters[i, 0]), rtol=1e-7)
+
+
+def test_consistent_states_in_rows() -> None:
+    t, y, z, dy, dz = se.symbols("t y z dy dz")
+    program = compile_program(t, [y, z], [dy, dz], [], [dy + z, z**3 + z - y])
+    y_values = np.linspace(-5.0, 5.0, 11)
+    found = consistent(program, 0.0, np.stack([y_values, np.ones(11)], axis=1), np.zeros((11, 2)), [])
+    assert np.all(found.valid)
+    np.testing.assert_allclose(found.y[:, 1] ** 3 + found.y[:, 1], y_values, atol=1e-13)
+    np.testing.assert_allclose(found.ydot[:, 0], -found.y[:, 1], rtol=1e-14)
+
+
+def test_thirteen_digits_against_high_precision() -> None:
+    """Logistic growth to 1e-13: the tables and the linear algebra lose nothing."""
+    t, y, dy = se.symbols("t y dy")
+    program = compile_program(t, [y], [dy], [], [dy - y * (1 - y)])
+    result = radau.solve(problem(program, [0.1], [0.0, 5.0], 1e-13, atol=1e-16))
+    exact = mpmath.mpf(1) / (1 + 9 * mpmath.exp(-5))
+    assert abs(result.y[0] / float(exact) - 1) < 1e-13
+
+
+def test_batch_with_times_of_their_own_and_events() -> None:
+    """Runs that end at different times, and where each crosses half of its way."""
+    t, y, dy, k = se.symbols("t y dy k")
+    program = compile_program(t, [y], [dy], [k], [dy + k * y], margins=[y - 0.5])
+    rates = np.array([1.0, 10.0, 100.0])
+    ends = 3.0 / rates
+    batch = solve_many(
+        program,
+        np.ones((3, 1)),
+        rates[:, None, None],
+        np.stack([np.zeros(3), ends], axis=1),
+        1e-11,
+        [1e-17],
+        times=np.outer(ends, [0.0, 0.5, 1.0]),
+        margins=[Margin.restart()],
+        event_rows=4,
+    )
+    np.testing.assert_allclose(batch.t, ends)
+    np.testing.assert_allclose(batch.outputs[:, :, 0], np.exp([[0.0, -1.5, -3.0]] * 3), rtol=1e-10)
+    np.testing.assert_allclose([events.t[0] for events in batch.events], np.log(2.0) / rates, rtol=1e-10)
+    with pytest.raises(ValueError, match="segments and times too"):
+        solve_many(program, np.ones((3, 1)), rates[:, None, None], [[0.0, 1.0]], 1e-8, 1e-8, times=[[1.0]])
+
+
+def test_a_return_code_without_words_ends_the_step():
+    """The wrapper of SUNDIALS looks its message up and raises KeyError where it has none."""
+    from surfacechem.solve.adapters.stepping import StepError
+    from surfacechem.solve.adapters.sundials import _Stretch
+
+    class Library:
+        def init_step(self, *_start):
+            raise KeyError(-60)
+
+    with pytest.raises(StepError, match="return code -60"):
+        _Stretch(Library(), 0.0, 1.0, np.zeros(1))

@@ -1,0 +1,193 @@
+"""What random scenes brought to light: each cause by itself, in the smallest scene that shows it."""
+
+import numpy as np
+import pytest
+import symengine
+from scenes import SITES, bodies, path, perfect_contact, varying
+from scenes_mechanics import TOGETHER, inertial_gap, overdamped_gap
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
+from surfacechem.laws.adhesion import AdhesionIntensity
+from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonds import DudkoHummerSzabo
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
+from surfacechem.laws.contact_conductance import PressureConductance
+from surfacechem.laws.factors import Linear
+from surfacechem.laws.films import FilmCapacity
+from surfacechem.laws.friction import Coulomb, Viscous
+from surfacechem.laws.gap_conductance import GasGap
+from surfacechem.laws.kinetics import LinearAffinity, Relaxation
+from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.longrange import VanDerWaalsFlatFlat
+from surfacechem.model.assemble import assemble
+from surfacechem.results.audit import audit
+from surfacechem.results.solution import Solution
+from surfacechem.scene import Interface, Medium, Mounting, Scene, Stage
+from surfacechem.solve.run import Model, Run
+
+APART = {"T_1": 300.0, "T_2": 310.0}
+
+
+def run(scene, end, points=11):
+    return Model(assemble(scene)).solve(Run(np.linspace(0.0, end, points).tolist(), max_steps=20_000))
+
+
+def column(trajectory, name):
+    return trajectory.outputs[:, [item.name for item in trajectory.model.system.outputs].index(name)]
+
+
+def state(trajectory, name):
+    return trajectory.result.outputs[:, [item.name for item in trajectory.model.system.states].index(name)]
+
+
+def test_a_parameter_called_M_is_not_the_chemical_potential():
+    interface = Interface(None, [LinearEnthalpy(H_r=0.3)], (), [LinearAffinity(c_r=1e10)], SITES)
+    gas = GasGap(between=("lower", "upper"), k=0.026, M=3.7e-7)
+    loading = {"g_n": Hold(level=1e-6)}
+    scene = Scene(bodies(energy=Constant), interface, [gas], loading, None, 300.0, APART | {"phi": 0.1})
+    trajectory = run(scene, 1e-3)
+    assert column(trajectory, "q_12")[0] == pytest.approx(0.026 / 1.37e-6 * -10, rel=1e-12)
+
+
+def test_a_parameter_called_C_T_is_not_the_capacity_of_a_node_T():
+    adhesion = AdhesionIntensity(C_N=1e12, C_T=varying(1e12, Linear(of="T_c", slope=0.0, about=0.0)), w=1.0, E_n=1e14)
+    loading = {"g_t": Hold(level=1e-6), "g_n": Hold(level=0.0), "phi": Hold(level=0.5)}
+    scene = perfect_contact([adhesion], loading=loading)
+    trajectory = run(scene, 1.0)
+    assert column(trajectory, "t_e")[0] == pytest.approx(0.25 * 1e12 * 1e-6, rel=1e-12)
+
+
+def test_energy_and_traction_know_the_same_side_of_touch():
+    interface = Interface("T", [Penalty(E_n=1e14)])
+    loading = {"w_n": Ramp(start=1e-8, rate=-1e-7)}
+    mount = Mounting(k=1e13, m=0.01)
+    scene = Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER | {"g_n": 1e-8}, normal=mount)
+    system = assemble(scene)
+    g = symengine.Symbol("g_n")
+    for row in system.residual():
+        conditions = row.atoms(symengine.StrictLessThan, symengine.LessThan)
+        assert not any(g in condition.free_symbols for condition in conditions)
+
+
+@pytest.mark.parametrize("make", [overdamped_gap, inertial_gap], ids=lambda make: make.__name__)
+def test_equations_are_linear_in_the_rates(make):
+    system = assemble(make())
+    rates = [s.dot for s in system.states]
+    for row in system.residual():
+        assert all(derivative(derivative(row, a), b) == 0 for a in rates for b in rates)
+
+
+def test_work_on_a_state_at_rest_is_followed_without_transitions():
+    loading = {"g_n": Harmonic(mean=2e-8, amplitude=1.8e-8, frequency=0.1, phase=1.0)}
+    interface = Interface(None, [NormalStiffness(E_n=6e13)])
+    heat = [path("lower", "upper", 100.0)]
+    trajectory = run(Scene(bodies(energy=Constant), interface, heat, loading, None, 300.0, APART), 200.0)
+    assert audit(trajectory).energy_error < 1e-9
+
+
+def test_reversals_are_events_under_a_periodic_load():
+    loading = {"v": Harmonic(amplitude=0.02, frequency=2.0), "p": Hold(level=1e5)}
+    trajectory = run(perfect_contact([], frictions=[Coulomb(mu=0.3)], loading=loading), 5.0)
+    assert len(trajectory.result.events.t) == 19
+
+
+def test_relaxation_needs_a_potential_that_curves():
+    with pytest.raises(InputError, match=r"relaxation holds for dmu_dphi > 0 only; .* always 0"):
+        assemble(perfect_contact([LinearEnthalpy(H_r=1.0)], [Relaxation(tau=1.0)]))
+
+
+def test_the_range_of_a_law_of_bonds_is_a_number():
+    law = DudkoHummerSzabo(k_off=0.1, x_off=1e-10, barrier=2e-20)
+    loading = {"f": Ramp(start=0.0, rate=1e-9)}
+    solution = Solution(run(perfect_contact([LatticeGas(epsilon=1e-20)], [law], phi=0.5, loading=loading), 1.0))
+    assert any("dudko hummer szabo is an extrapolation" in warning for warning in solution.warnings)
+
+
+def test_a_film_that_stores_heat_needs_a_temperature_of_its_own():
+    medium = Medium(None, {"rho_m": 1e3, "cp_m": 2e3}, 1e-6)
+    interface = Interface(None, [FilmCapacity()], medium=medium)
+    with pytest.raises(InputError, match="depends on temperature, but the interface has none"):
+        assemble(Scene(bodies(), interface, [path("lower", "upper", 1.0)], {}, None, 300.0, APART))
+
+
+def test_a_slider_without_transitions_starts_in_equilibrium():
+    mount, loading = Mounting(k=1e12), {"w_t": Ramp(start=-4e-8, rate=1e-9), "g_n": Hold(level=1e-6)}
+    interface = Interface("T", [TangentialStiffness(E_t=1e12)], [Viscous(eta=1e3)])
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
+    trajectory = run(scene, 1.0)
+    assert state(trajectory, "u_t")[0] == pytest.approx(-2e-8, rel=1e-9)
+    balance = 1e12 * (column(trajectory, "w_t") - state(trajectory, "u_t")) - column(trajectory, "t_e")
+    assert np.max(np.abs(balance)) < 1e-9 * np.max(np.abs(column(trajectory, "t_e")))
+
+
+def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
+    law = PressureConductance(between=("lower", "upper"), h_c=1e3, H=varying(1e9, Linear(of="phi", slope=-1.5)))
+    loading = {"phi": Ramp(start=0.1, rate=0.5), "p": Hold(level=1e6)}
+    scene = Scene(bodies(), Interface(None), [law], loading, None, 300.0, APART)
+    trajectory = run(scene, 1.5)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies near t = 1.13333")
+
+
+def test_a_programme_moves_a_dead_load():
+    interface = Interface("T", [NormalStiffness(E_n=1e12)])
+    programme = (Stage("pull", {"F_n": 1e3}, duration=1.0), Stage("hold", {}))
+    trajectory = run(Scene(bodies("T", "T"), interface, T_0=300.0, initial=TOGETHER, programme=programme), 2.0)
+    assert trajectory.status == "finished"
+    assert state(trajectory, "g_n")[-1] == pytest.approx(1e-9, rel=1e-9)
+
+
+def test_an_overdamped_slider_starts_from_rest():
+    mount = Mounting(k=1.4e12, c_g=1.8e12)
+    loading = {"F_t": Ramp(start=7e4, rate=1e5), "w_t": Hold(level=0.0), "p": Hold(level=4e5)}
+    interface = Interface("T", frictions=[Coulomb(mu=0.9, mu_s=0.04)])
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
+    trajectory = run(scene, 10.0)
+    assert trajectory.status == "finished"
+    # The limit of sticking is at least what sliding resists with: 3.6e5 Pa at t = 2.9 s; then c v + k u = F - 3.6e5 Pa.
+    tau, since = 1.8 / 1.4, 7.1
+    assert state(trajectory, "u_t")[-1] == pytest.approx(
+        1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8
+    )
+
+
+def test_an_open_contact_does_not_stick_and_slide_without_end():
+    adhesion = AdhesionIntensity(C_N=1.8e9, C_T=1.8e7, w=1.5e-7, E_n=1.2e9)
+    pulse = Table(times=[0.0, 0.31, 0.310000002, 0.310000004], values=[0.0, 0.0, 3e-9, 0.0])
+    loading = {"w_t": pulse, "g_n": Hold(level=1e-9), "phi": Hold(level=0.12)}
+    interface = Interface("T", [adhesion, BondSprings(k_b=1e-9)], [Coulomb(mu=0.8, mu_s=0.3)], sites=SITES)
+    mount = Mounting(k=2.4e7, c_b=6e6, c_g=6e6, beta_1=1.0)
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
+    assert run(scene, 2.2).status == "finished"
+
+
+def test_a_film_that_closes_before_the_last_breakpoint_is_named():
+    loading = {"g_n": Ramp(start=1e-6, rate=-1e-6), "v": Harmonic(amplitude=1e-6, frequency=0.4, phase=1.0)}
+    interface = Interface("T", frictions=[Viscous(eta=1.0)])
+    trajectory = run(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER), 5.0)
+    assert trajectory.status == "stopped"
+    assert trajectory.reason.startswith("g_n reached zero, where the law viscous ends")
+    assert Solution(trajectory).audit.violations == ()
+
+
+def test_an_impossible_jump_says_what_is_in_the_way():
+    interface = Interface("T", [ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)])
+    loading = {"F_n": Ramp(start=0.0, rate=1e5)}
+    trajectory = run(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER), 20.0)
+    assert trajectory.status == "stopped"
+    assert "is impossible: no gap follows at which the tractions are in equilibrium" in trajectory.reason
+    assert trajectory.result.t == pytest.approx(10.0, rel=1e-6)
+
+
+def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_side():
+    interface = Interface("T", [VanDerWaalsFlatFlat(A_H=1e-19), Penalty(E_n=1e13)])
+    loading = {"w_n": Ramp(start=5e-9, rate=-1e-9)}
+    initial = TOGETHER | {"g_n": 5e-9}
+    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    trajectory = run(scene, 10.0)
+    # In contact the attraction is what it is at touch: A_H / (6 pi D_0^3).
+    pull = 1e-19 / (6 * np.pi * 1.65e-10**3)
+    assert state(trajectory, "g_n")[0] == pytest.approx((5e-9 - pull / 1e13) / 2, rel=1e-9)

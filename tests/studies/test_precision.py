@@ -1,0 +1,378 @@
+"""Error against run time: errors fall with the tolerance, references know how uncertain they are, nothing is hidden."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+import surfacechem
+from surfacechem.cli.main import app
+from surfacechem.results.accuracy import relative_errors
+from surfacechem.results.achieved import computed
+from surfacechem.solve import names
+from surfacechem.solve.adapters import sundials
+from surfacechem.studies.precision import truth as truths
+from surfacechem.studies.precision.columns import LABELS
+from surfacechem.studies.precision.comparing import _subject
+from surfacechem.studies.precision.errors import KINDS
+from surfacechem.studies.precision.figure import figure
+from surfacechem.studies.precision.truth import establish, numerical
+from surfacechem.studies.report import LIBRARIES
+
+pytestmark = pytest.mark.around
+
+TIMES = ("seconds", "repetitions")
+"""What differs from one study to the next."""
+
+
+@pytest.fixture(autouse=True)
+def quick_methods(monkeypatch, request):
+    """References of the two quicker methods, but in slow tests of all."""
+    if "slow" not in request.keywords:
+        monkeypatch.setattr(truths, "METHODS", ("radau", "lsoda"))
+
+
+@pytest.fixture(scope="module")
+def study():
+    return surfacechem.precision("exothermic", ["radau", "lsoda"], [1e-4, 1e-7, 1e-10], repeat=1)
+
+
+@pytest.fixture(scope="module")
+def data(study):
+    return named(study)
+
+
+def named(study):
+    return study.dataset.set_index(LABELS)
+
+
+def subject_of(name, *overrides):
+    return _subject(surfacechem.load(name, list(overrides)))
+
+
+# -- errors ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_errors_fall_with_the_tolerance(data, kind):
+    errors = data[f"error_{kind}"].sel(case="exothermic")
+    for solver in data.solver.values:
+        column = errors.sel(solver=solver).values
+        assert np.all(np.diff(column) < 0)
+        assert np.all(column < 1e-2)
+    assert np.all(data[f"uncertainty_{kind}"] < 1e-14)
+    assert np.all(data["error_l2"] <= data["error_max"])
+    assert np.all(data["error_final"] <= data["error_max"])
+
+
+def test_the_energy_residual_falls_with_the_tolerance(data):
+    assert np.all(np.diff(data["energy_error"].values, axis=-1) < 0)
+
+
+def test_the_worst_variable_counts(data):
+    for kind in KINDS:
+        xarray.testing.assert_equal(
+            data[f"variable_error_{kind}"].max("variable").drop_vars("variable", errors="ignore").drop_attrs(),
+            data[f"error_{kind}"].drop_attrs(),
+        )
+    assert list(data["variable"].values) == ["phi", "T"]
+
+
+def test_the_error_is_that_of_the_run(data):
+    simulation = surfacechem.load("exothermic")
+    alone = simulation.run(run=replace(simulation.case.run, rtol=1e-7)).accuracy.variables
+    ours = data["variable_error_max"].sel({"case": "exothermic", "solver": "radau", "tolerance": 1e-7})
+    for name in ("phi", "T"):
+        assert float(ours.sel(variable=name).item()) == pytest.approx(alone[name], rel=1e-12)
+
+
+def test_chosen_variables_count():
+    chosen = surfacechem.precision("exothermic", ["radau"], [1e-8], ["T"], repeat=1)
+    both = surfacechem.precision("exothermic", ["radau"], [1e-8], repeat=1)
+    assert list(chosen.dataset["variable_name"].values) == ["T"]
+    at_t = named(both)["variable_error_max"].sel(variable="T").values
+    assert np.array_equal(chosen.dataset["error_max"].values, at_t)
+
+
+def test_a_named_quantity_without_an_exact_value_is_held_against_two_methods():
+    found = surfacechem.precision("exothermic", ["radau"], [1e-6, 1e-9], ["T", "S_total"], repeat=1)
+    reference = str(found.dataset["reference"].values[0])
+    assert reference.startswith("exact solution exothermic-bonding; S_total: ")
+    errors = named(found)["variable_error_max"].sel(variable="S_total").values.ravel()
+    assert errors[1] < errors[0] < 1e-6
+
+
+def test_the_times_of_events_have_errors():
+    found = surfacechem.precision("coulomb-stop", ["radau", "cvode"], [1e-5, 1e-9], repeat=1).dataset
+    errors = found["error_event"].values[0]
+    assert np.all(np.isfinite(errors))
+    assert np.all(errors[:, 1] <= np.maximum(errors[:, 0], found["uncertainty_event"].values[0]))
+    assert float(found["uncertainty_event"][0]) < 1e-9
+
+
+# -- references --------------------------------------------------------------------------------------------------------
+
+
+HONEST = [("exothermic", ("phi", "T")), ("coulomb-stop", ("T",)), ("sliding-dry", ("T",))]
+SLOW = [("cooling-to-zero", ("T",)), ("adiabatic-arrhenius", ("T",)), ("stick-slip", ("T",))]
+
+
+@pytest.mark.parametrize(("name", "variables"), HONEST)
+def test_a_computed_reference_is_as_good_as_it_says(name, variables):
+    check_reference(name, variables)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "variables"), [*HONEST, *SLOW])
+def test_a_reference_of_all_methods_is_as_good_as_it_says(name, variables):
+    check_reference(name, variables)
+
+
+def check_reference(name, variables):
+    subject = subject_of(name)
+    exact, found = establish(subject, variables), numerical(subject, variables)
+    assert found.status == exact.status
+    n = min(len(exact.times), len(found.times))
+    for variable in variables:
+        floor = found.floors[variable]
+        error = relative_errors(found.values[variable][:n], exact.values[variable][:n], floor)
+        # The last steps before an end that physics sets are as uncertain as its time.
+        limit = found.uncertainty.by_kind["max"][variable] + exact.uncertainty.by_kind["max"][variable]
+        assert error.max() <= 3 * limit
+        assert limit < 1e-8
+
+
+def test_a_case_without_an_exact_solution_says_what_it_is_held_against():
+    data = surfacechem.precision("exothermic", ["radau"], [1e-13], repeat=1, overrides=["reference="]).dataset
+    assert re.fullmatch(r"\S+ and \S+, extrapolated from rtol 1e-12 and 1e-13", str(data["reference"].values[0]))
+    assert 0 < float(data["uncertainty_max"][0]) < 1e-11
+
+
+def test_an_exact_solution_of_another_scene_is_not_used():
+    data = surfacechem.precision("exothermic", ["radau"], [1e-6], repeat=1, overrides=["reference=sliding"]).dataset
+    assert "the exact solution sliding is not of this scene: it says nothing of phi" in str(data["reference"].values[0])
+
+
+def test_methods_that_do_not_agree_give_no_reference(monkeypatch, tmp_path):
+    limit = truths._limit
+    shifts = iter(np.linspace(0.0, 1.0, 1000))
+    monkeypatch.setattr(truths, "_limit", lambda loose, tight: limit(loose, tight) * (1 + next(shifts)))
+    target = tmp_path / "none.nc"
+    options = ["--solvers", "radau", "--tolerances", "1e-6", "--repeat", "1", "--set", "reference=", "-o", str(target)]
+    done = CliRunner().invoke(app, ["precision", "exothermic", *options])
+    assert done.exit_code == 4
+    assert "has no reference: the methods that agree best" in done.output
+    with xarray.open_dataset(target) as data:
+        assert np.isnan(data["error_max"]).all()
+        assert np.isfinite(data["energy_error"]).all()
+        assert data.attrs["status"] == "failed"
+
+
+def test_a_method_that_fails_is_no_reference(monkeypatch):
+    monkeypatch.setattr(truths, "METHODS", ("radau", "scipy-radau", "lsoda"))
+    subject = subject_of("exothermic", "reference=")
+    original = type(subject.model).solve
+
+    def failing(model, run, changes=None):
+        if run.solver == "scipy-radau":
+            raise ArithmeticError("lost")
+        return original(model, run, changes)
+
+    monkeypatch.setattr(type(subject.model), "solve", failing)
+    assert numerical(subject, ["T"]).source.startswith("radau and lsoda")
+
+
+# -- what failed and what was left out ---------------------------------------------------------------------------------
+
+
+def test_a_failing_solver_is_shown_as_failed():
+    few = surfacechem.precision("exothermic", ["radau", "bdf"], [1e-10], repeat=1, overrides=["run.max-steps=40"])
+    data = few.dataset.isel(case=0, tolerance=0)
+    assert list(data["status"].values) == ["finished", "failed"]
+    assert "the number of steps allowed was used up" in str(data["reason"].values[1])
+    assert np.isnan(data["error_max"].values[1])
+    assert data["count_steps"].values[1] == 40
+    for text in (few.page.text(), few.page.html()):
+        assert re.search(r"bdf\W.*1e-10\W.*failed", text)
+        assert re.search(r"bdf\W.*1e-10\W.*the number of steps allowed was used up", text)
+    assert "tr class=marked" in few.page.html()
+
+
+def test_a_solver_that_raises_is_shown_as_failed(monkeypatch):
+    def broken(*_):
+        raise RuntimeError("CVODE had a bad day")
+
+    monkeypatch.setattr(sundials.CVODESolver, "solve", broken)
+    data = surfacechem.precision("exothermic", ["radau", "cvode"], [1e-6], repeat=1).dataset
+    assert list(data["status"].values.ravel()) == ["finished", "failed"]
+    assert "CVODE had a bad day" in str(data["reason"].values[0, 1, 0])
+
+
+def test_a_run_with_other_events_has_failed(monkeypatch):
+    subject = subject_of("coulomb-stop")
+    truth = establish(subject, ["T"])
+    trajectory = subject.solve("radau", 1e-8)
+    assert truth.objection(trajectory) == ""
+    assert truth.objection(replace(trajectory, jumps=())).startswith("other events")
+    early = replace(trajectory.result, times=trajectory.result.times[:3])
+    assert truth.objection(replace(trajectory, result=early)).startswith("ended elsewhere than the reference")
+    assert truth.objection(replace(trajectory, status="stopped")).startswith("ended otherwise than the reference")
+
+
+def test_a_solver_that_cannot_run_a_case_is_left_out(monkeypatch):
+    from surfacechem.studies.precision.subject import Subject
+
+    reason = "rates of the mechanism come from Cantera itself, which this solver cannot ask"
+    monkeypatch.setattr(Subject, "unable", lambda _, name: reason if name == "ida" else "")
+    study = surfacechem.precision("exothermic", ["radau", "ida"], [1e-6], repeat=1)
+    assert list(study.dataset["status"].values.ravel()) == ["finished", "omitted"]
+    assert f"exothermic: ida: {reason}" in study.page.text()
+    assert f"exothermic: ida: {reason}" in study.page.html()
+    assert "ida (left out)" in study.page.html()
+
+
+# -- the dataset -------------------------------------------------------------------------------------------------------
+
+
+def test_counts_are_the_solvers_own(data):
+    counts = data.sel({"case": "exothermic", "tolerance": 1e-7})
+    assert np.isnan(counts["count_rejected"].sel(solver="lsoda"))
+    assert counts["count_rejected"].sel(solver="radau") >= 0
+    # LSODA asks for few right-hand sides a step; those for 201 outputs are not among them.
+    assert counts["count_residuals"].sel(solver="lsoda") < 3 * counts["count_steps"].sel(solver="lsoda")
+    assert np.isnan(counts["stepping_seconds"].sel(solver="radau"))
+    assert counts["stepping_seconds"].sel(solver="lsoda") <= counts["run_seconds"].sel(solver="lsoda")
+
+
+def test_what_is_no_time_is_the_same_again(study):
+    again = surfacechem.precision("exothermic", ["radau", "lsoda"], [1e-4, 1e-7, 1e-10], repeat=1)
+    for a, b in zip(study.columns, again.columns, strict=True):
+        if not any(word in a.name for word in TIMES):
+            np.testing.assert_array_equal(a.values, b.values, err_msg=a.name)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    found = surfacechem.precision(["exothermic", "sliding-dry"], ["radau", "lsoda"], [1e-4, 1e-8], repeat=1)
+    return found, found.write(tmp_path_factory.mktemp("study") / "two.nc")
+
+
+def test_opens_plainly_over_case_solver_and_tolerance(written):
+    study, (target, *_) = written
+    with xarray.open_dataset(target) as opened:
+        xarray.testing.assert_identical(opened.load(), study.dataset)
+        assert opened["error_max"].dims == ("case", "solver", "tolerance")
+        assert list(opened["case_name"].values) == ["exothermic", "sliding-dry"]
+        by_name = opened.set_index(LABELS)
+        assert np.isnan(by_name["variable_error_max"].sel(case="sliding-dry", variable="phi")).all()
+        for variable in opened.variables.values():
+            assert variable.attrs["units"]
+            assert variable.attrs["long_name"]
+
+
+def test_follows_the_cf_conventions(written):
+    runner = pytest.importorskip("compliance_checker.runner")
+    suite = runner.CheckSuite()
+    suite.load_all_available_checkers()
+    results, problems = suite.run_all(suite.load_dataset(str(written[1][0])), ["cf:1.11"])["cf:1.11"]
+    assert problems == {}
+    assert [message for result in results for message in result.msgs] == []
+
+
+def test_the_figure_is_drawn_from_the_file(written, tmp_path):
+    target = tmp_path / "figure.svg"
+    done = CliRunner().invoke(app, ["plot", str(written[1][0]), "-o", str(target)])
+    assert done.exit_code == 0, done.output
+    text = target.read_text()
+    for word in ("exothermic", "sliding-dry", "largest relative error", "run time [s]", "energy residual", "lsoda"):
+        assert f"<!-- {word} -->" in text
+
+
+def test_hollow_marks_are_below_the_uncertainty(study):
+    plot = figure(study.dataset.assign(uncertainty_max=study.dataset["uncertainty_max"] * 0 + 1e-6))
+    marks = [line for line in plot.axes[0].lines if line.get_linestyle() == "None"]
+    hollow = np.concatenate([line.get_xdata() for line in marks if line.get_markerfacecolor() == "white"])
+    solid = np.concatenate([line.get_xdata() for line in marks if line.get_markerfacecolor() != "white"])
+    assert len(hollow) > 0
+    assert np.all(hollow < 1e-6)
+    assert np.all(solid[np.isfinite(solid)] >= 1e-6)
+    assert any(handle.get_text() == "below the uncertainty of the reference" for handle in plot.legends[0].get_texts())
+
+
+def test_a_case_without_energy_has_no_panel_of_it(study):
+    plot = figure(study.dataset.assign(energy_error=study.dataset["energy_error"] * 0))
+    assert [ax.get_xlabel() for ax in plot.axes] == ["largest relative error"]
+
+
+# -- the report --------------------------------------------------------------------------------------------------------
+
+
+def test_the_report_contains_everything(written):
+    study, (_, svg, png, page) = written
+    text = page.read_text()
+    assert svg.read_text().startswith("<?xml")
+    assert png.read_bytes().startswith(b"\x89PNG")
+    for word in (study.command, "<svg", "How it was measured", "Left out", "processor", "warms", *LIBRARIES):
+        assert word in text, word
+    for case in study.cases:
+        assert case.reference in text
+        assert f"uncertain  final {case.truth.uncertainty.worst('final'):.1e}" in text
+        assert case.subject.text.splitlines()[0] in text
+    for solver in study.plan.solvers:
+        assert f"<td>{solver}</td><td>1e-08</td>" in text
+    assert not re.search(r'(src|href)="(?!#)', text)
+
+
+def test_the_command_in_the_report_makes_the_study_again(written, tmp_path, monkeypatch):
+    import shlex
+
+    study, _ = written
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, shlex.split(study.command)[1:])
+    assert done.exit_code == 0, done.output
+    with xarray.open_dataset("precision.nc") as again:
+        np.testing.assert_array_equal(again["error_max"], study.dataset["error_max"])
+
+
+# -- input -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["exothermc"], "Did you mean 'exothermic'?"),
+        (["exothermic", "--solvers", "radua"], "solvers: no solver 'radua'. Did you mean 'radau'?"),
+        (["exothermic", "--solvers", ","], "solvers: at least one is needed."),
+        (["exothermic", "--tolerances", "tight"], "--tolerances: 'tight' are no tolerances"),
+        (["exothermic", "--tolerances", "1e-4..0"], "--tolerances: '1e-4..0' is no range of tolerances"),
+        (["exothermic", "--tolerances", "2"], "tolerances: 2 is outside its range: > 0 and <= 0.1."),
+        (["exothermic", "--variables", "phii"], "variables: no variable 'phii' in the cases. Did you mean 'phi'?"),
+        (["exothermic", "--repeat", "0"], "repeat: 0 is outside its range: >= 1"),
+        (["exothermic", "exothermic"], "the case exothermic is given twice."),
+        (["exothermic", "-o", "nowhere/x.nc"], "there is no folder"),
+        (["exothermic", "--set", "initial.phi=2"], "phi"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_runs(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("surfacechem.studies.precision.plan.measure", None)
+    done = CliRunner().invoke(app, ["precision", *arguments])
+    assert done.exit_code == 2, done.output
+    assert message in done.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_tolerances_may_be_decades(study):
+    from surfacechem.cli.precision import _tolerances
+
+    assert _tolerances("1e-4..1e-12") == [float(f"1e-{k}") for k in range(4, 13)]
+    assert study.plan.tolerances == (1e-4, 1e-7, 1e-10)
+    assert set(study.plan.solvers) < set(names)
+
+
+def test_all_that_is_compared_is_computed():
+    trajectory = subject_of("exothermic").solve("radau", 1e-6)
+    assert {"phi", "T", "S_total"} <= set(computed(trajectory))

@@ -1,0 +1,285 @@
+"""The stability matrix: its expectations hold for our solver, and what does not hold is seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+from surfacechem.cli.main import app
+from surfacechem.errors import InputError
+from surfacechem.runs.report import run_summary
+from surfacechem.runs.simulation import Simulation
+from surfacechem.solve import names
+from surfacechem.studies.stability import search
+from surfacechem.studies.stability.condition import condition
+from surfacechem.studies.stability.matrix import (
+    FAILED,
+    REFUSED,
+    RTOL,
+    SENSITIVE,
+    SOLVED,
+    WRONG,
+    attempt,
+    digits_left,
+    digits_of,
+    few,
+    read,
+)
+from surfacechem.studies.stability.matrix import LEAST as LEAST_DIGITS
+from surfacechem.studies.stability.page import cell_text
+from surfacechem.studies.stability.regime import Exact, Problem, Refused, Stops
+from surfacechem.studies.stability.regimes import regimes
+from surfacechem.studies.stability.study import stability
+
+pytestmark = pytest.mark.around
+
+BROKEN = {
+    # A film of 1e-14 of its thickness: the last bit of the time is a tenth of the gap.
+    ("film", 1e-14): FAILED,
+    # Changes of the data grow by (T_0 / T)^2, and with the exponential of E_a / (R_g T).
+    ("cold", 1e-6): SENSITIVE,
+    ("runaway", 200.0): SENSITIVE,
+}
+"""Where each regime ends; what is listed here and holds is a failure of the test."""
+
+SENSITIVE_CELLS = [place for place, outcome in BROKEN.items() if outcome == SENSITIVE]
+
+LEAST = {"cold": 2.5, "runaway": 7.0, "film": 6.5, "debonding": 8.5, "fold": 8.5, "endothermic": 8.5}
+"""Digits that the regime itself leaves at rtol 1e-10; elsewhere nine and a half."""
+
+CELLS = [(name, value) for name, regime in regimes().items() for value in few(regime.values)]
+ALL = [(name, value) for name, regime in regimes().items() for value in regime.values]
+
+
+def assert_kept(name: str, value: float) -> None:
+    (cell,) = attempt(regimes()[name].problem(value), ["radau"])
+    expected = regimes()[name].problem(value).expected
+    right = SOLVED if isinstance(expected, Exact) else REFUSED
+    assert cell.outcome == BROKEN.get((name, value), right), cell
+    if cell.outcome == right:
+        assert cell.digits > LEAST.get(name, 9.5), cell
+    if cell.outcome != FAILED and np.isfinite(cell.condition):
+        assert cell.digits > digits_left(max(cell.condition, 1.0), RTOL) - 0.5, cell
+
+
+@pytest.mark.parametrize(("name", "value"), CELLS)
+def test_what_is_expected_of_a_regime_holds(name, value):
+    assert_kept(name, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "value"), ALL)
+def test_what_is_expected_of_a_regime_holds_everywhere(name, value):
+    assert_kept(name, value)
+
+
+@pytest.mark.parametrize("name", [name for name, regime in regimes().items() if regime.space])
+def test_random_corners_are_solved(name):
+    corner = search.worst_corner(regimes()[name], rounds=1)
+    assert corner.unsolved == 0, corner
+    assert corner.cell.digits > 8.0, corner
+
+
+@pytest.mark.parametrize(("exponent", "k_off"), [(374.2, 1.9e11), (459.0, 1.5e-9), (1e4, 3.9e-12), (1e4, 2.6e-5)])
+def test_rates_that_fall_by_decades_within_a_run(exponent, k_off):
+    """A Jacobian of the start is far too stiff for what follows."""
+    problem = regimes()["bell"].corner({"exponent": exponent, "k_off": k_off})
+    cell = attempt(problem, ["radau"])[0]
+    assert (cell.outcome, cell.digits > 8.0) == (SOLVED, True), cell
+
+
+def test_a_search_finds_the_same_corner_again():
+    first, second = (search.worst_corner(regimes()["bell"], rounds=1, seed=1) for _ in range(2))
+    assert first.point == second.point
+    assert search.worst_corner(regimes()["bell"], rounds=0, seed=2).point != first.point
+
+
+def expecting(name: str, value: float, expected):
+    return attempt(replace(regimes()[name].problem(value), expected=expected), ["radau"])[0]
+
+
+def test_wrong_expectations_are_caught():
+    assert expecting("seconds", 1.0, Exact(lambda t: {"T": np.full_like(t, 250.0)})).outcome == WRONG
+    assert expecting("stop", 1.0, Exact(lambda t: {"v": 0 * t}, events=2)).reason == "1 events, not 2"
+    assert expecting("film", 0.0, Stops("g_n reached zero", 20.0)).outcome == WRONG
+    assert expecting("film", 0.0, Stops("the temperature T reached zero", 10.0)).outcome == WRONG
+    assert expecting("film", 0.0, Exact(lambda t: {"T": 300.0 + 0 * t})).outcome == FAILED
+    assert expecting("seconds", 1.0, Refused("capacity")).outcome == WRONG
+    assert expecting("endothermic", 0.0, Refused("no such reason")).outcome == FAILED
+    assert expecting("endothermic", 0.0, Exact(lambda t: {"T": 0 * t})).outcome == FAILED
+
+
+def test_a_value_that_is_missed_by_a_part_in_a_thousand_keeps_three_digits():
+    problem = regimes()["seconds"].problem(1.0)
+    values = problem.expected.values
+    cell = expecting("seconds", 1.0, Exact(lambda t: {"T": values(t)["T"] * 1.001}))
+    assert (cell.outcome, cell_text(cell)) == (SOLVED, "3.0")
+
+
+def test_budgets_and_libraries_fail_without_an_exception():
+    (cell,) = attempt(regimes()["runaway"].problem(200.0), ["cvode"])
+    assert (cell.outcome, cell.kept) == (FAILED, 0.0)
+    assert "the number of steps allowed was used up" in cell.reason
+
+
+def test_the_condition_number_is_that_of_the_exact_solution():
+    """T = T_i sqrt(1 - t / t_0) with t_0 = C T_i^2 / (2 T_0 Q): for all six data together, T_i twice and by itself."""
+    for part in (0.1, 1e-3, 1e-5):
+        ratio = (1 - part**2) / (2 * part**2)  # of the relative change of T over that of t / t_0
+        found = condition(regimes()["cold"].problem(part), ["T"])
+        assert found == pytest.approx(4 * ratio + abs(1 + 2 * ratio), rel=0.05)
+
+
+@pytest.mark.parametrize("size", [1e-15, 1.0, 1e15])
+def test_the_condition_number_knows_no_units(size):
+    """A line through the origin changes with its slope and with the time."""
+
+    def line(data, t):
+        return {"u": data["slope"] * t}
+
+    data = {"slope": size}
+    found = condition(Problem("", [1.0, 2.0], Exact(lambda t: line(data, t), data=data, again=line)), ["u"])
+    np.testing.assert_allclose(found, 2.0, rtol=1e-6)
+
+
+def test_the_condition_number_of_a_runaway_is_its_rate_times_the_time():
+    """A time that is wrong by a part of itself changes phi by the rate: the largest of all changes but that by E_a."""
+    problem = regimes()["runaway"].problem(50.0)
+    times = np.array(problem.times)
+    step = 1e-9
+    after, before = (problem.expected.values(times * (1 + sign * step)) for sign in (1, -1))
+    by_time = max(abs(after["phi"] - before["phi"]) / before["phi"]) / (2 * step)
+    assert by_time < condition(problem, ["phi", "T"]) < 200 * by_time
+
+
+@pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
+def test_fewer_than_two_digits_are_the_condition_of_the_problem(name, value):
+    (cell,) = attempt(regimes()[name].problem(value), ["radau"])
+    assert digits_left(cell.condition, RTOL) < LEAST_DIGITS
+    (tight,) = attempt(regimes()[name].problem(value), ["radau"], rtol=1e-13)
+    assert tight.digits > cell.possible - 0.5  # nothing but rounding is lost then
+
+
+def test_an_answer_without_digits_to_a_problem_that_leaves_some_is_wrong():
+    problem = regimes()["cold"].problem(0.1)
+    values = problem.expected.values
+    away = replace(problem.expected, values=lambda t: {"T": 2 * values(t)["T"]})
+    assert attempt(replace(problem, expected=away), ["radau"])[0].outcome == WRONG
+
+
+def test_digits():
+    assert digits_of(float("nan")) == 0.0
+    assert digits_of(1e-20) == 16.0
+
+
+@pytest.fixture(scope="module")
+def study():
+    return stability("seconds", "ignition", solvers=("radau", "ida"), quick=True, rounds=0)
+
+
+def test_the_dataset_holds_every_cell(study, tmp_path):
+    files = study.write(tmp_path / "study")
+    assert [file.suffix for file in files] == [".nc", ".svg", ".png", ".html"]
+    with xarray.open_dataset(files[0]) as data:
+        assert data["digits"].dims == ("regime", "decade", "solver")
+        assert data["regime"].values.tolist() == ["seconds", "ignition"]
+        assert data["outcome"].sel(regime="ignition", solver="radau").values.tolist()[-1] == REFUSED
+        assert data["value"].sel(regime="seconds").values[0] == 1e-15
+        assert float(data["digits"].sel(regime="seconds", solver="radau").min()) > 9.5
+        assert data["condition"].dims == data["possible"].dims == ("regime", "decade")
+        assert 1 < float(data["condition"].sel(regime="seconds").max()) < 20
+        assert float(data["possible"].sel(regime="seconds").min()) > 14
+        assert data.attrs["command"] == "surfacechem stability seconds ignition --solvers radau,ida --quick --search 0"
+        assert data.attrs["versions"].startswith("surfacechem ")
+    assert study.dataset["digits"].shape == (2, 4, 2)
+
+
+def test_the_report_says_what_every_solver_keeps(study):
+    text, html = study.page.text(), study.page.html()
+    assert "Least digits kept over all values, at rtol 1e-10" in text
+    assert "tau [s]: 1e-15 .. 1e+15" in text
+    for words in ("condition", "possible", "at rtol 1e-10"):
+        assert words in text
+        assert words in html
+    assert "Every cell" not in text
+    assert "no temperature T_c balances the heat" in html
+    assert "<svg" in html
+
+
+def test_the_figure_is_drawn_from_the_file(study, tmp_path):
+    study.write(tmp_path / "study")
+    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "-o", str(tmp_path / "again.svg")])
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "again.svg").read_text()
+    for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits", "possible"):
+        assert f"<!-- {word} -->" in text
+    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "--variables", "digits"])
+    assert done.exit_code == 2
+    assert "the figure of a study has no choice of variables" in done.output
+
+
+def test_the_report_says_what_was_left_out_and_nothing_else(study):
+    text = study.page.text()
+    assert "8 of 16 values of the regimes, for the sake of time" in text
+    assert "the solvers lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
+    assert "the search for worst corners, which was not asked for" in text
+    assert "steps of a run" not in text
+    everything = stability("seconds", solvers=names, rounds=1)
+    assert everything.page.omissions == []
+    assert "<p>Nothing.</p>" in everything.page.html()
+
+
+def test_runs_that_take_too_many_steps_are_counted(monkeypatch):
+    monkeypatch.setattr("surfacechem.studies.stability.matrix.STEPS", 20)
+    monkeypatch.setattr("surfacechem.studies.stability.page.STEPS", 20)
+    found = stability("capacity", solvers=["radau"], quick=True, rounds=0)
+    assert "what lies beyond 20 steps of a run: 4 took as many, and count as failed" in found.page.omissions
+
+
+@pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
+def test_where_an_answer_has_no_digits_the_summary_of_the_run_says_so(name, value):
+    case = read(regimes()[name].problem(value))
+    solution = Simulation(replace(case, run=replace(case.run, rtol=1e-10))).run()
+    unknown = "ended earlier" in solution.accuracy.source
+    assert unknown or solution.accuracy.error > 10.0**-LEAST_DIGITS
+    assert any("error" in warning for warning in solution.warnings), solution.warnings
+    assert "warning" in run_summary(solution, None)
+
+
+def test_a_study_tells_what_it_is_at(caplog):
+    with caplog.at_level("INFO", "surfacechem"):
+        stability("seconds", "bell", solvers=("radau",), quick=True, rounds=0)
+    assert caplog.messages == ["seconds: 4 values, regime 1 of 2", "bell: 4 values, regime 2 of 2"]
+
+
+def test_names_get_the_nearest_guess():
+    for arguments, message in (
+        (("endotermic",), "no regime 'endotermic'. Did you mean 'endothermic'?"),
+        (("seconds", "--solvers", "radua"), "no solver 'radua'. Did you mean 'radau'?"),
+        (("seconds", "--rtol", "2"), "--rtol: 2 is outside its range"),
+        (("seconds", "--search", "-1"), "--search: -1 is outside its range: >= 0"),
+        (("seconds", "--solvers", ","), "--solvers: at least one is needed."),
+    ):
+        done = CliRunner().invoke(app, ["stability", *arguments])
+        assert done.exit_code == 2
+        assert message in done.output
+
+
+def test_the_command_writes_its_report(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["stability", "seconds", "--solvers", "radau", "--search", "0", "--quick"])
+    assert done.exit_code == 0, done.output
+    assert "written to stability.nc, stability.svg, stability.png, stability.html" in done.output
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".html", ".nc", ".png", ".svg"]
+
+
+def test_a_regime_without_a_space_cannot_be_searched():
+    with pytest.raises(NotImplementedError, match="film has no space to search"):
+        regimes()["film"].corner({})
+
+
+def test_no_regime_of_that_name():
+    with pytest.raises(InputError, match="no regime 'x'"):
+        stability("x")
