@@ -8,8 +8,8 @@ import numpy as np
 import tables
 import tables_bonds
 import tables_mechanics as mechanics
+from tables import errors
 from tables_mechanics import columns, expected, parameters, rows
-from test_tables import errors
 
 import surfacechem
 from surfacechem.format import names

@@ -20,6 +20,7 @@ from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffi
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene, Sites
+from surfacechem.solve.run import Trajectory
 
 FOLDER = Path(__file__).parent / "references"
 
@@ -303,3 +304,19 @@ def makers() -> dict[str, Callable[[], Table]]:
     for row in range(20):
         result[f"x06_stiff_exchange-{row}"] = lambda row=row: stiff_exchange(row)
     return result
+
+
+def errors(table: Table, trajectory: Trajectory) -> dict[str, float]:
+    """Largest relative error of each tabulated variable."""
+    result, system = trajectory.result, trajectory.model.system
+    rows = slice(-len(table.times), None)
+    values = {state.name: result.outputs[rows, j] for j, state in enumerate(system.states)}
+    values |= {item.name: trajectory.outputs[rows, j] for j, item in enumerate(system.outputs)}
+    values |= {account.quantity.name: result.ledger_outputs[rows, j] for j, account in enumerate(system.ledger)}
+    return {name: worst(values[name], exact, table.floors.get(name, 0.0)) for name, exact in table.exact.items()}
+
+
+def worst(values, exact, floor: float) -> float:
+    scale = np.maximum(np.abs(exact), floor * np.max(np.abs(exact)))
+    error = np.abs(values - exact)
+    return float(np.max(np.divide(error, scale, out=error, where=scale > 0)))

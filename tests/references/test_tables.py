@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 import tables
+from tables import errors
 
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
@@ -31,22 +32,6 @@ each_table = pytest.mark.parametrize("name", MAKERS)
 def solved(table: tables.Table, model: Model | None = None, **settings) -> Trajectory:
     times = table.times if table.times[0] == 0 else np.concatenate([[0.0], table.times])
     return (model or Model(assemble(table.scene))).solve(Run(times=times, **settings))
-
-
-def errors(table: tables.Table, trajectory: Trajectory) -> dict[str, float]:
-    """Largest relative error of each tabulated variable."""
-    result, system = trajectory.result, trajectory.model.system
-    rows = slice(-len(table.times), None)
-    values = {state.name: result.outputs[rows, j] for j, state in enumerate(system.states)}
-    values |= {item.name: trajectory.outputs[rows, j] for j, item in enumerate(system.outputs)}
-    values |= {account.quantity.name: result.ledger_outputs[rows, j] for j, account in enumerate(system.ledger)}
-    return {name: worst(values[name], exact, table.floors.get(name, 0.0)) for name, exact in table.exact.items()}
-
-
-def worst(values, exact, floor: float) -> float:
-    scale = np.maximum(np.abs(exact), floor * np.max(np.abs(exact)))
-    error = np.abs(values - exact)
-    return float(np.max(np.divide(error, scale, out=error, where=scale > 0)))
 
 
 @each_table
