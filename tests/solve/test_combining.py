@@ -4,7 +4,6 @@ import numba
 import numpy as np
 import pytest
 
-from surfacechem.solve.radau.combining import ROWS, combine
 from surfacechem.solve.radau.tables import (
     DEFECT,
     FROM_PARTS,
@@ -19,6 +18,7 @@ from surfacechem.solve.radau.tables import (
     STAGES,
     TO_PARTS,
 )
+from surfacechem.solve.radau.work import ROWS, combine
 
 each_member = pytest.mark.parametrize("k", range(3))
 

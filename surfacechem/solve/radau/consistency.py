@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.chains import fold_chains, solve_real
-from surfacechem.solve.radau.lu import factor
+from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
 from surfacechem.solve.radau.roundoff import spread_noise
 from surfacechem.solve.radau.work import (
     COLUMNS,

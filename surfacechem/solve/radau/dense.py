@@ -6,7 +6,6 @@ which is the error estimate, fixes its leading error term; adding that term gain
 
 from typing import Any
 
-from surfacechem.solve.radau.combining import combine
 from surfacechem.solve.radau.newton import divide, nested, set_stage, stage_count
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
@@ -32,6 +31,7 @@ from surfacechem.solve.radau.work import (
     TRIAL_DOT,
     Q,
     Y,
+    combine,
     compiled,
     copy,
     evaluate,

@@ -6,6 +6,7 @@ import numpy as np
 
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.advance import (
+    BRIEF,
     GOOD,
     accept,
     advance,
@@ -13,13 +14,12 @@ from surfacechem.solve.radau.advance import (
     keep_matrices,
     restart,
     store_polynomial,
+    unseen,
 )
 from surfacechem.solve.radau.consistency import find_consistent
-from surfacechem.solve.radau.locate import AT_START, find_event
+from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.outputs import write_outputs
 from surfacechem.solve.radau.quadrature import ledger_factor, ledger_norm
-from surfacechem.solve.radau.samples import BRIEF, unseen
-from surfacechem.solve.radau.sides import keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.step import first_size, growing_size, loosening
 from surfacechem.solve.radau.work import (
     ATOL,

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.chains import fold_shifted, solve_complex, solve_real
-from surfacechem.solve.radau.combining import combine
-from surfacechem.solve.radau.lu import factor
+from surfacechem.solve.radau.linear import factor, fold_shifted, solve_complex, solve_real
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
     FROM_PARTS,
@@ -52,6 +50,7 @@ from surfacechem.solve.radau.work import (
     Q,
     Y,
     clear,
+    combine,
     compiled,
     evaluate,
     finite,

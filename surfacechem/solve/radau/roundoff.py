@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.chains import solve_real
+from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import (
     ATOL,

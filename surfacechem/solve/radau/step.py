@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.chains import solve_real
 from surfacechem.solve.radau.consistency import CONSISTENT, find_consistent
+from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.tables import START_SLOPE

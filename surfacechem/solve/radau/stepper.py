@@ -16,9 +16,7 @@ from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
 _SOURCES = (
     "../contract",
     "work",
-    "combining",
-    "lu",
-    "chains",
+    "linear",
     "roundoff",
     "tables",
     "newton",
@@ -27,9 +25,7 @@ _SOURCES = (
     "consistency",
     "dense",
     "quadrature",
-    "samples",
-    "sides",
-    "locate",
+    "guards",
     "outputs",
     "driver",
 )
