@@ -33,11 +33,14 @@ class SurfacechemError(Exception):
 
 
 class PlacedError(SurfacechemError):
-    """One line that can be read, whatever it quotes, with the place that it is about."""
+    """One line that can be read, whatever it quotes, with the place that it is about.
 
-    def __init__(self, message: str, place: Place | None = None) -> None:
+    Who knows no file gives the ``path`` in the case, to which the reader of the case knows file and line.
+    """
+
+    def __init__(self, message: str, place: Place | None = None, *, path: str = "") -> None:
         self.message = message = shortened(printable(message))
-        self.place = place
+        self.place = place = place or (Place(path=path) if path else None)
         super().__init__(printable(f"{place}: {message}" if place and str(place) else message))
 
     def at(self, place: Place) -> Self:

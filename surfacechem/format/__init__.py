@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -33,21 +32,6 @@ TOP_KEYS = (
     *("title", "source", "description", "T_0", "bodies", "interface", "heat", "surroundings"),
     *("mechanics", "loading", "programme", "initial", "run", "reference", "sweep"),
 )
-
-SECTIONS = (
-    (r"(initial|loading|heat|interface): ", r"\1"),
-    (r"initial (\w+) =", r"initial.\1"),
-    (r"nothing evolves or prescribes \w+: give ([\w-]+) a heat capacity", r"bodies.\1"),
-    (r".*interface's potential", "interface"),
-    (r"the body ([\w-]+) reads", r"bodies.\1"),
-    (r"the interface|the bonding state|the force per bond|the limit|.*rigid interface", "interface"),
-    (r"the medium reads|the film reads|the fit of", "interface.medium"),
-    (r"the mechanics|the far field", "mechanics"),
-    (r"the stage", "programme"),
-    (r"(\w+) has two roles: .*\b(initial|loading)\b", r"\2.\1"),
-    (r"(a sweep|sweep:|.* never reaches|.* is no ramp|runs until)", "sweep"),
-)
-"""What messages of the assembly speak of, as a path in the case."""
 
 Overrides = Sequence[str] | Mapping[str, object]
 
@@ -79,26 +63,13 @@ class Case:
             raise self.located(error) from None
 
     def located(self, error: InputError) -> InputError:
-        """The error at the place that it speaks of, at least with the file."""
+        """The error with file and line of the path that it carries, or of the innermost section around it."""
         if error.place is not None and error.place.file:
             return error
-        for path in [error.place.path] if error.place else _spoken_of(error.message):
-            place = self._nearest(path)
-            if place is not None:
-                return InputError(error.message.removeprefix(f"{place.path}: "), place)
-        return InputError(error.message, self.places[""])
-
-    def _nearest(self, path: str) -> Place | None:
-        """The place of a path, or of the innermost section around it that the case has."""
-        while path and path not in self.places:
+        path = error.place.path if error.place is not None else ""
+        while path not in self.places:
             path = path.rpartition(".")[0]
-        return self.places[path] if path else None
-
-
-def _spoken_of(message: str) -> list[str]:
-    """Paths that a message of the assembly may speak of."""
-    found = ((re.match(pattern, message), path) for pattern, path in SECTIONS)
-    return [match.expand(path) for match, path in found if match]
+        return InputError(error.message, self.places[path])
 
 
 def load(name: str | Path, overrides: Overrides = ()) -> Case:

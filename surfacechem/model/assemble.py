@@ -169,5 +169,6 @@ def _refuse_idle_initial_values(build: Build) -> None:
         if name in states:
             continue
         if name in build.scene.loading or build.variables.has(name):
-            raise InputError(f"initial: {name} has two roles: an initial value, and prescribed or constant elsewhere.")
-        raise InputError(f"initial: nothing that evolves is called '{name}'.{suggestion(name, states)}")
+            message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
+            raise InputError(message, path=f"initial.{name}")
+        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, states)}", path=f"initial.{name}")

@@ -153,7 +153,7 @@ class Build(Draft):
     def initial(self, name: str) -> float:
         """Initial value of a state; InputError where the case gives none."""
         if name not in self.scene.initial:
-            raise InputError(f"initial: {name} evolves but has no initial value. Add `{name}:` under `initial`.")
+            raise InputError(f"{name} evolves but has no initial value. Add `{name}:` under `initial`.", path="initial")
         return self.scene.initial[name]
 
     def areal(self, quantity: Quantity, nominal: Expression) -> Expression:
@@ -203,7 +203,7 @@ class Build(Draft):
             reason = f"{name} reached zero, where the law {law.name()} ends"
             sought = name in self.motion.gap_rates and name not in self.scene.initial
             remedy = STARTS.get(name, "") if sought else ""
-            self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, domain=True))
+            self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, path=law.path, domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value = own[name] if name in own else self.variables.get(name, law)
             least = law.least.get(name, 0)
@@ -276,7 +276,7 @@ class Build(Draft):
         if not self.variables.has(path):
             spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
             self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
-        return self.variables.get(path, "the interface")
+        return self.variables.get(path, "the interface", "interface")
 
     def _rounding(self, value: Expression) -> Expression:
         """By how much the last digits of its terms change a sum."""

@@ -145,6 +145,8 @@ class Margin:
     terminal: bool = True
     remedy: str = ""
     """What to change where it is closed from the start."""
+    path: str = ""
+    """What of a case it belongs to."""
     peak: bool = False
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
     domain: bool = False

@@ -40,7 +40,8 @@ def _check(margin: Margin, value: Expression) -> None:
     number = _number(value)
     if not number > 0:
         remedy = f" {margin.remedy}" if margin.remedy else ""
-        raise InputError(f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}")
+        message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
+        raise InputError(message, path=margin.path)
 
 
 def _number(value: Expression) -> float:

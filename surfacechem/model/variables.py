@@ -112,7 +112,10 @@ class Variables:
         """Give a name its role and the way to make its expression; a second role is an error."""
         taken = next((r for r in self.roles if r.variable == name), None)
         if taken is not None:
-            raise InputError(f"{name} has two roles: {taken.role} ({taken.by}) and {role} ({by}). Remove one of them.")
+            raise InputError(
+                f"{name} has two roles: {taken.role} ({taken.by}) and {role} ({by}). Remove one of them.",
+                path=f"loading.{name}" if "loading" in (taken.by, by) else "",
+            )
         self._makers[name] = make
         self.roles.append(Role(name, role, by))
 
@@ -124,21 +127,21 @@ class Variables:
         """Whether anything asked for the name so far."""
         return name in self._symbols
 
-    def get(self, name: str, reader: str | Law) -> Expression:
-        """The expression of a name for a law, or something else in words, that reads it."""
+    def get(self, name: str, reader: str | Law, path: str = "") -> Expression:
+        """The expression of a name for a law, or something else in words and its path in a case, that reads it."""
         if name == "p" and isinstance(reader, UnderPressure) and reader.pressure == "contact":
             name = "p_contact"
         if name not in self._symbols:
             if name not in self._makers:
-                raise self._missing(name, reader)
+                raise self._missing(name, reader, path)
             self._symbols[name] = self._makers[name]()
         return self._symbols[name]
 
-    def _missing(self, name: str, reader: str | Law) -> InputError:
+    def _missing(self, name: str, reader: str | Law, path: str) -> InputError:
         who = f"the law {reader.name()}" if isinstance(reader, Law) else reader
         remedy = REMEDIES.get(name, suggestion(name, self._makers).strip())
         message = f"{who} reads {self._described(name)}, but nothing evolves or prescribes it. {remedy}"
-        return InputError(message, reader.place if isinstance(reader, Law) else None)
+        return InputError(message, reader.place if isinstance(reader, Law) else None, path=path)
 
     def _described(self, name: str) -> str:
         words = VARIABLES[name].long_name.partition(":")[0] if name in VARIABLES else "variable"

@@ -289,7 +289,9 @@ class Simulation:
         if until is not None and section is not None:
             section = replace(section, until=read_until(from_plain(given["until"], Place(path="sweep.until"))))
         if section is None:
-            raise InputError("a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.")
+            raise InputError(
+                "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"
+            )
         return section.plan(self._units)
 
     @cached_property

@@ -44,11 +44,12 @@ def history(system: System, variable: str) -> Expression:
     """A prescribed variable that is a straight line in time, as an expression; InputError for any other."""
     named = next((item for item in system.named if item.name == variable), None)
     if named is None:
-        raise InputError(f"no law reads a prescribed {variable}.")
+        raise InputError(f"no law reads a prescribed {variable}.", path="sweep.until")
     expression = system.expand(named.expression)
     moving = {x for state in system.states for x in (state.symbol, state.dot)}
     if expression.free_symbols & moving or not _is_line(expression, system.t):
-        raise InputError(f"{variable} is no ramp; give it one under `loading`: {{ramp: {{rate: ...}}}}.")
+        message = f"{variable} is no ramp; give it one under `loading`: {{ramp: {{rate: ...}}}}."
+        raise InputError(message, path="sweep.until")
     return expression
 
 

@@ -118,7 +118,7 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
         return [run] * len(values)
     variable, target = plan.until
     if system.breakpoints:
-        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.")
+        raise InputError(f"runs until {variable} is reached cannot have histories with breakpoints.", path="sweep")
     line = spectrum.history(system, variable)
     shape = np.asarray(run.times) / run.times[-1]
     runs = []
@@ -126,6 +126,7 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
         point = {parameter.symbol: at[parameter.path] for parameter in system.parameters}
         start, slope = (float(part.subs({**point, system.t: 0})) for part in (line, derivative(line, system.t)))
         if not (target - start) * slope > 0:
-            raise InputError(f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s.")
+            message = f"{variable} never reaches {target:g}: it starts at {start:g} and changes by {slope:g}/s."
+            raise InputError(message, path="sweep.until")
         runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
     return runs

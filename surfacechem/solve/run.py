@@ -280,7 +280,9 @@ class Model:
             equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
             settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
-                raise InputError("there is no gap at which the tractions are in equilibrium at the start.")
+                raise InputError(
+                    "there is no gap at which the tractions are in equilibrium at the start.", path="mechanics"
+                )
             y = settled.y
             table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
         return stable_start(self.system, self.program, y, table[0])
@@ -328,7 +330,8 @@ class Model:
         if self.program.filler is not None and run.solver not in ASKING:
             raise InputError(
                 f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
-                f"`solver: {ASKING[0]}` under `run`."
+                f"`solver: {ASKING[0]}` under `run`.",
+                path="run.solver",
             )
         fit = self.system.fit
         values = fit.started(values) if fit else values

@@ -31,7 +31,8 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     if found.valid and np.any(found.y[guessed] <= 0):
         names = " and ".join(state.name for state, is_one in zip(system.states, guessed, strict=True) if is_one)
         raise InputError(
-            f"at the start the interface takes up more heat than any temperature {names} above zero brings it."
+            f"at the start the interface takes up more heat than any temperature {names} above zero brings it.",
+            path="interface",
         )
     return chosen
 

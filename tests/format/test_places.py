@@ -1,9 +1,14 @@
-"""Errors of the assembly come with the line of the section that they speak of."""
+"""Errors of the assembly carry their path in the case; the reader gives it file and line."""
+
+import ast
+from pathlib import Path
 
 import pytest
 
+import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
+from surfacechem.solve.run import Model
 
 BODIES = """\
 T_0: 300 K
@@ -60,6 +65,15 @@ MISTAKES = [
         BODIES + "interface:\n  friction: [coulomb: {mu: 0.3}]\nloading: {p: 1 Pa}\n" + RUN,
         "case.yaml:6: interface.friction.coulomb: the law coulomb reads the direction of sliding, but nothing evolves",
     ),
+    (
+        BODIES + "interface: {sites: 1e18, bonding: [relaxation: {tau: 1}]}\n" + RUN.replace("K}", "K, phi: 2}", 1),
+        "case.yaml:6: initial.phi: ",
+    ),
+    (
+        BODIES.replace("T_1, C: 1 kJ/m^2/K", "T_1") + RUN,
+        "case.yaml:3: bodies.lower: nothing evolves or prescribes T_1: give lower a heat capacity C",
+    ),
+    (BODIES + "run: {until: 5 s}\n", "case.yaml:1: T_1 evolves but has no initial value. Add `T_1:` under `initial`."),
 ]
 
 
@@ -68,3 +82,30 @@ def test_the_line_of_the_section(text, message):
     with pytest.raises(InputError) as error:
         load_text(text).system()
     assert str(error.value).startswith(message)
+
+
+def test_an_initial_state_that_no_law_allows():
+    """What only the start of a run finds out, by the path of the margin that does not hold."""
+    bonds = "interface:\n  temperature: T\n  sites: 1e18\n  potential: [bond-energy: {K_0: 1, K_2: 1e7}]\n"
+    case = load_text(
+        BODIES.replace("T_1", "T").replace("T_2", "T")
+        + bonds
+        + "  bonding: [relaxation: {tau: 1}]\ninitial: {T: 300, phi: 0}\nrun: {until: 5 s}\n"
+    )
+    model = Model(case.system())
+    with pytest.raises(InputError) as error:
+        model.problem(case.run, model.values())
+    assert str(case.located(error.value)).startswith("case.yaml:5: interface: at the start the heat capacity at T was")
+
+
+def test_every_error_of_the_model_carries_a_path():
+    """So that rewording a message never moves it to another line."""
+    folder = Path(surfacechem.__file__).parent / "model"
+    found = [
+        f"{file.name}:{node.lineno}"
+        for file in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "InputError"
+        if len(node.args) + len(node.keywords) < 2
+    ]
+    assert found == []

@@ -176,11 +176,12 @@ def profiles(build: Build) -> None:
         surface, initial = slab.nodes[0], build.scene.initial.get(slab.profile)
         start = slab.profile if initial is not None else surface.name
         if initial is None and surface.prescribed:
-            text = f"initial: the temperature inside {slab.body.name} is not given. Add `{slab.profile}:`."
+            text = f"nothing gives the temperature inside {slab.body.name}. Add `{slab.profile}:` under `initial`."
             raise InputError(text, slab.law.place)
         value = initial if initial is not None else build.initial(surface.name)
         if not value > 0:
-            raise InputError(f"initial {start} = {value:g} K is not an absolute temperature above zero.")
+            message = f"initial {start} = {value:g} K is not an absolute temperature above zero."
+            raise InputError(message, path=f"initial.{start}")
         for i, node in enumerate(slab.inner, start=1):
             build.rows[node.name] = balances.node_row(node, {}, {})
             text = f"temperature of {slab.body.name}, point {i} from the contact"

@@ -117,11 +117,15 @@ def _temperature_state(build: Build, node: Node) -> None:
     if algebraic and members:
         raise InputError(
             f"nothing evolves or prescribes {node.name}: give {members[0].name} a heat capacity C, or its "
-            "temperature a value."
+            "temperature a value.",
+            path=f"bodies.{members[0].name}",
         )
     initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else _initial(build, node)
     if not initial > 0:
-        raise InputError(f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.")
+        raise InputError(
+            f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.",
+            path=f"initial.{node.name}",
+        )
     quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
     build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic))
 
@@ -168,7 +172,7 @@ def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
         quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
         symbol = build.name(quantity, capacity)
         reason = f"the heat capacity at {node.name} was lost"
-        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY))
+        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface"))
 
 
 def _warm(node: Node) -> Margin:

@@ -63,7 +63,8 @@ class Coefficients:
         try:
             return divided(self.fluid.fit(quantity, low, high), count)
         except NoFitError as error:
-            raise InputError(f"the fit of {quantity} of {self.fluid.name} cannot go on: {error} {REMEDY}") from None
+            message = f"the fit of {quantity} of {self.fluid.name} cannot go on: {error} {REMEDY}"
+            raise InputError(message, path="interface.medium") from None
 
 
 def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
@@ -96,7 +97,7 @@ class FluidFit:
 
     def __init__(self, build: Build, fluid: Fluid) -> None:
         self.build = build
-        self.T = build.variables.get("T_c", "the medium")
+        self.T = build.variables.get("T_c", "the medium", "interface.medium")
         assert build.interface.medium is not None
         self.held = (*_held(build), *build.interface.medium.temperatures)
         starts = [build.scene.initial.get(node.name) for node in build.nodes.values() if not node.prescribed]

@@ -65,9 +65,9 @@ def _elastic(build: Build, variable: str, name: str) -> Expression:
 
 def _shared(build: Build) -> Expression:
     """Tension over the bonds that carry it, whose number ends a run where they cannot."""
-    t_n = build.variables.get("t_n", "the force per bond")
-    n_c = build.variables.get("n_c", "the force per bond")
-    phi = build.variables.get("phi", "the force per bond")
+    t_n = build.variables.get("t_n", "the force per bond", "interface")
+    n_c = build.variables.get("n_c", "the force per bond", "interface")
+    phi = build.variables.get("phi", "the force per bond", "interface")
     build.margins.append(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
     carrying = where(phi > FEWEST, phi, FEWEST)
     return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
@@ -86,14 +86,14 @@ def rupture(build: Build) -> None:
             # What is left of hardly any bonds cannot be told from rounding.
             left = where(bonds > FEWEST, left, NOTHING)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
-            build.margins.append(Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD))
+            build.margins.append(Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface"))
 
 
 def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:
     """Bonds whose load grows on the rest as they break: those that share one, or hold a gap that gives way."""
     for role in build.variables.roles:
         if role.by == SHARED and build.variables.was_read(role.variable):
-            yield "phi", build.variables.get("phi", "the force per bond")
+            yield "phi", build.variables.get("phi", "the force per bond", "interface")
         if role.by == ELASTIC and build.variables.was_read(role.variable) and "g_n" in build.motion.gap_rates:
             name = role.variable.removeprefix("f_") if role.variable != "f" else "phi"
             yield name, build.bonding[name].symbol

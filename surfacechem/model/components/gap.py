@@ -31,7 +31,7 @@ def normal_gap(build: Build) -> None:
         _rigid(build, mount)
     else:
         build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
-        build.variables.get("g_n", "the mechanics")
+        build.variables.get("g_n", "the mechanics", "mechanics")
         if meets and not _ends_before_touch(build):
             _unilateral(build, mount)
     _refuse_idle_restitution(build, mount)
@@ -108,7 +108,7 @@ def _unilateral(build: Build, mount: Held) -> None:
         build.motion.gap_rates["g_n"] = (1 - closed) * v
     initial = build.scene.initial.get("g_n", 0.0)
     first = build.constant("g_n_i", "initial.g_n", Spec("m", "initial gap"), initial, internal=False)
-    build.margins.append(Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT))
+    build.margins.append(Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n"))
     _carry(build, closed * pull)
 
 
@@ -145,7 +145,7 @@ def normal_motion(build: Build) -> None:
     mount = held(build, "n")
     if mount is None:
         return
-    g = build.variables.get("g_n", "the mechanics")
+    g = build.variables.get("g_n", "the mechanics", "mechanics")
     far = far_field(build, mount)
     if "g_n" not in build.motion.gap_rates:
         rate = build.total_derivative(g)
@@ -154,7 +154,7 @@ def normal_motion(build: Build) -> None:
     rate = build.motion.gap_rates["g_n"]
     t_n = derivative(build.psi, g)
     if not mount.quasi_static:
-        build.variables.get("v_n", "the mechanics")
+        build.variables.get("v_n", "the mechanics", "mechanics")
     if build.find_mode("closed") is None:
         closing(build, g)
     dot = symengine.Symbol("dg_n_dt")

@@ -59,7 +59,7 @@ def prescribed_variables(build: Build) -> None:
             continue
         if name not in LOADABLE:
             known = [*LOADABLE, *build.nodes]
-            raise InputError(f"loading: nothing is called '{name}'.{suggestion(name, known)}")
+            raise InputError(f"nothing is called '{name}'.{suggestion(name, known)}", path="loading")
         build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
 
 
@@ -85,7 +85,7 @@ def bonding_variables(build: Build) -> None:
     breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
-        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding state"), limit)
+        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding state", "interface"), limit)
     for variable in build.interface.variables:
         spec = Spec("1/m^2", "site density", above=0)
         amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
@@ -96,7 +96,7 @@ def bonding_variables(build: Build) -> None:
 
 
 def _current_density(build: Build) -> Expression:
-    nominal = build.variables.get("N_c", "the interface")
+    nominal = build.variables.get("N_c", "the interface", "interface")
     if not build.variables.has("J_c"):
         return nominal
     return build.name(VARIABLES["n_c"], nominal / build.stretch)
@@ -106,7 +106,7 @@ def _side_density(build: Build, k: int, density: float) -> Expression:
     """Sites of one body; those of the reference are the reference density itself."""
     sites = build.interface.sites
     if sites is not None and density == sites.density:
-        return build.variables.get("n_c", "the interface")
+        return build.variables.get("n_c", "the interface", "interface")
     spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
     path = f"interface.sites.{build.scene.bodies[k - 1].name}"
     return build.constant(f"N_{k}", path, spec, density) / build.stretch
@@ -119,7 +119,7 @@ def _amounts(build: Build, name: str, density: Expression) -> None:
 
 
 def _derived_phi(build: Build) -> Expression:
-    N_c = build.variables.get("N_c", "the bonding state")
+    N_c = build.variables.get("N_c", "the bonding state", "interface")
     bonds = sum(build.bonding[name].symbol * build.bonding[name].density for name in build.interface.bonds)
     return bonds / N_c
 
@@ -129,7 +129,7 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
     symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
     initial = initial_bonding(build, name)
     if not 0 <= initial <= limit:
-        raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.")
+        raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
     build.variables.define(name, lambda: symbol, "evolved", "bonding")
     build.bonding[name] = Bond(symbol, dot, density)
     start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
@@ -167,7 +167,8 @@ def free_energy(build: Build) -> None:
     elif any(depends(build.psi, symengine.Symbol(name)) for name in (*build.nodes, "T_c")):
         raise InputError(
             "the interface's potential depends on temperature, but the interface has none. "
-            "Give `interface.temperature` a name."
+            "Give `interface.temperature` a name.",
+            path="interface",
         )
     _tractions(build)
     if depends(build.psi, symengine.Symbol("g_n")):

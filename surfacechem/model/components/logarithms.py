@@ -20,9 +20,12 @@ def initial_bonding(build: Build, name: str) -> float:
     if name != "phi" or LOGARITHM not in initial:
         return build.initial(name)
     if "phi" in initial:
-        raise InputError(f"initial: phi has two roles: given by itself and by {LOGARITHM}. Remove one of them.")
+        raise InputError(
+            f"phi has two roles: given by itself and by {LOGARITHM}. Remove one of them.", path="initial.phi"
+        )
     if initial[LOGARITHM] < math.log(math.ulp(0.0)):
-        raise InputError(f"initial: {LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold.")
+        message = f"{LOGARITHM} = {initial[LOGARITHM]:g} is no bonding state that a number can hold."
+        raise InputError(message, path=f"initial.{LOGARITHM}")
     return math.exp(initial[LOGARITHM])
 
 
@@ -32,7 +35,8 @@ def logarithmic_state(build: Build) -> None:
         return
     bond = build.bonding["phi"]
     if any(bond.symbol in transition.jump for transition in build.transitions):
-        raise InputError(f"initial: bonds that break at once have no {LOGARITHM}. Give `phi` instead.")
+        message = f"bonds that break at once have no {LOGARITHM}. Give `phi` instead."
+        raise InputError(message, path=f"initial.{LOGARITHM}")
     symbol, dot = symengine.symbols(f"{LOGARITHM} d{LOGARITHM}_dt")
     phi = Named(VARIABLES["phi"], symengine.exp(symbol))
     change = Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), bond.symbol * dot, False)

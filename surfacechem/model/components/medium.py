@@ -50,7 +50,9 @@ def _property(fluid: Callable[[], FluidFit], name: str) -> Expression:
 
 def _film(build: Build, found: Medium) -> None:
     if found.thickness is None:
-        build.variables.define("d_m", lambda: build.variables.get("g_n", "the medium"), "derived", "the normal gap")
+        build.variables.define(
+            "d_m", lambda: build.variables.get("g_n", "the medium", PATH), "derived", "the normal gap"
+        )
     else:
         spec = Spec("m", "thickness of the medium", above=0)
         thickness = partial(build.constant, "d_m", f"{PATH}.thickness", spec, found.thickness)
@@ -85,5 +87,5 @@ def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | No
             "as numbers.",
             Place(path=PATH),
         )
-    rho, cp, T, T_0 = (build.variables.get(name, "the film") for name in ("rho_m", "cp_m", "T_c", "T_0"))
+    rho, cp, T, T_0 = (build.variables.get(name, "the film", PATH) for name in ("rho_m", "cp_m", "T_c", "T_0"))
     return rho * cp * (T - T_0 - T * log(T / T_0))

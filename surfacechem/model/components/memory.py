@@ -20,7 +20,7 @@ def memory(build: Build, law: Friction, bound: Friction) -> None:
         symbol, dot = symengine.symbols(f"{name} d{name}_dt")
         start = build.initial(of)
         if not start > 0:
-            raise InputError(f"initial: {of} = {start:g} is outside its range: > 0.")
+            raise InputError(f"initial {of} = {start:g} is outside its range: > 0.", path=f"initial.{of}")
         build.variables.define(name, lambda symbol=symbol: symbol, "evolved", law.path)  # type: ignore[misc]
         given = Given(VARIABLES[of], start)
         build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given))

@@ -71,7 +71,7 @@ def _new_node(build: Build, name: str, load: Load | None, member: str) -> Node:
 def _mean_temperature(build: Build) -> Expression:
     shares = build.shares()
     if "surroundings" in shares and "surroundings" not in build.node_of:
-        raise InputError("interface: heat is lost to surroundings that have no temperature. Add `surroundings`.")
+        raise InputError("heat is lost to surroundings that have no temperature. Add `surroundings`.", path="interface")
     return build.name(
         VARIABLES["T_c"], 1 / symengine.Add(*(share / build.node_of[end].T for end, share in shares.items()))
     )
@@ -81,6 +81,6 @@ def _body_energy(build: Build, body: Body, suffix: str) -> None:
     node = build.node_of[body.name]
     if body.energy is not None:
         law = build.variables.bind(body.energy, f"bodies.{body.name}", suffix)
-        F = law.energy(T=node.T, T_0=build.variables.get("T_0", f"the body {body.name}"))
+        F = law.energy(T=node.T, T_0=build.variables.get("T_0", f"the body {body.name}", f"bodies.{body.name}"))
         build.refuse_foreign(F, {node.T}, body.energy)
         node.energies[body.name] = F

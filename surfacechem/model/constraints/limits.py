@@ -32,7 +32,7 @@ def _starts_bonded(build: Build) -> Expression | None:
     closed = next((mode.start for mode in build.modes if mode.name == "closed"), None)
     if closed is not None or not build.variables.has("g_n"):
         return closed
-    start = where(build.variables.get("g_n", "the bonds") > 0, 0, 1)
+    start = where(build.variables.get("g_n", "the bonds", "interface") > 0, 0, 1)
     bonds = bonds_left(build)
     return start if bonds is None else where(bonds > 0, 1, start)
 
@@ -48,10 +48,10 @@ def limits(build: Build) -> None:
         _rebond(build, again)
         return
     if not build.interface.limits:
-        t_n = build.variables.get("t_n", "the rigid interface")
+        t_n = build.variables.get("t_n", "the rigid interface", "interface")
         _opening(build, where(closed > 0, -t_n, 1), closed)
     build.motion.heals = {closed: symengine.Integer(1), **again}
-    gap = build.variables.get("g_n", "the rigid interface")
+    gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
         margin = where(closed > 0, 1, gap)
         build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals))
@@ -70,7 +70,7 @@ def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
     if not again or "g_n" not in build.motion.gap_rates:
         return
     (bonded,) = again
-    margin = where(bonded > 0, 1, build.variables.get("g_n", "the limit"))
+    margin = where(bonded > 0, 1, build.variables.get("g_n", "the limit", "interface"))
     build.transitions.append(Transition("rejoin", margin, "the gap closes, so that bonds can hold again", again))
 
 

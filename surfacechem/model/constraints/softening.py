@@ -71,7 +71,7 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
     build.margins += [
         Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
-        Margin("t_max", 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1), reason, remedy=SAME),
+        Margin("t_max", 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1), reason, remedy=SAME, path=law.path),
     ]
 
 
@@ -135,10 +135,8 @@ def _start(build: Build, phi: Expression, left: Expression) -> None:
     build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
     slack = build.variables.get("slack", "the bonds")
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + slack)
-    remedy = "Give fewer bonds under `initial`, or a smaller gap."
-    build.margins.append(
-        Margin("bonds within their envelope", given, "there are more bonds than the gap leaves", remedy=remedy)
-    )
+    reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
+    build.margins.append(Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi"))
 
 
 def _rate(build: Build, left: Expression) -> Expression:

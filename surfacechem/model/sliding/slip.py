@@ -149,7 +149,7 @@ def motion(build: Build, kind: Kind) -> None:
     """Balance of the tractions in one direction, and the transitions between sticking and sliding."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
-        build.variables.get("v_t", "the mechanics")
+        build.variables.get("v_t", "the mechanics", "mechanics")
     d, u = kind.d, symengine.Symbol(kind.d.displacement)
     v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
     rubs, t_a = build.motion.rubs, derivative(build.psi, u)
