@@ -1,6 +1,8 @@
 """Figures that are computed when the documentation is built."""
 
+import re
 import runpy
+import tomllib
 from collections.abc import Callable
 from functools import partial
 from io import BytesIO
@@ -266,6 +268,35 @@ def gas_network() -> Figure:
     return runpy.run_path(str(Path(__file__).parent / "notebooks" / "gas_network.py"))["figure"]
 
 
+def rooms() -> Figure:
+    """How many modules of each room import each other room; rooms from the top down, as the contracts order them."""
+    package = Path(surfacechem.__file__).parent
+    contracts = tomllib.loads((package.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    names = [room for floor in contracts["contracts"][0]["layers"] for room in floor.split(" | ")]
+    modules = {room: [*(package / room).rglob("*.py"), *package.glob(f"{room}.py")] for room in names}
+    table = np.zeros((len(names), len(names)))
+    for i, room in enumerate(names):
+        texts = [file.read_text(encoding="utf-8") for file in modules[room]]
+        for j, other in enumerate(names):
+            imports = re.compile(rf"^ *(from|import) surfacechem(\.| import .*\b){other}\b", re.MULTILINE)
+            table[i, j] = 0 if i == j else sum(bool(imports.search(text)) for text in texts)
+    figure = new(6.8, 5.6)
+    ax = figure.subplots()
+    ax.imshow(np.log1p(table), cmap="Blues", vmax=1.6 * np.log1p(table.max()))
+    for i, j in zip(*np.nonzero(table), strict=True):
+        ax.text(j, i, f"{table[i, j]:.0f}", ha="center", va="center", fontsize=7)
+    for i in range(len(names)):
+        ax.add_patch(Rectangle((i - 0.5, i - 0.5), 1, 1, color="0.75"))
+    ax.set_xticks(range(len(names)), names, rotation=60, ha="left", rotation_mode="anchor")
+    ax.set_yticks(range(len(names)), [f"{room} ({len(modules[room])})" for room in names])
+    ax.grid(visible=False)
+    ax.tick_params(length=0, top=False, bottom=False, labeltop=True, labelbottom=False, labelsize=8)
+    ax.set_ylabel("room (its modules) that imports ...")
+    ax.set_xlabel("... this room", labelpad=6)
+    ax.xaxis.set_label_position("top")
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     **{f"gallery-{name}.svg": partial(gallery, name) for name in case.names()},
     "gallery-gas-network.svg": gas_network,
@@ -273,6 +304,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "precision.svg": precision,
     "signs.svg": signs,
     "press.svg": press,
+    "rooms.svg": rooms,
     "sudden-contact.svg": sudden_contact,
     "closing-gap.svg": closing_gap,
     "oil-film.svg": oil_film,
