@@ -102,14 +102,17 @@ def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: floa
     everything = np.arange(len(at))
     moved = np.nonzero(_resisted(driving(at[None]), onward)[0])[0]
     for free in (everything, moved) if len(moved) < len(at) else (everything,):
-        rest = _equilibrium(driving, scale, free, at, least)
+        rest = equilibrium(driving, scale, free, at, least)
         if rest is not None and np.all(onward * rest >= 0):
             return rest
     return None
 
 
-def _equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: float) -> Array | None:
-    """The stable equilibrium of the gaps that are free, where a few short steps of Newton's method lead to it."""
+def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: float) -> Array | None:
+    """The stable equilibrium of the gaps that are free, where a few short steps of Newton's method lead to it.
+
+    Each is at most half as long as the one before, the first no longer than the gaps' sizes times ``least``.
+    """
     if len(free) == 0:
         return at
     change = stiffness(driving, scale, at)[np.ix_(free, free)]

@@ -14,7 +14,7 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD, SIDE, SLIP, Equilibrium, Fold
 from surfacechem.model.system import System
 from surfacechem.solve.branches import Curve, march, push_ahead, zero_ahead
-from surfacechem.solve.damped import KICK, Field, Indices, come_to_rest, stiffness, unstable_way
+from surfacechem.solve.damped import KICK, Field, Indices, come_to_rest, equilibrium, stiffness, unstable_way
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -114,7 +114,7 @@ class Equilibria:
         """Which gaps are not held."""
         return compile_function(self.system.inputs, [self.system.expand(e.active) for e in self.items])
 
-    def _ways(self, point: Point) -> list[Way]:
+    def ways(self, point: Point) -> list[Way]:
         """The way of each gap by itself."""
         company = self._company(point.inputs()).reshape(len(self.items), len(self.states))
         ways = []
@@ -190,7 +190,7 @@ class Equilibria:
         """Driving traction along a way and its rounding, as functions of the gap that counts the way."""
 
         def driving(gaps: Sequence[float] | Array) -> Array:
-            pushes = self._pushes(self._reached(point, way, gaps, heat), heat)
+            pushes = self.pushes(self._reached(point, way, gaps, heat), heat)
             return np.asarray(np.where(way.pulls != 0, pushes, 0.0) @ way.pulls)
 
         def noise(gaps: Sequence[float] | Array) -> Array:
@@ -199,7 +199,7 @@ class Equilibria:
 
         return driving, noise
 
-    def _pushes(self, rows: Array, heat: Heat | None) -> Array:
+    def pushes(self, rows: Array, heat: Heat | None = None) -> Array:
         """Driving tractions at inputs with the temperatures that a jump to them gives, shape (rows, equilibria)."""
         return np.asarray(np.atleast_2d(self._balance(self._warmed(rows, heat)))[:, ::2])
 
@@ -216,10 +216,26 @@ class Equilibria:
         A single gap is found by a search along it, several at the end of the damped motion that they begin. Where the
         tractions are ``balanced`` within this part, what slides runs on only if that balance is unstable.
         """
-        if not self.items:
+        if not self.items or len(self._free(point)) == 0:
             return point
         unstable = self._unstable(point, heat) if self._is_balanced(point, balanced) else None
         return self._released(point, heat, unstable)
+
+    def settle_near(self, point: Point, heat: Heat, span: Array) -> Point | None:
+        """The point with all gaps in equilibrium, for loads that go from one value to the next little by little.
+
+        Newton's method leads there where its first step is no longer than the gaps or their whole ``span``, shape
+        (states,), and each is at most half as long as the one before; elsewhere they settle.
+        """
+        free = self._free(point)
+        if len(free) == 0:
+            return point
+        (driving, scale), (moves, columns) = self._field(point, heat), self._moves(point)
+        sizes = np.maximum(scale, span[columns])
+        way = equilibrium(driving, sizes, np.arange(len(free)), np.zeros(len(free)), 1.0)
+        if way is None:
+            return self.settle(point, heat)
+        return self._moved(point, self._arrived(replace(point, y=point.y + way @ moves).inputs()[None], heat)[0])
 
     def _released(self, point: Point, heat: Heat | None, lost: Lost | None) -> Point | None:
         """Where what is not held comes to rest, from an equilibrium that is lost or from tractions out of balance."""
@@ -228,7 +244,7 @@ class Equilibria:
             return self._damped(point, heat, lost)
         if len(free) == 0:
             return point
-        way, direction = (lost.way, lost.direction) if lost else (self._ways(point)[free[0]], 0.0)
+        way, direction = (lost.way, lost.direction) if lost else (self.ways(point)[free[0]], 0.0)
         onward = self._onward_along(point, way)
         if onward and not direction:
             return self._slid(point, way, onward, heat)
@@ -286,7 +302,7 @@ class Equilibria:
             return None
         weights = np.zeros(len(onward))
         weights[free] = found
-        way, direction = self._together(self._ways(point), weights), float(np.sign(weights @ pushes))
+        way, direction = self._together(self.ways(point), weights), float(np.sign(weights @ pushes))
         if not direction:
             return None
         driving, noise = self._along(point, way, heat)
@@ -310,7 +326,7 @@ class Equilibria:
 
     def _moves(self, point: Point) -> tuple[Array, Array]:
         """Change of the states with each gap that is not held, and the columns of these gaps."""
-        ways, free = self._ways(point), self._free(point)
+        ways, free = self.ways(point), self._free(point)
         return np.array([ways[j].moves for j in free]), np.array([ways[j].column for j in free])
 
     def _field(self, point: Point, heat: Heat | None) -> tuple[Field, Array]:
@@ -320,7 +336,7 @@ class Equilibria:
         def driving(moved: Array) -> Array:
             rows = np.repeat(point.inputs()[None], len(moved), axis=0)
             rows[:, 1 : 1 + n] += moved @ moves
-            return self._pushes(self._arrived(rows, heat), heat)[:, free]
+            return self.pushes(self._arrived(rows, heat), heat)[:, free]
 
         return driving, np.maximum(np.abs(point.y[columns]), TINY)
 
@@ -391,7 +407,7 @@ class Equilibria:
         for _ in range(POLISH):
             values = self._tangents(point.inputs())
             y = point.y.copy()
-            for way, residual, slope in zip(self._ways(point), values[::2], values[1::2], strict=True):
+            for way, residual, slope in zip(self.ways(point), values[::2], values[1::2], strict=True):
                 change = -residual / slope if slope < 0 else 0.0
                 if abs(change) <= DRIFTED * abs(point.y[way.column]):
                     y += change * way.moves
@@ -491,7 +507,7 @@ class Equilibria:
 
     def _lost_way(self, point: Point, A: Array) -> Way:
         """The way that costs no traction: the gaps by which the stiffness is singular."""
-        ways, active = self._ways(point), np.nonzero(self._active(point.inputs()))[0]
+        ways, active = self.ways(point), np.nonzero(self._active(point.inputs()))[0]
         weights = np.zeros(len(ways))
         weights[active] = np.linalg.svd(A[np.ix_(active, active)])[2][-1] if len(active) > 1 else 1.0
         weights /= weights[np.abs(weights).argmax()]

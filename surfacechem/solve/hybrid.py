@@ -20,6 +20,7 @@ from surfacechem.solve.bounces import ENDLESS, MANY, MISSED, Rebounds
 from surfacechem.solve.contract import Problem, Result, Solver, Status
 from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jumps import Jump, Jumper, booked
+from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
 from surfacechem.solve.stalls import solve
 from surfacechem.solve.watching import sizes, to_pass
@@ -71,6 +72,8 @@ class Hybrid:
     sharpened: float = -np.inf
     """Time [s] at which the largest margins seen were last forgotten."""
     steps: int = 0
+    step: LoadStep | None = None
+    """The last loads that have jumped."""
     renewed: int = 0
     """Number of short stretches in a row that time could not resolve."""
     written: int = 0
@@ -121,7 +124,7 @@ class Hybrid:
         if not steps or before is None:
             return polished(point)
         before = polished(before)
-        point = replace(point, y=before.y)
+        point, self.step = replace(point, y=before.y), LoadStep(before)
         return self._jump(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
 
     def _segment(self, point: Point, end: float) -> Point | None:
@@ -327,7 +330,11 @@ class Hybrid:
         """Carry out a transition and book it; None where the run ends with it."""
         largest, drift = float(self.largest[self.first + index]), DRIFT * self.problem.rtol
         balanced = BALANCED if self.system.transitions[index].times else drift
-        jump = self.jumper.make(index, point, self._since(point.t), NOISE * largest, drift * largest, balanced, last)
+        small, drift = NOISE * largest, drift * largest
+        step = self.step if self.step is not None and self.step.before.t == point.t else None
+        jump = self.jumper.make(
+            index, point, self._since(point.t), small, drift, balanced, last, step, self.problem.rtol
+        )
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import INTERFACE, RESTS, Sink, Transition
+from surfacechem.model.automaton import INTERFACE, RESTS, Transition
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Account, System
 from surfacechem.solve.domains import Domain
 from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
+from surfacechem.solve.jump_heat import JumpHeat
+from surfacechem.solve.load_path import LoadPath, LoadStep
 
 Array = NDArray[np.float64]
 
@@ -35,7 +37,8 @@ ROUNDING = 1e-12
 DIGITS = 4 * float(np.finfo(float).eps)
 """Last digits of a number."""
 
-NEWTON = 60
+ROUNDS = 20
+"""Rounds in which the end of a slip and the shares of its heat agree, where the one depends on the other."""
 
 
 @dataclass(frozen=True)
@@ -148,20 +151,12 @@ class Jumper:
         return compile_function(self.system.inputs, [self.system.expand(self.system.jump_energy)])
 
     @cached_property
-    def _nodes(self) -> dict[str, Sink]:
-        """Everything that takes heat of jumps, by the name of the node."""
-        return {sink.node: sink for sinks in self.system.sinks.values() for sink in sinks}
+    def _heat(self) -> JumpHeat:
+        return JumpHeat(self.system)
 
     @cached_property
-    def _takers(self) -> Function:
-        """Temperature, energy and capacity of each node, and its part of the heat that each maker makes."""
-        shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
-        columns = [
-            item
-            for name, s in self._nodes.items()
-            for item in (s.T, s.energy, derivative(s.energy, s.T), *(share.get(name, 0) for share in shares))
-        ]
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in columns])
+    def _load_path(self) -> LoadPath:
+        return LoadPath(self.system, self.equilibria, self._heat, self._energy, self._stages)
 
     @cached_property
     def _stages(self) -> list[tuple[str, list[int]]]:
@@ -174,13 +169,13 @@ class Jumper:
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
     def _made(self, rows: Array, item: Transition, start: Point, energy: float) -> Array:
-        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers).
+        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1): friction last.
 
         The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
         the normal gap is where it goes to.
         """
         makers = list(self.system.sinks)
-        made = np.zeros((len(rows), len(makers)))
+        made = np.zeros((len(rows), len(makers) + 1))
 
         def maker(axis: str) -> int:
             return makers.index(axis if axis in makers and item.sinks != "snap" else INTERFACE)
@@ -196,7 +191,7 @@ class Jumper:
             with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
                 fall = level - now
             made[~gives, maker(axis)] += fall[~gives]
-            made[gives, maker(INTERFACE)] += fall[gives]
+            made[gives, maker(INTERFACE) if axis == "n" else -1] += fall[gives]
             level = now
         return made
 
@@ -218,10 +213,13 @@ class Jumper:
         drift: float = 0.0,
         balanced: float = BALANCED,
         last: Point | None = None,
+        step: LoadStep | None = None,
+        rtol: float = 0.0,
     ) -> Jump:
         """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
         far the integration may have carried it, and ``balanced`` the part of tractions by which it leaves them out of
-        balance. ``last`` is the state before loads jump, or where the integration ended close to a fold.
+        balance. ``last`` is the state before loads jump, or where the integration ended close to a fold. ``step`` are
+        loads that have jumped at this moment; what their way decides is found within ``rtol``.
         """
         item = self.system.transitions[index]
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
@@ -241,16 +239,24 @@ class Jumper:
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
         books, lift = self._opened(item, before, last)
         energy = float(books[0])
+        if step is not None:
+            self._load_path.reach(index, step, before)
         after: Point | None = start
-        if item.settles:
+        shares: Array | None = None
+        for _ in range(ROUNDS if item.settles else 0):
 
-            def heat(rows: Array) -> Array:
-                return self._temperatures(rows, self._made(rows, item, start, energy))
+            def heat(rows: Array, shares: Array | None = shares) -> Array:
+                return self._heat.warmed(rows, self._made(rows, item, start, energy), shares)
 
             after = self._rested(index, start, lost, heat, balanced)
             after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
+            found = self._path_shares(step, item, start, after, energy, rtol)
+            agreed = found is None or (shares is not None and np.allclose(found, shares, rtol=0.0, atol=rtol))
+            shares = found
+            if agreed or not self._load_path.warms_itself:
+                break
         beyond = self._beyond(item, after)
-        heated = self._heated(after, item, start, energy) if after is not None and not beyond else None
+        heated = self._heated(after, item, start, energy, shares) if after is not None and not beyond else None
         if heated is None:
             obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
@@ -322,6 +328,16 @@ class Jumper:
             return found.let_go(lost, onward.parameters, heat)
         return found.settle(onward, heat, balanced)
 
+    def _path_shares(
+        self, step: LoadStep | None, item: Transition, start: Point, after: Point | None, energy: float, rtol: float
+    ) -> Array | None:
+        """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
+        if step is None or after is None or item.sinks == "snap" or not self._load_path.slides(start, after):
+            return None
+        rubbed = float(self._made(after.inputs()[None], item, start, energy)[0, -1])
+        small = self._rounding(after, energy)
+        return self._load_path.shares(step, start, after, rtol * rubbed + small) if rubbed > small else None
+
     def _beyond(self, item: Transition, after: Point | None) -> str:
         """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
         if after is None or not item.settles or item.measure:
@@ -363,7 +379,7 @@ class Jumper:
         return float(np.sum(np.abs(entropies[1:] - entropies[0])))
 
     def _heated(
-        self, point: Point, item: Transition, start: Point, energy: float
+        self, point: Point, item: Transition, start: Point, energy: float, shares: Array | None
     ) -> tuple[Point, float, float, float] | None:
         """The point with the heat made in its nodes: point, energy, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]
@@ -371,11 +387,11 @@ class Jumper:
         made[np.abs(made) <= self._rounding(point, energy)] = 0.0
         if not np.any(made):
             return point, 0.0, 0.0, 0.0
-        heated = self._temperatures(rows, made)
+        heated = self._heat.warmed(rows, made, shares)
         if not np.all(np.isfinite(heated)):
             return None
-        T, _, _, taken = self._taken(rows, made)
-        passed = np.array([node.prescribed for node in self._nodes.values()])
+        T, _, _, taken = self._heat.taken(rows, made, shares)
+        passed = np.array([node.prescribed for node in self._heat.nodes.values()])
         heat, entropy = float(np.sum(taken[0, passed])), float(np.sum((taken / T)[0, passed]))
         after = Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters)
         return after, float(np.sum(made)), heat, entropy
@@ -387,29 +403,3 @@ class Jumper:
         rows[1:, states] *= 1 + DIGITS * np.eye(len(point.y))
         energies = self._energy(rows)[:, 0]
         return float(np.sum(np.abs(energies[1:] - energies[0])) + DIGITS * max(abs(energies[0]), abs(energy)))
-
-    def _taken(self, rows: Array, made: Array) -> tuple[Array, Array, Array, Array]:
-        """Temperature, energy and capacity of each node, and the heat that it takes, each of shape (rows, nodes)."""
-        values = self._takers(rows).reshape(len(rows), len(self._nodes), -1)
-        T, U, C = (values[:, :, i] for i in range(3))
-        return T, U, C, np.einsum("ijk,ik->ij", values[:, :, 3:], made)
-
-    def _temperatures(self, rows: Array, made: Array) -> Array:
-        """Inputs with the temperatures of the nodes after they have taken the heat that is made."""
-        free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(self._nodes.values()) if not s.prescribed]
-        _, U, C, taken = self._taken(rows, made)
-        target, rows = U + taken, rows.copy()
-        for _ in range(NEWTON if free else 0):
-            done = True
-            for j, column in free:
-                T = rows[:, column]
-                with np.errstate(over="ignore", invalid="ignore"):  # far away a search may see no number
-                    change = (target[:, j] - U[:, j]) / C[:, j]
-                moved = T + change
-                done = done and not np.any(np.abs(change) > 4e-16 * np.abs(T))
-                # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
-                rows[:, column] = np.where(moved > 0, moved, np.nan)
-            if done:
-                break
-            _, U, C, _ = self._taken(rows, made)
-        return rows

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad, solve_ivp
 
 from surfacechem.format import load_text
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.runs.check import warnings
 from surfacechem.runs.simulation import Simulation
+from surfacechem.solve.load_path import shared
 
 CASE = """
 T_0: 300 K
@@ -73,8 +75,31 @@ THERMAL = {
 }
 
 
+SPOTS = "pressure-conductance: {h_c: 1e5, H: 1 GPa, h_0: 5, between: [slider, interface]}"
+TOUCHING = f"heat: [{SPOTS}, conductance: {{between: [base, interface], h: %s}}%s]"
+CHANGING = {
+    "spots": {"heat": TOUCHING % (20, "")},
+    "outward": {
+        "heat": "surroundings: {temperature: 280 K}\n"
+        + TOUCHING % (20, ", conductance: {between: [surroundings, interface], h: 30}")
+    },
+    "both": {
+        "heat": f"heat: [{SPOTS}, pressure-conductance: {{h_c: 1e4, H: 1e8, q: 0.5, between: [base, interface]}}]"
+    },
+    "warmer": {"heat": TOUCHING % ("{value: 20, times: [power: {of: T_2, exponent: 80}]}", "")},
+    "spots over cells": {
+        "heat": TOUCHING % (20, ""),
+        "cells": ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}",
+    },
+    "spots of an area": {"heat": TOUCHING % (20, ""), "loading": "J_c: 2"},
+}
+CHANGING = {name: APART | {"interface": "  temperature: T_c"} | given for name, given in CHANGING.items()}
+"""Conductances that change as loads jump."""
+
+
 def text(thermal, loading, mechanics, potential="", static="", **more):
-    given = {"cells": "", "heat": "", "C_1": 1000, "static": static, "initial": ""} | THERMAL[thermal] | more
+    given = {"cells": "", "heat": "", "C_1": 1000, "static": static, "initial": ""}
+    given |= (THERMAL | CHANGING)[thermal] | more
     interface = given["interface"]
     if potential:
         interface = (
@@ -159,7 +184,7 @@ def test_libraries_and_sweeps_heat_the_same():
     np.testing.assert_allclose(1000 * rise + 700 * other, 1000 * rise[0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("thermal", ["surroundings", "paths", "stores"])
+@pytest.mark.parametrize("thermal", ["surroundings", "paths", "stores", "spots"])
 def test_a_network_heats_the_same(thermal):
     case = load_text(pressure_falls(thermal, "rigid", 0))
     solution = solved(pressure_falls(thermal, "rigid", 0))
@@ -169,6 +194,160 @@ def test_a_network_heats_the_same(thermal):
     net.advance(4.0)
     for name, T in temperatures(solution).items():
         assert interface[name] == pytest.approx(T, abs=1e-5)
+
+
+# -- heat that is shared by the moment: conductances change along the way of the loads
+
+SLIDER["both"] = (SLIDER["pressed"][0], f"{SLIDER['pressed'][1]}, {SLIDER['elastic'][1]}")
+PRESSING = {
+    "p": lambda jump, low: table("p", [2, 2, low, low], "MPa", jump),
+    "F_n": lambda jump, low: "w_n: -2 um, " + table("F_n", [0, 0, 2 - low, 2 - low], "MPa", jump),
+    "w_n": lambda jump, low: table("w_n", [-2, -2, -low, -low], "um", jump),
+}
+VARIED = [(thermal, "rigid", "p", 0.4, "") for thermal in CHANGING]
+VARIED += [("spots", "rigid", "p", rate, static) for rate, static in ((0.7, ""), (-0.4, ""), (0.4, ", mu_s: 0.6"))]
+VARIED += [("spots", "elastic", "p", rate, "") for rate in (0.4, 0.7)]
+VARIED += [("spots", slider, load, 0.7, "") for slider in ("pressed", "both") for load in ("F_n", "w_n")]
+VARIED += [("spots", "plane", "p", 0.4, ""), ("outward", "pressed", "w_n", 0.4, ", mu_s: 0.6")]
+
+
+def limit_of_ramps(case, durations=(1e-4, 1e-5)):
+    """Temperatures at the end as a ramp takes no time; their error is in proportion to its duration."""
+    slow, swift = (temperatures(solved(case(duration))) for duration in durations)
+    ratio = durations[0] / durations[1]
+    return {name: (ratio * swift[name] - slow[name]) / (ratio - 1) for name in swift}
+
+
+def pressing(thermal, slider, load, rate, static, jump, low=0.2):
+    across = ", w_t2: 0.3 mm" if slider == "plane" else ""
+    loads = f"{PRESSING[load](jump, low)}, w_t: {{ramp: {{rate: {rate} mm/s}}}}{across}"
+    return text(thermal, loads, *SLIDER[slider], static)
+
+
+@pytest.mark.parametrize(("thermal", "slider", "load", "rate", "static"), VARIED)
+def test_friction_heats_by_the_conductances_of_each_moment_of_a_jump(thermal, slider, load, rate, static):
+    """The normal gap, where there is one, follows a jump by more work than a ramp: its heat of 2 mJ is known."""
+    jumped = solved(pressing(thermal, slider, load, rate, static, 0))
+    limit = limit_of_ramps(lambda jump: pressing(thermal, slider, load, rate, static, jump))
+    found = temperatures(jumped)
+    assert found.pop("T_c") == pytest.approx(limit.pop("T_c"), abs=1e-5)
+    if load != "p":
+        found["T_2"] -= (1.8e6) ** 2 / (2 * 1.001e15) / 700
+    same(found, limit, 1e-7 if load != "p" else 1e-9)
+
+
+@pytest.mark.parametrize("load", ["F_n", "w_n"])
+def test_friction_heats_by_what_touches_until_a_jump_has_opened_the_gap(load):
+    jumped = solved(pressing("spots", "pressed", load, 0.7, "", 0, low=-1))
+    limit = limit_of_ramps(lambda jump: pressing("spots", "pressed", load, 0.7, "", jump, low=-1))
+    found = temperatures(jumped)
+    excess = {"T_1": 1000 * (found["T_1"] - limit["T_1"]), "T_2": 700 * (found["T_2"] - limit["T_2"])}
+    # The spring of the normal gap lets go in the air, into the base; what conducts afterwards is less than a hundredth.
+    assert excess["T_2"] == pytest.approx(0.5, rel=0.02)
+    assert abs(excess["T_1"]) < 0.01
+
+
+def weakening(case, of):
+    return case.replace("mu: 0.5", f"mu: {{value: 0.5, times: [power: {{of: {of}, exponent: -40}}]}}")
+
+
+@pytest.mark.parametrize("of", ["T_1", "T_2"])
+def test_friction_that_falls_with_its_own_heat_is_shared_along_a_jump(of):
+    """Where the slip ends follows from the temperatures that its way has given."""
+
+    def case(jump):
+        return weakening(pressing("warmer", "rigid", "p", 0.4, "", jump), of)
+
+    jumped = temperatures(solved(case(0)))
+    same(jumped, limit_of_ramps(case), 1e-9)
+
+
+def test_what_lets_go_along_a_jump_heats_as_it_is_then():
+    """A zone holds the slider until the gap has snapped open: it slips in the air, as nothing touches the slider."""
+
+    def case(jump):
+        zone = "exponential-cohesive-zone: {t_max: 1 MPa, g_0: 1 um, E_n: 1e15 Pa/m}"
+        loads = f"{table('w_n', [-1, -1, 3, 3], 'um', jump)}, w_t: {{ramp: {{rate: 1.1 mm/s}}}}"
+        mechanics = "normal: {k: 1e12, beta_1: 0}, tangential: {k: 1e9}"
+        given = text("spots", loads, mechanics, zone, initial="g_n: -1 nm").replace("h_0: 5, ", "")
+        given = given.replace("coulomb: {mu: 0.5}", "mohr-coulomb: {mu: 0.5, t_n_max: 3 MPa}")
+        return given.replace("until: 4 s, outputs: 5", "until: 2.5 s, rtol: 1e-8")
+
+    jumped = temperatures(solved(case(0)))
+    swift = temperatures(solved(case(1e-5)))
+    assert swift["T_2"] > 301
+    # The gap does some more work as it jumps, which its support takes.
+    assert 700 * (jumped["T_2"] - swift["T_2"]) == pytest.approx(4, abs=3)
+    assert 1000 * (jumped["T_1"] - swift["T_1"]) == pytest.approx(0, abs=0.5)
+
+
+@pytest.mark.parametrize("stiffness", ["", "tangential-stiffness: {E_t: 4e9}"])
+def test_the_heat_of_a_jump_by_hand(stiffness):
+    """By quadrature: the slider has the traction mu p, and takes h / (h + 20) of the heat, at each pressure p."""
+    mechanics = SLIDER["rigid"][0]
+    loads = f"{table('p', [2, 2, 0.2, 0.2], 'MPa', 0)}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}"
+    trajectory = solved(text("spots", loads, mechanics, stiffness)).trajectory
+    (jump,) = trajectory.jumps
+    k = 1 / (1e-9 + (0.25e-9 if stiffness else 0))
+    first = min(2e6, k * 0.8e-3 / 0.5)
+
+    def heat(p):
+        return 0.5 * p * 0.5 / k
+
+    def share(p):
+        h = 5 + 1e5 * (p / 1e9) ** 0.95
+        return h / (h + 20)
+
+    whole = quad(heat, 0.2e6, first)[0]
+    slider = quad(lambda p: share(p) * heat(p), 0.2e6, first, epsabs=1e-10, epsrel=1e-12)[0]
+    names = [state.name for state in trajectory.model.system.states]
+    rises = dict(zip(names, jump.after.y - jump.before.y, strict=True))
+    assert jump.released == pytest.approx(whole, rel=1e-10)
+    assert 1000 * rises["T_1"] == pytest.approx(slider, rel=1e-10)
+    assert 700 * rises["T_2"] == pytest.approx(whole - slider, rel=1e-10)
+
+
+def test_the_heat_of_a_jump_of_friction_that_weakens_by_hand():
+    """An initial value problem over the pressure: k (w - u) = mu p, mu falls with T_2, and h_2 grows with it."""
+    case = pressing("warmer", "rigid", "p", 0.4, "", 0)
+    trajectory = solved(
+        case.replace("mu: 0.5", "mu: {value: 0.5, times: [power: {of: T_2, exponent: -40}]}")
+    ).trajectory
+    (jump,) = trajectory.jumps
+
+    def rates(part, y):
+        p, T_2 = 2e6 - 1.8e6 * part, y[1]
+        mu, h_1, h_2 = 0.5 * (T_2 / 300) ** -40, 5 + 1e5 * (p / 1e9) ** 0.95, 20 * (T_2 / 300) ** 80
+        s = h_1 / (h_1 + h_2)
+        # du = -d(mu p) / k, and the heat mu p du warms the base by its share, which changes mu.
+        weakens = -40 * mu / T_2
+        way = mu * 1.8e6 / 1e9 / (1 + p * weakens * (1 - s) * mu * p / 700 / 1e9)
+        return [s * mu * p * way / 1000, (1 - s) * mu * p * way / 700]
+
+    begins = (2e6 - 0.8e6 / 0.5) / 1.8e6
+    end = solve_ivp(rates, (begins, 1.0), [300.0, 300.0], method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    names = [state.name for state in trajectory.model.system.states]
+    after = dict(zip(names, jump.after.y, strict=True))
+    assert [after["T_1"], after["T_2"]] == pytest.approx(end.tolist(), abs=1e-9)
+
+
+@pytest.mark.parametrize("feeds_back", [False, True])
+def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
+    def moments(ways, taken):
+        share = 1 / (1 + taken[:, 0]) if feeds_back else np.where(ways < 0.3, 0.2, 1 / (1 + ways))
+        return ways**2, np.array([share, 1 - share]).T
+
+    # The square root of 3, less 1, where it feeds back: (1 + Q) dQ = dH.
+    exact = 3**0.5 - 1 if feeds_back else 0.2 * 0.09 + 2 * (0.7 - np.log(2 / 1.3))
+    for small in (1e-4, 1e-8, 1e-12):
+        one, other = shared(moments, 2, small, feeds_back=feeds_back)
+        assert abs(one - exact) <= small
+        assert one + other == pytest.approx(1, rel=1e-13)
+
+
+def test_where_a_way_has_no_numbers_nothing_is_shared():
+    found = shared(lambda ways, _: (ways, np.full((len(ways), 2), np.nan)), 2, 1e-9, feeds_back=False)
+    assert np.all(np.isnan(found))
 
 
 # -- what gives way by itself
