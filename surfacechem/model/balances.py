@@ -1,4 +1,4 @@
-r"""The balance laws: sites, energy. The only place where equations are formed.
+r"""The balance laws: kinematics, momentum, sites, energy. The only place where equations are formed.
 
 Everything conservative is a derivative of the free energy. For a temperature node with free energy
 :math:`F(T, x)`, where x are bonding variables and gaps,
@@ -21,7 +21,7 @@ from typing import Any
 
 import symengine
 
-from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.expressions import Expression, depends, derivative, where
 
 
 @dataclass
@@ -104,17 +104,57 @@ def _horner(derivatives: Sequence[Expression], z: Expression) -> Expression:
     return result
 
 
-def site_balance(rate: Expression, variable_dot: Expression, density: Expression, stretch: Expression) -> Expression:
-    """N x_dot = J_c R as a residual scaled by 1/N: bonds per reference area change by the reaction rate."""
-    return variable_dot - stretch * rate / density
-
-
 def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]) -> Expression:
     """Energy balance of one node as a residual: dU/dt minus what flows in."""
     rate = energy_rate(node.free_energy, node.T, node.T_dot, rates, about)
     return symengine.Add(rate, *(-flow for flow in node.inflow))
 
 
-def energy_rows(rows: Mapping[str, Expression], centre: str) -> dict[str, Expression]:
-    """The energy balances of the free nodes, that of ``centre`` replaced by the sum over all of them."""
-    return {name: symengine.Add(*rows.values()) if name == centre else row for name, row in rows.items()}
+class Rows(dict[str, Expression]):
+    """The equations of a system as residuals, linear in the rates: one row for each state, by the state's name.
+
+    ``moves`` is 1 where a balance governs and 0 where a constraint holds what would move; it may be a mode.
+    """
+
+    def kinematics(self, name: str, rate: Expression) -> None:
+        """x_dot = rate."""
+        self[name] = _dot(name) - rate
+
+    def momentum(self, name: str, force: Expression, mass: Expression, moves: Expression = 1) -> None:
+        """Mass times acceleration is the force; what is held keeps its velocity."""
+        self[name] = _dot(name) - moves * force / mass
+
+    def momentum_of(self, name: str, inertia: Expression, force: Expression, moves: Expression) -> None:
+        """Inertia = force, where the state is not the velocity but something that stands for it."""
+        self[name] = moves * (inertia - force) + (1 - moves) * _dot(name)
+
+    def equilibrium(
+        self, name: str, driving_rate: Expression, moves: Expression = 1, held: Expression | None = None
+    ) -> None:
+        """What drives stays zero, so its rate is zero; ``held`` is the row where a constraint holds it."""
+        self[name] = -moves * driving_rate + (0 if held is None else (1 - moves) * held)
+
+    def switched(self, name: str, moves: Expression, balance: Expression, held: Expression) -> None:
+        """An algebraic balance while it governs, else the constraint; a balance without meaning there is not formed."""
+        self[name] = where(moves > 0, balance, held)
+
+    def balance(self, name: str, balance: Expression) -> None:
+        """An algebraic balance that always governs."""
+        self[name] = balance
+
+    def sites(self, name: str, rate: Expression, density: Expression, stretch: Expression) -> None:
+        """N x_dot = J_c R, scaled by 1/N: bonds per reference area change by the reaction rate."""
+        self[name] = _dot(name) - stretch * rate / density
+
+    def logarithm(self, name: str, symbol: Any, logarithm: str, row: Expression) -> None:
+        """The row of ln x in place of that of x: the balance per x, ``row`` that of x in terms of ln x."""
+        del self[name]
+        self[logarithm] = symengine.expand(row * symengine.exp(-symbol))
+
+    def energies(self, rows: Mapping[str, Expression], centre: str) -> None:
+        """The energy balances of the free nodes, that of ``centre`` replaced by the sum over all of them."""
+        self |= {name: symengine.Add(*rows.values()) if name == centre else row for name, row in rows.items()}
+
+
+def _dot(name: str) -> Expression:
+    return symengine.Symbol(f"d{name}_dt")

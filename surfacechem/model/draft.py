@@ -11,7 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Friction, Load
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Equilibrium, Mode, Transition
-from surfacechem.model.balances import Node
+from surfacechem.model.balances import Node, Rows
 from surfacechem.model.conductors import Profile
 from surfacechem.model.refit import Fit
 from surfacechem.model.system import Account, Capped, Caution, Margin, Named, Pace, Pair, Range, State
@@ -94,7 +94,7 @@ class Draft:
     psi: Expression = field(default_factory=lambda: symengine.Integer(0))
     states: list[State] = field(default_factory=list)
     named: list[Named] = field(default_factory=list)
-    rows: dict[str, Expression] = field(default_factory=dict)
+    rows: Rows = field(default_factory=Rows)
     ledger: list[Account] = field(default_factory=list)
     margins: list[Margin] = field(default_factory=list)
     bonding: dict[str, Bond] = field(default_factory=dict)

@@ -9,7 +9,6 @@ import symengine
 
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
-from surfacechem.model import balances
 from surfacechem.model.build import Build
 from surfacechem.model.components.beside import affinity_taken, supplied
 from surfacechem.model.components.force import RESOLUTION, SHARED
@@ -64,7 +63,7 @@ def reactions(build: Build) -> None:
     for pair in pairs:
         departure(build, pair, loaded)
     for name, bond in build.bonding.items():
-        build.rows[name] = balances.site_balance(change[name], bond.dot, bond.density, build.stretch)
+        build.rows.sites(name, change[name], bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
     _prescribed_bonding(build)

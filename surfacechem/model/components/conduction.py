@@ -183,7 +183,7 @@ def profiles(build: Build) -> None:
             message = f"initial {start} = {value:g} K is not an absolute temperature above zero."
             raise InputError(message, path=f"initial.{start}")
         for i, node in enumerate(slab.inner, start=1):
-            build.rows[node.name] = balances.node_row(node, {}, {})
+            build.rows.balance(node.name, balances.node_row(node, {}, {}))
             text = f"temperature of {slab.body.name}, point {i} from the contact"
             quantity = Quantity(node.name, "K", text)
             build.states.append(State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start))

@@ -39,7 +39,7 @@ def equations(build: Build) -> None:
     own_rows = {node.name: balances.node_row(node, rates, build.about) for node in free}
     for node in free:
         _temperature_margins(build, node, own_rows[node.name])
-    build.rows |= balances.energy_rows(own_rows, _centre(build, own_rows))
+    build.rows.energies(own_rows, _centre(build, own_rows))
     for node in build.nodes.values():
         if node.prescribed:
             build.margins.append(_warm(node))

@@ -160,11 +160,11 @@ def normal_motion(build: Build) -> None:
     dot = symengine.Symbol("dg_n_dt")
     far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
     if mount.inertial:
-        build.rows["g_n"] = dot - rate
+        build.rows.kinematics("g_n", rate)
         force = far.force(g, rate) - t_n - far.c_g * rate
-        build.rows["v_n"] = symengine.Symbol("dv_n_dt") - _free(build) * force / far.m
+        build.rows.momentum("v_n", force, far.m, _free(build))
     elif mount.damped:
-        build.rows["g_n"] = dot - rate
+        build.rows.kinematics("g_n", rate)
     else:
         _quasi_static(build, g, far, t_n)
 
@@ -173,5 +173,5 @@ def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -
     """Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find."""
     residual = far.force(g, symengine.Integer(0)) - t_n
     size = far.size(g) + absolute(t_n)
-    build.rows["g_n"] = -build.total_derivative(residual)
+    build.rows.equilibrium("g_n", build.total_derivative(residual))
     build.equilibria.append(Equilibrium("g_n", residual, size))

@@ -41,6 +41,6 @@ def logarithmic_state(build: Build) -> None:
     phi = Named(VARIABLES["phi"], symengine.exp(symbol))
     change = Named(Quantity(str(bond.dot), "1/s", "rate of change of the bonding state"), bond.symbol * dot, False)
     build.named[:0] = [phi, change]
-    build.rows[LOGARITHM] = symengine.expand(build.expanded(build.rows.pop("phi")) * symengine.exp(-symbol))
+    build.rows.logarithm("phi", symbol, LOGARITHM, build.expanded(build.rows["phi"]))
     state = State(VARIABLES[LOGARITHM], symbol, dot, build.scene.initial[LOGARITHM], 1.0, algebraic=False)
     build.states = [state if item.name == "phi" else item for item in build.states]

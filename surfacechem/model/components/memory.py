@@ -25,7 +25,6 @@ def memory(build: Build, law: Friction, bound: Friction) -> None:
         given = Given(VARIABLES[of], start)
         build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given))
         build.name(VARIABLES[of], exp(symbol))
-        build.rows[name] = dot
     if law.internal:
         for name, rate in build.variables.call(bound, bound.evolution).items():
-            build.rows[name] -= rate
+            build.rows.kinematics(name, rate)

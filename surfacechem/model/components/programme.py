@@ -68,7 +68,7 @@ def _driven(build: Build, name: str, stage: Expression) -> Expression:
             rate = rate + where(_during(stage, i), value, 0)
     start = build.scene.initial.get(name, 0.0)
     build.states.append(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
-    build.rows[name] = dot - rate
+    build.rows.kinematics(name, rate)
     build.motion.drives[name] = rate
     return symbol
 

@@ -151,7 +151,7 @@ def motion(build: Build, kinds: Sequence[Kind]) -> None:
     sides = [side_of(build, kind) for kind in kinds]
     for side in sides:
         name = side.kind.d.displacement
-        build.rows[name] = symengine.Symbol(f"d{name}_dt") - side.rate
+        build.rows.kinematics(name, side.rate)
         assert side.kind.mount is not None
         far_field(build, side.kind.mount).book(build, side.u, side.rate)
         name_traction(build, side.kind.d, SLIDES, side.t_a + side.resisted, side.t_a + side.needed)
@@ -175,11 +175,11 @@ def _balance(build: Build, sides: Sequence[Side]) -> Expression:
 
 
 def _inertial(build: Build, sides: Sequence[Side]) -> None:
-    (ds, turn), m = symengine.symbols("dspeed_dt dturn_dt"), sides[0].far.m
+    turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
     (x, y), (c, s), least = (side.driving for side in sides), (side.cosine for side in sides), _least(build, sides)
     along, across = c * x + s * y, c * y - s * x
-    build.rows["speed"] = ds - SLIDES * along / m
-    build.rows["turn"] = where(SLIDES > 0, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
+    build.rows.momentum("speed", along, m, SLIDES)
+    build.rows.switched("turn", SLIDES, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
 
 
 def _least(build: Build, sides: Sequence[Side]) -> Expression:
@@ -201,8 +201,8 @@ def _steady(build: Build, sides: Sequence[Side]) -> Expression:
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
     along_row = -along.subs({SPEED: 0}) / slope - SPEED if linear else along
-    build.rows["speed"] = where(SLIDES > 0, along_row, SPEED)
-    build.rows["turn"] = where(SLIDES * norm(*pull) > 0, across, TURNED)  # what nothing pulls has no direction
+    build.rows.switched("speed", SLIDES, along_row, SPEED)
+    build.rows.switched("turn", SLIDES * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
     stable = -derivative(build.expanded(along), SPEED)
     build.margins.append(Margin(f"{STABLE}speed", where(SLIDES > 0, stable, 1), UNSTABLE))

@@ -83,8 +83,8 @@ def on_springs(build: Build, sides: Sequence[Side]) -> None:
     along, across = (a - b * dl - c for a, b, c in zip(pulled, held, firmer, strict=True))
     skew, (x, _) = against(sizes)[1], unit_vector()
     turning = sizes[0] + (sizes[1] - sizes[0]) * x**2 + _unseen(sides)
-    build.rows[PATH] = where(SLIDES > 0, along - skew * turn, dl)
-    build.rows["turn"] = where(SLIDES > 0, across - turning * turn, turn)
+    build.rows.switched(PATH, SLIDES, along - skew * turn, dl)
+    build.rows.switched("turn", SLIDES, across - turning * turn, turn)
     _settling(build, sides, sizes)
 
 

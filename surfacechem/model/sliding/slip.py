@@ -202,22 +202,20 @@ def _balance(
     rate = build.motion.gap_rates[name]
     if kind.inertial:
         moves = symengine.Integer(1) if kind.elastic else slides
-        build.rows[name] = du - rate
+        build.rows.kinematics(name, rate)
         driving = far.force(u, rate) - carried - far.c_g * rate
         law = creeping_mass(build) if _has_pace(build, kind) else None
         if law is not None:
-            held = symengine.Symbol(f"d{PACE}_dt")
-            build.rows[PACE] = moves * (inertia(build, far.m) - driving) + (1 - moves) * held
+            build.rows.momentum_of(PACE, inertia(build, far.m), driving, moves)
             between_creep_and_sliding(build, law, driving, moves)
         else:
-            dv = symengine.Symbol(f"d{kind.own_velocity}_dt")
-            build.rows[kind.own_velocity] = dv - moves * driving / far.m
+            build.rows.momentum(kind.own_velocity, driving, far.m, moves)
     elif kind.elastic:
         follows = symengine.Integer(1) if kind.rate_dependent else 1 - slides
         _elastic_balance(build, far, u, du, carried, follows)
     elif kind.rate_dependent:
         v = symengine.Symbol(kind.d.velocity)
-        build.rows[name] = du - v
+        build.rows.kinematics(name, v)
         driving = far.force(u, v) - t_f - far.c_g * v
         _sliding_row(build, kind, slides, driving)
     else:
@@ -226,7 +224,7 @@ def _balance(
             _held_by_friction(build, name, driving)
             return
         held = far.k if far.k != 0 else 1
-        build.rows[name] = -slides * build.total_derivative(driving) + (1 - slides) * held * du
+        build.rows.equilibrium(name, build.total_derivative(driving), slides, held * du)
         size = mounted.size(u) + absolute(t_f) + absolute(t_a)
         build.equilibria.append(Equilibrium(name, slides * driving, size, active=slides, slides=1))
 
@@ -237,7 +235,7 @@ def _has_pace(build: Build, kind: Kind) -> bool:
 
 def _held_by_friction(build: Build, name: str, driving: Expression) -> None:
     """Under a dead load alone an interface that sticks does not move, and nothing holds one that slides."""
-    build.rows[name] = symengine.Symbol(f"d{name}_dt")
+    build.rows.kinematics(name, NONE)
     limit = build.motion.stick_limits.get("t")
     if limit is None:
         raise InputError(
@@ -252,10 +250,10 @@ def _elastic_balance(
 ) -> None:
     """The body's spring and damper in series with the elastic gap, which ``follows`` at once what cannot slide."""
     if far.c_b != 0 or far.c_g != 0:
-        build.rows["u_t"] = du - build.motion.gap_rates["u_t"]
+        build.rows.kinematics("u_t", build.motion.gap_rates["u_t"])
         return
     residual = far.force(u, NONE) - t_e
-    build.rows["u_t"] = -build.total_derivative(residual)
+    build.rows.equilibrium("u_t", build.total_derivative(residual))
     size = far.size(u) + absolute(t_e)
     build.equilibria.append(Equilibrium("u_t", residual, size, along={"g_t": follows}))
 
@@ -266,12 +264,12 @@ def _elastic_rows(
     dg = symengine.Symbol("dg_t_dt")
     rate = build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
-        build.rows["g_t"] = dg - (rate - v)
+        build.rows.kinematics("g_t", rate - v)
         driving = t_e - t_f
         _sliding_row(build, kind, slides, driving)
         return
     residual = t_f - t_e
-    build.rows["g_t"] = -slides * build.total_derivative(residual) + (1 - slides) * (dg - rate)
+    build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
     build.equilibria.insert(0, Equilibrium("g_t", slides * residual, size, active=slides, slides=-1))
     _carried(build, slides, derivative(t_e, symengine.Symbol("g_t")))
@@ -295,7 +293,10 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
         whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
         balance = whole.subs({v: 0}) / slope - v
     # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
-    build.rows[str(v)] = where(slides > 0, balance, v) if kind.sticks else balance
+    if kind.sticks:
+        build.rows.switched(str(v), slides, balance, v)
+    else:
+        build.rows.balance(str(v), balance)
     if build.motion.creeping is not None and len(build.interface.frictions) == 1 and _is_damped(kind):
         return  # both friction and damper resist the more, the faster it slides
     if slope == 0:
