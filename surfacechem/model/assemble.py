@@ -13,12 +13,12 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.chemistry import reactions
 from surfacechem.model.components.conduction import conductors, profiles, slabs
 from surfacechem.model.components.energy import equations
-from surfacechem.model.components.exchange import friction, heat_paths
 from surfacechem.model.components.force import force, rupture
+from surfacechem.model.components.friction import friction
 from surfacechem.model.components.gap import normal_gap, normal_motion
+from surfacechem.model.components.heat import heat_paths, mean_influx
 from surfacechem.model.components.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.model.components.logarithms import logarithmic_state
-from surfacechem.model.components.mean_influx import mean_influx
 from surfacechem.model.components.medium import medium
 from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
 from surfacechem.model.components.temperatures import temperatures

@@ -10,7 +10,7 @@ from surfacechem.model import balances
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
-from surfacechem.model.components.exchange import takers
+from surfacechem.model.components.heat import takers
 from surfacechem.model.components.sources import GAPS, GEOMETRY, by_channel, by_source, heat_of_reaction
 from surfacechem.model.system import Account
 from surfacechem.quantities import VARIABLES, Quantity

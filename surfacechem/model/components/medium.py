@@ -7,16 +7,24 @@ so that capacity, entropy and energy belong together exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import pairwise
+from typing import Any
 
-from surfacechem.contracts.substances import Property
-from surfacechem.contracts.terms import Spec
+import numpy as np
+import symengine
+
+from surfacechem.contracts.fits import DEGREE, NoFitError, Piece, divided
+from surfacechem.contracts.substances import Fluid, Property
+from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.model.build import Build
-from surfacechem.model.components.fluid import FluidFit
-from surfacechem.quantities import VARIABLES
+from surfacechem.model.refit import Fit, first_range
+from surfacechem.model.system import Margin
+from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Medium
 
 PATH = "interface.medium"
@@ -89,3 +97,168 @@ def _free_energy(build: Build, found: Medium, fluid: Callable[[], FluidFit] | No
         )
     rho, cp, T, T_0 = (build.variables.get(name, "the film", PATH) for name in ("rho_m", "cp_m", "T_c", "T_0"))
     return rho * cp * (T - T_0 - T * log(T / T_0))
+
+
+FLUID_PATH = "interface.medium.fluid"
+
+ENERGY = "capacity_m"
+"""Heat capacity per volume over T; minus its double integral is the free energy."""
+
+PIECES = 4
+"""Fewest pieces of a fit."""
+
+SPARE = 2
+"""Pieces beyond those that the first range takes, for the kinks of a wider one."""
+
+REMEDY = "Give `interface.medium.temperatures`: those that the run will reach."
+
+KELVIN = Spec("K", "where a piece of the fit ends")
+NUMBER = Spec("1", "coefficient of the fit")
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """The fits of a fluid as values of parameters, by path."""
+
+    fluid: Fluid
+    counts: dict[str, int] = field(default_factory=dict)
+    """Number of pieces of each property."""
+
+    def __call__(self, low: float, high: float, T_start: float) -> Mapping[str, float]:
+        """Values between two temperatures; the energy is zero with its slope at ``T_start`` [K]."""
+        values = {f"{FLUID_PATH}.low": low, f"{FLUID_PATH}.high": high}
+        for quantity, count in self.counts.items():
+            pieces = self._pieces(quantity, count, low, high)
+            for i, piece in enumerate(pieces):
+                values[f"{FLUID_PATH}.{quantity}.ends[{i}]"] = piece.high
+                values |= {f"{FLUID_PATH}.{quantity}[{i}][{k}]": c for k, c in enumerate(piece.coefficients)}
+            if quantity == ENERGY:
+                for i, (constant, slope) in enumerate(_joints(pieces, T_start)):
+                    values[f"{FLUID_PATH}.{quantity}.constant[{i}]"] = constant
+                    values[f"{FLUID_PATH}.{quantity}.slope[{i}]"] = slope
+        return values
+
+    def _pieces(self, quantity: str, count: int, low: float, high: float) -> tuple[Piece, ...]:
+        try:
+            return divided(self.fluid.fit(quantity, low, high), count)
+        except NoFitError as error:
+            message = f"the fit of {quantity} of {self.fluid.name} cannot go on: {error} {REMEDY}"
+            raise InputError(message, path="interface.medium") from None
+
+
+def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
+    """What each piece of the energy needs beside its double integral, to be smooth and zero with its slope there."""
+    found = [(0.0, 0.0)]
+    for left, right in pairwise(pieces):
+        (f, df), (g, dg) = _integrals(left, left.high), _integrals(right, left.high)
+        constant, slope = found[-1]
+        next_slope = slope + df - dg
+        found.append((constant + f - g + (slope - next_slope) * left.high, next_slope))
+    at = next((i for i, piece in enumerate(pieces) if T_start <= piece.high), len(pieces) - 1)
+    f, df = _integrals(pieces[at], T_start)
+    slope = found[at][1] + df
+    constant = found[at][0] + found[at][1] * T_start + f - slope * T_start
+    return [(a - constant, b - slope) for a, b in found]
+
+
+def _integrals(piece: Piece, T: float) -> tuple[float, float]:
+    """Minus the double integral of a piece, from its middle, and its slope."""
+    half = (piece.high - piece.low) / 2
+    x = (2 * T - piece.low - piece.high) / (piece.high - piece.low)
+    once = np.polynomial.polynomial.polyint(np.array(piece.coefficients))
+    twice = np.polynomial.polynomial.polyint(once)
+    value, slope = (float(np.polynomial.polynomial.polyval(x, c)) for c in (twice, once))
+    return -(half**2) * value, -half * slope
+
+
+class FluidFit:
+    """Makes the expressions of a fluid's properties, and remembers which were asked for."""
+
+    def __init__(self, build: Build, fluid: Fluid) -> None:
+        self.build = build
+        self.T = build.variables.get("T_c", "the medium", "interface.medium")
+        assert build.interface.medium is not None
+        self.held = (*_held(build), *build.interface.medium.temperatures)
+        starts = [build.scene.initial.get(node.name) for node in build.nodes.values() if not node.prescribed]
+        self.states = tuple(node.name for node in build.nodes.values() if not node.prescribed)
+        known = [*self.held, *(T for T in starts if T is not None)] or [build.scene.T_0 or 300.0]
+        self.coefficients = Coefficients(fluid)
+        self.low, self.high, self.start = first_range(fluid, known)
+        self.ends = [self._number(f"T_m_{end}", end, KELVIN, getattr(self, end)) for end in ("low", "high")]
+        for end, sign in zip(self.ends, (1, -1), strict=True):
+            reason = f"{fluid.name} has no properties beyond its range"
+            build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
+        build.fit = self.fit
+
+    def fit(self) -> Fit:
+        """How a run goes on where it leaves the range."""
+        ends = (f"{FLUID_PATH}.low", f"{FLUID_PATH}.high")
+        return Fit(self.coefficients.fluid, str(self.T), self.held, self.states, self.coefficients, ends)
+
+    def property(self, name: str) -> Expression:
+        """A property as a named quantity, constant beyond its range."""
+        values = self._values(name)
+        pieces = self._pieces(name, values)
+        inside = [self._polynomial(f"{name}_{i}", x, cs) for i, (x, cs) in enumerate(pieces)]
+        first = sum(c * (-1) ** k for k, c in enumerate(pieces[0][1]))
+        last = sum(pieces[-1][1])
+        low, *bounds = (self.ends[0], *self._ends(name, values))
+        branches = [(first, low > self.T), *zip(inside, (bound > self.T for bound in bounds), strict=True)]
+        return self.build.name(VARIABLES[name], symengine.Piecewise(*branches, (last, True)))
+
+    def _polynomial(self, name: str, x: Expression, coefficients: Sequence[Expression]) -> Expression:
+        """A piece of a property, and its scaled temperature, by names."""
+        x = self.build.name(Quantity(f"{name}_x", "1", "scaled temperature of the piece below"), x, output=False)
+        powers = sum(c * x**k for k, c in enumerate(coefficients))
+        unit = VARIABLES[name.rpartition("_")[0]].unit
+        return self.build.name(Quantity(name, unit, "piece of the fit of a property"), powers, output=False)
+
+    def energy(self) -> Expression:
+        """Thermal free energy per volume [J/m^3]."""
+        values = self._values(ENERGY)
+        pieces = self._pieces(ENERGY, values)
+        ends = self._ends(ENERGY, values)
+        lows = (self.ends[0], *ends)
+        branches = []
+        for i, (x, coefficients) in enumerate(pieces):
+            half = (ends[i] - lows[i]) / 2
+            integral = sum(c * x ** (k + 2) / symengine.Integer((k + 1) * (k + 2)) for k, c in enumerate(coefficients))
+            constant, slope = (self._part(ENERGY, part, i, values) for part in ("constant", "slope"))
+            condition = ends[i] > self.T if i < PIECES - 1 else True
+            branches.append((constant + slope * self.T - half**2 * integral, condition))
+        return symengine.Piecewise(*branches)
+
+    def _values(self, quantity: str) -> Mapping[str, float]:
+        fluid, counts = self.coefficients.fluid, self.coefficients.counts
+        counts[quantity] = max(PIECES, len(fluid.fit(quantity, self.low, self.high)) + SPARE)
+        return Coefficients(fluid, {quantity: counts[quantity]})(self.low, self.high, self.start)
+
+    def _pieces(self, quantity: str, values: Mapping[str, float]) -> list[tuple[Expression, list[Expression]]]:
+        """Scaled temperature and coefficients of each piece."""
+        ends = (self.ends[0], *self._ends(quantity, values))
+        xs = [(2 * self.T - low - high) / (high - low) for low, high in pairwise(ends)]
+        keys = [[f"[{i}][{k}]" for k in range(DEGREE + 1)] for i in range(len(xs))]
+        return [(x, [self._coefficient(quantity, key, values) for key in row]) for x, row in zip(xs, keys, strict=True)]
+
+    def _coefficient(self, quantity: str, key: str, values: Mapping[str, float]) -> Expression:
+        symbol = quantity + key.replace("][", "_").replace("[", "_").replace("]", "")
+        return self._number(symbol, f"{quantity}{key}", NUMBER, values[f"{FLUID_PATH}.{quantity}{key}"])
+
+    def _ends(self, quantity: str, values: Mapping[str, float]) -> list[Expression]:
+        return [self._part(quantity, "ends", i, values) for i in range(self.coefficients.counts[quantity])]
+
+    def _part(self, quantity: str, part: str, i: int, values: Mapping[str, float]) -> Expression:
+        key = f"{quantity}.{part}[{i}]"
+        return self._number(f"{quantity}_{part}_{i}", key, NUMBER, values[f"{FLUID_PATH}.{key}"])
+
+    def _number(self, symbol: str, key: str, spec: Spec, value: float) -> Any:
+        path = f"{FLUID_PATH}.{key}"
+        if any(parameter.path == path for parameter in self.build.parameters.items):
+            return symengine.Symbol(symbol)
+        return self.build.constant(symbol, path, spec, value, internal=True)
+
+
+def _held(build: Build) -> list[float]:
+    """Prescribed temperatures at the start."""
+    loads: list[Load] = [build.loads[node.name] for node in build.nodes.values() if node.prescribed]
+    return [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]

@@ -16,7 +16,7 @@ from surfacechem.contracts.terms import Friction, Varying, reads
 from surfacechem.expressions import Expression, absolute, where
 from surfacechem.model.automaton import Transition
 from surfacechem.model.build import Build
-from surfacechem.model.components.exchange import pressed
+from surfacechem.model.components.friction import pressed
 from surfacechem.model.system import Given, State
 from surfacechem.quantities import VARIABLES
 

@@ -1,4 +1,12 @@
-"""Friction, heat paths and external heat: what flows, and what it dissipates."""
+r"""Heat paths between temperature nodes and external heat: what flows, and the entropy it produces.
+
+A path with the closure `mean` heats both bodies alike. Its driving force is the temperature of the interface over the
+harmonic mean of the bodies, so that the production of both fluxes is a square,
+
+.. math:: \sigma = h_m \left( T_c - \frac{2 T_1 T_2}{T_1 + T_2} \right)^2 \frac{T_1 + T_2}{T_1 T_2 T_c} \ge 0,
+
+though one of the two alone may run uphill: into the hotter body, from an interface between both temperatures.
+"""
 
 from __future__ import annotations
 
@@ -7,66 +15,13 @@ from dataclasses import dataclass
 
 import symengine
 
-from surfacechem.contracts.terms import Friction, HeatTransfer
+from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression, derivative, where
+from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import Node
 from surfacechem.model.build import BOTH, NOTHING, Build
-from surfacechem.model.components.memory import memory
-from surfacechem.model.components.mounting import ACROSS, ALONG, Direction
-from surfacechem.model.sliding.formulations import displacement, in_parallel
-from surfacechem.model.sliding.resistance import resist, resistance, stick_limit
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
-
-
-def friction(build: Build) -> None:
-    """Sliding tractions and what they dissipate; their power comes from outside."""
-    rubs, total = build.motion.rubs, symengine.Integer(0)
-    for law in build.interface.frictions:
-        label = build.label(law)
-        bound = build.bound(law)
-        memory(build, law, bound)
-        met = pressed(build, law)
-        resisted = resistance(build, law, bound, met)
-        build.law_margins(bound, {}, met=met)
-        power = symengine.Integer(0)
-        for d, traction in resisted.items():
-            across = " across v" if d is ACROSS else ""
-            quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
-            nominal = build.stretch * build.name(quantity, traction)
-            power += rubs * nominal * build.variables.get(d.velocity, law)
-            total += rubs * nominal
-            resist(build, d, nominal)
-        build.frictions.add(label)
-        build.dissipation[label] = power
-        if not build.motion.slips:
-            build.motion.works[law] = f"W_{label}"
-            build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
-            _reversal(build, resisted)
-        else:
-            stick_limit(build, law, bound, met)
-    if not build.motion.slips and in_parallel(build):
-        t_a = derivative(build.psi, displacement(build))
-        build.areal(Quantity(ALONG.total, "Pa", f"{ALONG.text} on body 1", ALONG.total), t_a + total)
-
-
-def pressed(build: Build, law: Friction) -> dict[str, Expression]:
-    """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
-
-    At zero it is one that grows or falls, not one that stays: so a contact begins and ends.
-    """
-    if "p" not in law.nonnegative or "p" in build.scene.loading:
-        return {}
-    p, least = build.variables.get("p", law), build.bound(law).least.get("p")
-    return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
-
-
-def _reversal(build: Build, directions: Collection[Direction]) -> None:
-    for v in (d.velocity for d in directions):
-        if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
-            reason = "sliding reverses" if len(directions) == 1 else f"{v} changes its sign"
-            build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
 
 
 def heat_paths(build: Build) -> None:
@@ -310,3 +265,47 @@ def _external_heat(build: Build, member: str, name: str) -> None:
         build.into_body[member].append(Q)
     else:
         build.into_interface.append(Q)
+
+
+def mean_influx(build: Build) -> None:
+    """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] of the paths with the closure `mean`."""
+    channels: dict[str, Expression] = {}
+    for law in (law for law in build.scene.heat if law.closure == "mean"):
+        check_closure(build, law)
+        if end_node(build, law.between[0]) is end_node(build, law.between[1]):
+            raise InputError("`closure: mean` is of two bodies with temperatures of their own.", law.place)
+        for channel, h in conductances(build, law).items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
+    if channels:
+        _into_both(build, channels)
+
+
+def _into_both(build: Build, channels: dict[str, Expression]) -> None:
+    bodies = [body.name for body in build.scene.bodies]
+    (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
+    build.conductances[BOTH] = list(channels.values())
+    difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)
+    flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
+    total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
+    for name in bodies:
+        build.node_of[name].inflow.append(total)
+    centre.inflow.append(-2 * total)
+    for channel, heat in parts.items():
+        for end, share in ((bodies[0], heat), (bodies[1], heat), ("interface", -2 * heat)):
+            receive(build, end, share, channel)
+    sum_h = symengine.Add(*channels.values())
+    _warn_of_uphill(build, bodies)
+    production = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
+    build.production(flux.name, "heat flow from interface to each body", production)
+
+
+def _warn_of_uphill(build: Build, bodies: list[str]) -> None:
+    """Say where an interface heats a body that is hotter than itself."""
+    (cold, _), (hot, name) = sorted((build.at_start(build.node_of[body].T), body) for body in bodies)
+    if hot > cold:
+        harmonic = 2 * cold * hot / (cold + hot)
+        build.warnings.append(
+            f"`closure: mean` heats both bodies alike: as they start, {name} also from an interface that is cooler "
+            f"than itself, between {harmonic:.6g} K and {hot:.6g} K. Their entropy production together is positive. "
+            "Where no heat should flow uphill, give paths from each body to the interface."
+        )

@@ -1,0 +1,86 @@
+"""Friction: what it resists sliding with and dissipates, and the variables that a law evolves by itself.
+
+Such a variable, as the age of a contact, is evolved as its logarithm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import symengine
+
+from surfacechem.contracts.terms import Friction
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, derivative, exp, where
+from surfacechem.model.build import Build
+from surfacechem.model.components.mounting import ACROSS, ALONG, Direction
+from surfacechem.model.sliding.formulations import displacement, in_parallel
+from surfacechem.model.sliding.resistance import resist, resistance, stick_limit
+from surfacechem.model.system import Given, Margin, State
+from surfacechem.quantities import VARIABLES, Quantity
+
+
+def friction(build: Build) -> None:
+    """Sliding tractions and what they dissipate; their power comes from outside."""
+    rubs, total = build.motion.rubs, symengine.Integer(0)
+    for law in build.interface.frictions:
+        label = build.label(law)
+        bound = build.bound(law)
+        memory(build, law, bound)
+        met = pressed(build, law)
+        resisted = resistance(build, law, bound, met)
+        build.law_margins(bound, {}, met=met)
+        power = symengine.Integer(0)
+        for d, traction in resisted.items():
+            across = " across v" if d is ACROSS else ""
+            quantity = Quantity(f"{d.traction}_{label}", "Pa", f"tangential traction of {law.title}{across}")
+            nominal = build.stretch * build.name(quantity, traction)
+            power += rubs * nominal * build.variables.get(d.velocity, law)
+            total += rubs * nominal
+            resist(build, d, nominal)
+        build.frictions.add(label)
+        build.dissipation[label] = power
+        if not build.motion.slips:
+            build.motion.works[law] = f"W_{label}"
+            build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
+            _reversal(build, resisted)
+        else:
+            stick_limit(build, law, bound, met)
+    if not build.motion.slips and in_parallel(build):
+        t_a = derivative(build.psi, displacement(build))
+        build.areal(Quantity(ALONG.total, "Pa", f"{ALONG.text} on body 1", ALONG.total), t_a + total)
+
+
+def pressed(build: Build, law: Friction) -> dict[str, Expression]:
+    """The pressure for a law that needs one, where the gap may open: an open contact does not rub.
+
+    At zero it is one that grows or falls, not one that stays: so a contact begins and ends.
+    """
+    if "p" not in law.nonnegative or "p" in build.scene.loading:
+        return {}
+    p, least = build.variables.get("p", law), build.bound(law).least.get("p")
+    return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
+
+
+def _reversal(build: Build, directions: Collection[Direction]) -> None:
+    for v in (d.velocity for d in directions):
+        if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
+            reason = "sliding reverses" if len(directions) == 1 else f"{v} changes its sign"
+            build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
+
+
+def memory(build: Build, law: Friction, bound: Friction) -> None:
+    """States of the law and their rates; the initial value is that of the quantity, not of its logarithm."""
+    for name, of in law.internal.items():
+        symbol, dot = symengine.symbols(f"{name} d{name}_dt")
+        start = build.initial(of)
+        if not start > 0:
+            raise InputError(f"initial {of} = {start:g} is outside its range: > 0.", path=f"initial.{of}")
+        build.variables.define(name, lambda symbol=symbol: symbol, "evolved", law.path)  # type: ignore[misc]
+        given = Given(VARIABLES[of], start)
+        build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given))
+        build.name(VARIABLES[of], exp(symbol))
+    if law.internal:
+        for name, rate in build.variables.call(bound, bound.evolution).items():
+            build.rows.kinematics(name, rate)
