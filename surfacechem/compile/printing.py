@@ -227,11 +227,15 @@ def _assignment(printer: _Python, name: str, expression: Expression, text: str) 
 
 
 def _broken(before: str, text: str, after: str) -> list[str]:
-    """The text between brackets, broken before operators and after commas where it is too long for one line."""
+    """The text between brackets, broken before operators and after commas where it is too long for one line; a product
+    that is too long by itself before its functions.
+    """
     if len(before + text + after) <= WIDTH:
         return [before + text + after]
     lines: list[str] = []
-    for piece in re.split(r" (?=[+-] |if |else )|(?<=,) ", text):
+    whole = re.split(r" (?=[+-] |if |else )|(?<=,) ", text)
+    factors = [[piece] if len(piece) <= WIDTH else re.split(r"(?<=[^*]\*)(?=math\.)", piece) for piece in whole]
+    for piece in (factor for pieces in factors for factor in pieces):
         if lines and len(lines[-1]) + len(piece) + 9 <= WIDTH:
             lines[-1] += f" {piece}"
         else:

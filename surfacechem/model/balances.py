@@ -54,8 +54,13 @@ class Node:
 
 def internal_energy(F: Expression, T: Expression) -> Expression:
     """U = F - T F_T, term by term: what is in proportion to T has no energy, whatever the size of its derivatives."""
+    return symengine.Add(*(term - T * derivative(term, T) for term in _terms(F)))
+
+
+def _terms(F: Expression) -> Sequence[Expression]:
+    """What is added up."""
     whole = symengine.sympify(F)
-    return symengine.Add(*(term - T * derivative(term, T) for term in (whole.args if whole.is_Add else (whole,))))
+    return whole.args if whole.is_Add else (whole,)
 
 
 def entropy(F: Expression, T: Expression) -> Expression:
@@ -73,10 +78,19 @@ def energy_rate(
 ) -> Expression:
     """dU/dt by the chain rule; ``rates`` maps the other variables of F to their time derivatives."""
     if not isinstance(T, symengine.Symbol):  # no medium: F does not depend on temperature
-        return sum((derivative(F, x) * rate for x, rate in rates.items()), symengine.Integer(0))
+        return symengine.Add(*(power(F, x, rate) for x, rate in rates.items()))
     U = internal_energy(F, T)
     heating = conditioned(-T * second(F, T), about) * T_dot
-    return heating + sum((derivative(U, x) * rate for x, rate in rates.items()), symengine.Integer(0))
+    return symengine.Add(heating, *(power(U, x, rate) for x, rate in rates.items()))
+
+
+def power(F: Expression, x: Expression, rate: Expression) -> Expression:
+    """Power F_x dx/dt of what does work on x, term by term.
+
+    In the balance of energy the mechanical power that flows in stands beside dU/dt, and cancels to what couples it to
+    temperature: as products with sums they would cancel as numbers only, however large beside all heat.
+    """
+    return symengine.Add(*(term * rate for term in _terms(derivative(F, x))))
 
 
 def conditioned(expression: Expression, about: Mapping[Any, Expression], degree: int = 4) -> Expression:
@@ -107,7 +121,7 @@ def _horner(derivatives: Sequence[Expression], z: Expression) -> Expression:
 def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]) -> Expression:
     """Energy balance of one node as a residual: dU/dt minus what flows in."""
     rate = energy_rate(node.free_energy, node.T, node.T_dot, rates, about)
-    return symengine.Add(rate, *(-flow for flow in node.inflow))
+    return symengine.Add(rate, *(-term for flow in node.inflow for term in _terms(flow)))
 
 
 class Rows(dict[str, Expression]):

@@ -200,6 +200,9 @@ def _read(path: Path) -> xarray.Dataset:
             raise InputError(f"{name} does not go over {' and '.join(map(str, wanted))}.", place)
         if (values.dtype.kind != "f" and name not in TEXTS) or (name == "time" and not np.isfinite(values).all()):
             raise InputError(f"{name} does not hold numbers in double precision.", place)
+        for key, value in values.attrs.items():
+            if not isinstance(value, (str, *NUMBER)):
+                raise InputError(f"the attribute '{key}' of {name} is no text or number.", place)
     for name, value in dataset.attrs.items():
         if not isinstance(value, NUMBER if name in NUMBERS else (str, *NUMBER)):
             raise InputError(

@@ -1,11 +1,16 @@
-"""Polynomials that are written about a point keep their digits beside it."""
+"""Balances keep the digits of what is small in them: polynomials beside a point, heat beside mechanical power."""
 
 from fractions import Fraction
 
 import pytest
 import symengine
 
+from surfacechem.laws.bulk import Constant
+from surfacechem.laws.loading import Ramp
+from surfacechem.laws.longrange import LennardJonesFlatFlat, LennardJonesSpherePlane
+from surfacechem.model.assemble import assemble
 from surfacechem.model.balances import conditioned
+from surfacechem.scene import Body, Interface, Scene
 
 X = symengine.Symbol("x")
 BESIDE = 1.0 + 2.0**-20
@@ -29,3 +34,17 @@ def test_a_polynomial_stays_the_same():
 def test_what_is_no_polynomial_is_left_alone():
     for expression in (symengine.exp(X), X**9, 1 / X):
         assert conditioned(expression, {X: symengine.Integer(1)}) == expression
+
+
+def test_the_power_of_elastic_tractions_leaves_the_balance_of_energy():
+    """It is stored as it flows in, and would leave its rounding, which may be larger than all heat."""
+    common = {"n_1": 1e19, "n_2": 1e19, "psi_0": 1e-21}
+    potentials = [
+        LennardJonesSpherePlane(**common, g_0=2e-6, R=1e-4, area=1e-12),
+        LennardJonesFlatFlat(**common, g_0=3e-6),
+    ]
+    bodies = Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))
+    loading = {"g_n": Ramp(start=2e-8, rate=2e-9)}
+    system = assemble(Scene(bodies, Interface("T", potentials), [], loading, None, 300.0, {"T": 300.0}))
+    read = {str(x) for x in system.expand(system.rows["T"]).free_symbols}
+    assert read <= {"T", "dT_dt", "T_0", "C_1", "C_2"}

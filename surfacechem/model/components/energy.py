@@ -72,7 +72,7 @@ def _gaps(build: Build) -> dict[Any, Expression]:
         if not depends(build.psi, symbol):
             continue
         rates[symbol] = build.motion.gap_rates[gap] if gap in build.motion.gap_rates else build.rate_of(gap)
-        power = derivative(build.psi, symbol) * rates[symbol]
+        power = balances.power(build.psi, symbol, rates[symbol])
         if power != 0:
             if gap not in build.motion.gap_rates:
                 build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
@@ -86,7 +86,7 @@ def _stretching(build: Build) -> dict[Any, Expression]:
     if not depends(build.psi, J_c):
         return {}
     rate = build.rate_of("J_c")
-    power = derivative(build.psi, J_c) * rate
+    power = balances.power(build.psi, J_c, rate)
     if power != 0:
         build.supply("W_J", "work done in stretching the surface", power, None)
         _give_power(build, power)

@@ -86,7 +86,8 @@ def _draw_solver(ax: Axes, case: xarray.Dataset, name: str, limit: float, k: int
     inside = case["stepping_seconds"].values
     stepped = shown & np.isfinite(inside)
     ax.plot(x[stepped], inside[stepped], "--", color=colour, linewidth=0.8, alpha=0.8)
-    spread = np.array([np.zeros(shown.sum()), (middle - y)[shown]])
+    # Single precision may round the median of a few equal times below them.
+    spread = np.array([np.zeros(shown.sum()), np.maximum(middle - y, 0.0)[shown]])
     ax.errorbar(x[shown], y[shown], spread, fmt="none", ecolor=colour, elinewidth=0.6, alpha=0.6)
     for below, fill in ((True, "white"), (False, colour)):
         some = shown & ((x < limit) == below)
