@@ -54,16 +54,17 @@ def _end(number: int, _frame: object) -> None:
 def _signals_raised() -> Iterator[None]:
     """Signals that end the process are exceptions meanwhile, so that files that are not finished are removed.
 
-    What the process was told to ignore, as by nohup, it ignores.
+    What the process was told to ignore, as by nohup, it ignores; a handler that is not Python's stays, since it could
+    not be put back.
     """
     wanted = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     if threading.current_thread() is not threading.main_thread():
         wanted = []
     usual = {number: signal.getsignal(number) for number in wanted}
-    for number, handler in usual.items():
-        if handler != signal.SIG_IGN:
-            signal.signal(number, _end)
+    usual = {number: handler for number, handler in usual.items() if handler not in (None, signal.SIG_IGN)}
     try:
+        for number in usual:
+            signal.signal(number, _end)
         yield
     finally:
         for number, handler in usual.items():

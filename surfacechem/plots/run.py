@@ -61,8 +61,8 @@ OVER = {
 """What some variables go over."""
 
 TEXTS = (
-    *("event_name", "status", "reason", "case_name", "solver_name", "variable_name", "title", "case_text"),
-    *("reference", "regime", "solver", "outcome", "symbol"),
+    *("event_name", "event_reason", "event_verdict", "status", "reason", "case_name", "solver_name", "variable_name"),
+    *("title", "case_text", "reference", "regime", "solver", "outcome", "symbol"),
 )
 """Variables that hold words."""
 

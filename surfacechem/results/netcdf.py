@@ -6,6 +6,8 @@ import os
 import re
 import secrets
 import stat
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,7 +20,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError
-from surfacechem.results.waiting import wait_for
 
 R = TypeVar("R")
 
@@ -29,6 +30,21 @@ PATIENCE = 20.0
 
 SLOWEST = 1e7
 """Bytes per second that a disk gives at the least."""
+
+TRIAL = """
+import sys
+from contextlib import suppress
+import netCDF4
+with netCDF4.Dataset(sys.argv[1]) as file:
+    for item in (file, *file.variables.values()):
+        for name in item.ncattrs():
+            with suppress(Exception):
+                item.getncattr(name)
+        if item is not file:
+            with suppress(Exception):
+                item[...]
+"""
+"""A process that reads all of a file, whatever the errors on the way."""
 
 SUFFIXES = (".nc", ".nc4", ".cdf")
 """What names of netCDF files end with."""
@@ -109,7 +125,7 @@ def replacing(target: Path) -> Iterator[Path]:
         _create(temporary, 0o666 if replaced is None else replaced, place)
         try:
             yield temporary
-        except (OSError, RuntimeError) as error:  # RuntimeError is netCDF's
+        except OSError as error:
             raise OutputError(f"cannot be written: {_reason(temporary, error)}.", place) from error
         if replaced is not None:
             temporary.chmod(replaced)
@@ -126,9 +142,9 @@ def _create(path: Path, mode: int, place: Place) -> None:
         raise InputError(f"cannot be written: {error.strerror or error}.", place) from error
 
 
-def _reason(path: Path, error: Exception) -> str:
+def _reason(path: Path, error: OSError) -> str:
     """Why a file could not be written. HDF5 does not say; plain writing meets what it has met."""
-    if isinstance(error, OSError) and error.strerror:
+    if error.strerror:
         return error.strerror
     try:
         with path.open("wb", buffering=0) as file:
@@ -157,28 +173,48 @@ def save(target: Path, columns: Sequence[Column], attributes: Mapping[str, str |
 
 
 def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str, str | float | int]) -> None:
-    """Write columns and attributes to a new file."""
+    """Write columns and attributes to a new file; OSError where that cannot be."""
     import netCDF4
 
-    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-        for dimension, size in _dimensions(columns).items():
-            file.createDimension(dimension, size)
-        for column in columns:
-            kind = str if np.asarray(column.values).dtype == object else np.float64
-            variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
-            variable.setncatts(column.attributes)
-            variable[...] = column.values
-        file.setncatts(attributes)
+    try:
+        with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+            for dimension, size in _dimensions(columns).items():
+                file.createDimension(dimension, size)
+            for column in columns:
+                kind = str if np.asarray(column.values).dtype == object else np.float64
+                variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
+                variable.setncatts(column.attributes)
+                variable[...] = column.values
+            file.setncatts(attributes)
+    except RuntimeError as error:  # the library's for all that HDF5 meets
+        raise OSError(str(error)) from error
 
 
 def reading(path: Path, read: Callable[[], R]) -> R:
     """What is read from a netCDF file; InputError where it is none, or damaged."""
     try:
         size = path.stat().st_size
-        return wait_for(read, PATIENCE + size / SLOWEST)
+        _try_elsewhere(path, PATIENCE + size / SLOWEST)
+        return read()
     except Exception as error:  # of a damaged file the library may meet anything
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()) or type(error).__name__
         raise InputError(f"is not a readable netCDF dataset: {reason}.", Place(str(path))) from error
+
+
+def _try_elsewhere(path: Path, seconds: float) -> None:
+    """OSError where a process that reads the file dies of it, or takes longer than some seconds.
+
+    In a damaged file HDF5 may go on without end, and nothing but the end of its process stops it: a thread would keep
+    its locks, and crash the process that ends with it.
+    """
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", TRIAL, str(path)]
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, check=False, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        raise TimeoutError(f"no answer in {seconds:g} s") from None
+    if done.returncode not in (0, 1):  # 1 is that of an exception, which is met again here
+        raise OSError(f"a process that reads it crashes (exit code {done.returncode})")
 
 
 def _dimensions(columns: Sequence[Column]) -> dict[str, int]:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 from importlib.metadata import version
 
 import netCDF4
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from surfacechem.cli import commands
 from surfacechem.cli.main import app
 from surfacechem.documents import shipped as data
 
@@ -356,3 +358,24 @@ def test_a_sweep_all_of_whose_runs_stop_is_stopped(call):
     assert some.exit_code == 0
     with netCDF4.Dataset("s.nc") as file:
         assert file.status == "finished"
+
+
+@pytest.mark.parametrize("handler", [None, signal.SIG_IGN, signal.SIG_DFL, signal.default_int_handler])
+def test_signals_are_handled_afterwards_as_before(monkeypatch, handler):
+    """None stands for a handler that is not Python's: it cannot be put back, so that it is not replaced."""
+    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: handler}
+    before = dict(handlers)
+    if hasattr(signal, "SIGHUP"):
+        handlers[signal.SIGHUP] = before[signal.SIGHUP] = signal.SIG_DFL
+
+    def install(number, new):
+        assert new is not None
+        handlers[number] = new
+
+    monkeypatch.setattr(signal, "getsignal", handlers.get)
+    monkeypatch.setattr(signal, "signal", install)
+    with commands._signals_raised():
+        kept = handler in (None, signal.SIG_IGN)
+        assert handlers[signal.SIGTERM] == (handler if kept else commands._end)
+        assert handlers[signal.SIGINT] == commands._end
+    assert handlers == before

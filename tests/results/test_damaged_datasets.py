@@ -15,6 +15,7 @@ import surfacechem
 from surfacechem.cli.main import _figure
 from surfacechem.errors import InputError
 from surfacechem.plots import run as plots
+from surfacechem.results import netcdf
 from surfacechem.runs import rerun
 
 pytestmark = pytest.mark.around
@@ -47,6 +48,12 @@ def is_used_or_refused(path: Path, again: bool) -> None:
             rerun.differences(record, rerun.run_again(record))
 
 
+@pytest.mark.parametrize("which", ["run", "sweep", "study"])
+def test_datasets_that_are_whole_are_drawn_and_read(files, which):
+    _figure(plots.opened(files[which]), None, None)
+    assert rerun.read(files[which]).variables
+
+
 def damaged(data: bytes, random: Random) -> bytes:
     """The bytes of a file with some of them flipped, zero or overwritten, or cut off."""
     result, place = bytearray(data), random.randrange(len(data))
@@ -64,9 +71,8 @@ def damaged(data: bytes, random: Random) -> bytes:
 
 
 EACH = """
-import os, sys, warnings
+import faulthandler, sys, warnings
 from contextlib import suppress
-from pathlib import Path
 from surfacechem.cli.main import _figure
 from surfacechem.errors import InputError
 from surfacechem.plots import run as plots
@@ -74,31 +80,62 @@ from surfacechem.results import netcdf
 from surfacechem.runs import rerun
 
 warnings.simplefilter("ignore")
-netcdf.PATIENCE = 5.0
+netcdf._try_elsewhere = lambda path, seconds: None  # this is that process
 for name in sys.argv[1:]:
     print(name, flush=True)
+    faulthandler.dump_traceback_later(5, exit=True)
     for use in (lambda: _figure(plots.opened(name), None, None), lambda: rerun.read(name)):
-        try:
+        with suppress(InputError):
             use()
-        except InputError as error:
-            if "no answer" in str(error):  # the library keeps what it has locked
-                sys.stdout.flush()
-                os._exit(0)
 """
 """Damaged files used one after the other, each with its name, until HDF5 does not come back from one."""
 
 
 @pytest.mark.parametrize("which", ["run", "sweep", "study"])
 @pytest.mark.parametrize("count", [12, pytest.param(1000, marks=pytest.mark.slow)])
-def test_damaged_bytes(files, which, count, tmp_path):
+def test_damaged_bytes(files, which, count, tmp_path, monkeypatch):
+    monkeypatch.setattr(netcdf, "PATIENCE", 5.0)
     data, random = files[which].read_bytes(), Random(count)
     names = [str(tmp_path / f"{i}.nc") for i in range(count)]
     for name in names:
         Path(name).write_bytes(damaged(data, random))
     while names:
         done = subprocess.run([sys.executable, "-c", EACH, *names], capture_output=True, text=True, check=False)
-        assert done.returncode == 0, f"{done.stdout.split()[-1:]}: {done.stderr}"
-        names = names[len(done.stdout.split()) :]
+        used = done.stdout.split()
+        if done.returncode:
+            assert done.returncode < 0 or "Timeout" in done.stderr, f"{used[-1:]}: {done.stderr}"
+            with pytest.raises(InputError, match=r"no answer|crashes"):
+                rerun.read(used[-1])
+        names = names[len(used) :]
+
+
+LEAVING = """
+import sys
+from surfacechem.errors import InputError
+from surfacechem.results import netcdf
+from surfacechem.runs import rerun
+netcdf.PATIENCE, netcdf.TRIAL = 1.0, sys.argv[2]
+try:
+    rerun.read(sys.argv[1])
+except InputError as error:
+    sys.exit(f"refused: {error}")
+"""
+
+
+@pytest.mark.parametrize(
+    ("trial", "words"),
+    [
+        ("while True: pass", "no answer in 1"),
+        ("import os; os.abort()", "crashes"),
+        ("raise OSError", "NetCDF"),
+    ],
+)
+def test_a_process_outlives_what_reading_a_file_does_not(tmp_path, trial, words):
+    (tmp_path / "x.nc").write_bytes(b"nothing that netCDF knows")
+    command = [sys.executable, "-c", LEAVING, str(tmp_path / "x.nc"), trial]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("refused: ")) == (1, 1), done.stderr
+    assert words in done.stderr
 
 
 @pytest.mark.parametrize("departures", ['{"atol": -1.0}', '{"atol": NaN}', '{"times": [1, 0]}'])
@@ -139,7 +176,8 @@ def edited(dataset: xarray.Dataset, random: Random) -> xarray.Dataset:
 @pytest.mark.parametrize("which", ["run", "sweep", "study"])
 @pytest.mark.parametrize("count", [12, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.filterwarnings("ignore")
-def test_edited_datasets(files, which, count, tmp_path):
+def test_edited_datasets(files, which, count, tmp_path, monkeypatch):
+    monkeypatch.setattr(netcdf, "_try_elsewhere", lambda path, seconds: None)  # the files themselves are sound
     whole, random = xarray.open_dataset(files[which]).load(), Random(count)
     for i in range(count):
         dataset = whole.copy(deep=True)

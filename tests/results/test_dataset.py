@@ -13,7 +13,7 @@ from case_runs import solved
 import surfacechem
 from surfacechem.errors import InputError, OutputError
 from surfacechem.format import names
-from surfacechem.results.netcdf import cf_unit, write_netcdf
+from surfacechem.results.netcdf import Column, cf_unit, replacing, write_netcdf
 
 pytestmark = pytest.mark.around
 
@@ -170,6 +170,15 @@ def test_where_there_is_no_room_at_all_nothing_stays_behind(solution, tmp_path, 
     with pytest.raises(OutputError, match="There is no room in"):
         solution.write(tmp_path / "out.nc")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_only_errors_of_writing_are_told_as_such(tmp_path):
+    with pytest.raises(RuntimeError, match="of the figure"), replacing(tmp_path / "out.png"):
+        raise RuntimeError("of the figure")
+    assert list(tmp_path.iterdir()) == []
+    twice = [Column("T", ("time",), np.zeros(3), "K", "temperature")] * 2
+    with pytest.raises(OSError, match="name"):  # of which the library makes a RuntimeError
+        write_netcdf(tmp_path / "out.nc", twice, {})
 
 
 @pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
