@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Self
@@ -12,6 +13,11 @@ MANY = 100
 
 LONGEST = 2000
 """Characters of a message: a hundred names and a sentence."""
+
+LIKE = 0.6
+"""Part of two names that is the same, above which one is a guess for the other: a choice, that of `difflib`."""
+
+SUFFIX = re.compile(r"\.(ya?ml|nc|csv)$")
 
 
 @dataclass(frozen=True)
@@ -79,8 +85,21 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it."""
-    names = sorted(map(str, known))
-    close = difflib.get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=0.6)
-    guess = next((n for n in names if close and n.lower() == close[0]), None)
-    return f" Did you mean '{guess}'?" if guess else ""
+    """``" Did you mean 'x'?"`` for a name that is not among the known ones, nothing where none of them is like it.
+
+    What the names of files end with counts only where all else is the same. A name that has the words of the other
+    among its own is nearer than its spelling says.
+
+    >>> nearest("cluster", ["bouncing-plate", "adhesion-cluster-held"]), nearest("debonding.yml", ["ends.yaml"])
+    (" Did you mean 'adhesion-cluster-held'?", '')
+    """
+
+    def likeness(other: str) -> tuple[float, float]:
+        one, two = (SUFFIX.sub("", text.lower()) for text in (name[:LONGEST], other))
+        words = [word for word in re.split(r"[^a-z0-9]+", one) if word]
+        inside = bool(words) and all(re.search(rf"(?<![a-z0-9]){word}", two) for word in words)
+        same = difflib.SequenceMatcher(None, two, one).ratio()
+        return (1 + same) / 2 if inside else same, difflib.SequenceMatcher(None, other, name[:LONGEST]).ratio()
+
+    guess = max(sorted(map(str, known)), key=likeness, default="")
+    return f" Did you mean '{guess}'?" if guess and likeness(guess)[0] >= LIKE else ""

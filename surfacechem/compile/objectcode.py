@@ -59,22 +59,15 @@ def keep(kernel: Any, folder: Path) -> None:
     except RuntimeError:
         return  # the kernel came from the cache, and its code with it
     data = sealed(made.fndesc.llvm_func_name.encode() + b"\n" + code)
-    with suppress(OSError, subprocess.SubprocessError):
-        if _is_loaded_elsewhere(data, folder):
+    with suppress(OSError, subprocess.SubprocessError), tempfile.TemporaryDirectory(dir=folder) as trial:
+        keep_file(Path(trial) / FILE, data)
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        command = [sys.executable, "-c", PROOF, trial]
+        done = subprocess.run(command, env=environment, capture_output=True, timeout=LONGEST)
+        if done.returncode == 0:
             keep_file(folder / FILE, data)
         else:
             (folder / FILE).unlink(missing_ok=True)  # a damaged one
-
-
-def _is_loaded_elsewhere(data: bytes, folder: Path) -> bool:
-    """Whether another process can load the code: LLVM ends the process in which it cannot."""
-    with tempfile.TemporaryDirectory(dir=folder) as trial:
-        keep_file(Path(trial) / FILE, data)
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        done = subprocess.run(
-            [sys.executable, "-c", PROOF, trial], env=environment, capture_output=True, timeout=LONGEST
-        )
-    return done.returncode == 0
 
 
 def load(folder: Path) -> Callable[..., None] | None:

@@ -132,8 +132,8 @@ def _find(name: str) -> tuple[Path, str]:
             return path, name
         if path.is_symlink():
             raise InputError(f"is a link to {path.readlink()}, where no file is.", Place(name))
-        beside = [file.name for file in path.parent.glob("*.yaml")]
-    guess = nearest(path.name, beside) or nearest(path.stem, [*names(), *beside])
+        beside = [file.name for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")]
+    guess = nearest(path.name, [*names(), *beside])
     raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
 
 

@@ -57,9 +57,19 @@ SIGNS = {
     "propto": "∝",
     "ll": "≪",
     "gg": "≫",
+    "ne": "≠",
+    "langle": "⟨",
+    "rangle": "⟩",
+    "ell": "ℓ",
+    "Lambda": "Λ",
+    "Phi": "Φ",
 }
 """LaTeX commands with one character; function names keep their letters."""
 
+FUNCTIONS = r"(?:ln|exp|sin|cos|min|max)"
+
+FORMULA = re.compile(r"\.\. math::((?:.*\n)(?:[ \t]+.*\n?)*)")
+ROLE = re.compile(r":math:`([^`]*)`")
 
 ONE = r"\s*(?:\{\s*(\w)\s*\}|(\w))"
 """The argument of an accent: one letter, in braces or not."""
@@ -71,27 +81,31 @@ def plain(latex: str) -> str:
     >>> plain(chr(92) + "dot" + chr(92) + "phi = -" + chr(92) + "frac{M}{N_c}")
     'dφ/dt = -M/N_c'
     """
-    text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!;]|&", " ", latex))
+    text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!; ]|&", " ", latex))
+    text = re.sub(r"(?<=\w)(?=\\)", " ", text)
     text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGNS.get(m[1], m[0]), text)
     text = re.sub(rf"\\dot{ONE}", r"d\1\2/dt ", text)
     text = re.sub(rf"\\bar{ONE}", r"\1\2_mean ", text)
     text = re.sub(rf"\\hat{ONE}", r"\1\2_max ", text)
     text = re.sub(r"\\(?:text|mathrm|operatorname)\s*\{([^{}]*)\}", r"\1", text)
+    text = re.sub(rf"\\({FUNCTIONS})\b\s*(?=\w)", r"\1 ", text)
+    text = re.sub(rf"\\({FUNCTIONS})\b", r"\1", text)
     while (reduced := _unnested(text)) != text:
         text = reduced
     text = re.sub(r"\\([a-zA-Z]+)", r"\1", text).replace("\\{", "(").replace("\\}", ")")
-    text = re.sub(r"\s+([,)\]])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text.replace("\\ ", " ")))
-    return re.sub(r"([(\[/]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
+    text = re.sub(r"\s+([,)\]⟩])|\s*(\0)\s*", r"\1\2", re.sub(r"\s+", " ", text))
+    return re.sub(r"([(\[/⟨]) ", r"\1", text.replace(" /", "/")).replace("\0", "  ").strip()
 
 
 def _unnested(text: str) -> str:
     """The innermost fractions, roots, powers and subscripts without their braces."""
     inner = r"\s*\{([^{}\\]*)\}"
     either = r"\s*(?:\{([^{}\\]*)\}|(\w))"
+    text = re.sub(rf"({FUNCTIONS}\s*)\\[dt]?frac{either}{either}", r"\1(\\frac{\2\3}{\4\5})", text)
     text = re.sub(rf"\\[dt]?frac{either}{either}", lambda m: f"{_atom(m[1] or m[2])}/{_atom(m[3] or m[4])} ", text)
-    text = re.sub(rf"\\sqrt{inner}", r"sqrt(\1)", text)
+    text = re.sub(rf"\\sqrt{either}", r"sqrt(\1\2)", text)
     text = re.sub(rf"\^{inner}", lambda m: f"^{_atom(m[1])}", text)
-    return re.sub(rf"_{inner}", r"_\1", text)
+    return re.sub(rf"_{inner}", lambda m: f"_({m[1]})" if " " in m[1].strip() else f"_{m[1]}", text)
 
 
 def _atom(text: str) -> str:
@@ -129,9 +143,7 @@ def _first_line(kind: type) -> str:
 
 def formulas(law: type[Law]) -> list[str]:
     """The formulas of a law's docstring as text."""
-    doc = inspect.getdoc(law) or ""
-    blocks = re.findall(r"\.\. math::((?:.*\n)(?:[ \t]+.*\n?)*)", doc + "\n")
-    return [plain(" ".join(block.split())) for block in blocks]
+    return [plain(" ".join(block.split())) for block in FORMULA.findall(f"{inspect.getdoc(law)}\n")]
 
 
 def parameters(law: type[Law]) -> Iterator[str]:
@@ -149,7 +161,7 @@ def source(law: type[Law]) -> str:
     """Where a law comes from, as its docstring says."""
     found = re.search(r"Source: (.*?)(?:\n\n|\Z)", inspect.getdoc(law) or "", re.DOTALL)
     text = " ".join(found[1].split()) if found else "not stated"
-    return re.sub(r":math:`([^`]*)`", lambda m: plain(m[1]), text)
+    return ROLE.sub(lambda m: plain(m[1]), text)
 
 
 def law_page(name: str) -> str:
@@ -162,10 +174,11 @@ def law_page(name: str) -> str:
 
 
 def _page(contract: type[Law], law: type[Law]) -> str:
-    doc = inspect.getdoc(law) or ""
+    doc = FORMULA.sub(lambda m: f"    {plain(' '.join(m[1].split()))}\n", f"{inspect.getdoc(law)}\n")
     lines = [f"  {line}" for line in parameters(law)]
     listed = "\n".join(lines) if lines else "  none"
-    return f"{law.name()} ({contract.contract})\n\n{textwrap.indent(doc, '  ')}\n\nParameters\n{listed}"
+    text = textwrap.indent(ROLE.sub(lambda m: plain(m[1]), doc).rstrip(), "  ")
+    return f"{law.name()} ({contract.contract})\n\n{text}\n\nParameters\n{listed}"
 
 
 def case_table() -> str:

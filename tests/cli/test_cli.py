@@ -1,5 +1,6 @@
 """Every command in-process: what it prints, what it writes, how it ends."""
 
+import inspect
 import json
 import re
 import signal
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 from surfacechem.cli import commands
 from surfacechem.cli.main import app
 from surfacechem.documents import shipped as data
+from surfacechem.runs import listing
 
 pytestmark = pytest.mark.around
 
@@ -239,6 +241,18 @@ class TestListings:
         assert text.startswith("coulomb (friction)\n")
         assert "Amontons-Coulomb dry friction." in text
         assert "mu [1]: sliding friction coefficient, >= 0" in text
+
+    def test_formulas_have_no_words_of_latex(self, call):
+        """Of the commands of a formula only names of functions and text stay words."""
+        from surfacechem.laws import FAMILIES, laws
+
+        for law in (law for contract in FAMILIES for law in laws(contract).values()):
+            text = call("laws", law.name()).stdout
+            assert not re.search(r"\\|:math|\.\. math|[{}]", text.partition(">>>")[0]), text
+            commands = set(re.findall(r"\\([A-Za-z]{2,})", inspect.getdoc(law) or ""))
+            layout = "|".join(commands - {"ln", "exp", "sin", "cos", "min", "max", "sqrt"})
+            formulas = " ".join(listing.formulas(law))
+            assert not (layout and re.search(rf"(?<![A-Za-z])(?:{layout})(?![A-Za-z])", formulas)), formulas
 
     def test_schema_is_json(self, call):
         assert json.loads(call("schema").stdout)["type"] == "object"

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from surfacechem.documents import document
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, nearest
 from surfacechem.format import load, load_text
 
 GOOD = """\
@@ -90,7 +90,7 @@ MISTAKES = [
     (
         "loading: {v:",
         "loading: {w:",
-        "17: loading: unknown key 'w'. Known: F_n, F_t, F_t2, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t, p, phi, t_n, u_t, v,",
+        "17: loading: unknown key 'w'. Did you mean 'w_n'? Known: F_n, F_t, F_t2, J_c, Q_1, Q_2, Q_c, T, f, g_n, g_t",
     ),
     ("v: 0.1 m/s", "v: 0.1 m", "17: loading.v: 0.1 m is a length; v needs a velocity [m/s]."),
     ("v: 0.1 m/s", "g_n: 5 nm/s", "g_n needs a length [m]. To change it in time, write `{ramp: {rate: 5 nm/s}}`."),
@@ -112,7 +112,11 @@ MISTAKES = [
     ("{until: 5 s}", "{until: 5 s, outputs: 1}", "19: run.outputs: outputs = 1 is outside its range: >= 2"),
     ("{until: 5 s}", "{until: 5 s, outputs: 2.5}", "19: run.outputs: outputs must be a whole number, got 2.5."),
     ("{until: 5 s}", "{until: 5 s, outputs: 1e99}", "19: run.outputs: outputs = 1e+99 is outside its range: >= 2 an"),
-    ("{until: 5 s}", "{until: 5 s, spacing: log}", "19: run.spacing: no spacing 'log'. Known: linear, logarithmic."),
+    (
+        "{until: 5 s}",
+        "{until: 5 s, spacing: log}",
+        "19: run.spacing: no spacing 'log'. Did you mean 'logarithmic'? Known: linear, logarithmic.",
+    ),
     ("{until: 5 s}", "{until: 5 s, spacing: logarithmic}", "19: run.spacing: logarithmic spacing needs `first`"),
     ("{until: 5 s}", "{until: 5 s, first: 1}", "19: run.first: `first` belongs to `spacing: logarithmic`."),
     ("{until: 5 s}", "{until: 5 s, times: [1]}", "19: run.until: the output times have two roles: give `times` or `u"),
@@ -242,6 +246,23 @@ def test_a_file_beside_is_the_nearest_guess(tmp_path):
         load(tmp_path / "pull.yaml")
     with pytest.raises(InputError, match=r"exotermic\.yaml'\. Did you mean 'exothermic'\?"):
         load(tmp_path / "exotermic.yaml")
+
+
+def test_suffixes_make_no_names_alike(tmp_path):
+    (tmp_path / "ends.yaml").write_text(GOOD)
+    with pytest.raises(InputError, match=r"debonding\.yml'\. Did you mean 'debonding'\?"):
+        load(tmp_path / "debonding.yml")
+    with pytest.raises(InputError, match=r"end\.yml'\. Did you mean 'ends\.yaml'\?"):
+        load(tmp_path / "end.yml")
+    (tmp_path / "debonding.yaml").write_text(GOOD)
+    with pytest.raises(InputError, match=r"debonding\.yml'\. Did you mean 'debonding\.yaml'\?"):
+        load(tmp_path / "debonding.yml")
+
+
+@pytest.mark.parametrize(("part", "whole"), [("lennard", "lennard-jones"), ("cluster", "adhesion-cluster-held")])
+def test_a_word_of_a_name_is_near(part, whole):
+    known = [whole, "bouncing-plate", "coulomb", "mass-action", "elastic-bonds-at-a-gap"]
+    assert nearest(part, known) == f" Did you mean '{whole}'?"
 
 
 def test_a_folder_is_no_case(tmp_path):
