@@ -169,8 +169,9 @@ class Jumper:
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
     def _made(self, rows: Array, item: Transition, start: Point, energy: float) -> Array:
-        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1): friction last.
+        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
 
+        Friction is last, with the bonds that it breaks.
         The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
         the normal gap is where it goes to.
         """
@@ -181,7 +182,8 @@ class Jumper:
             return makers.index(axis if axis in makers and item.sinks != "snap" else INTERFACE)
 
         level = self._energy(start.inputs())[0]
-        made[:, maker("n" if item.sinks == "joint" else INTERFACE)] += energy - level
+        first = -1 if item.sinks == "local" else maker("n" if item.sinks == "joint" else INTERFACE)
+        made[:, first] += energy - level
         here = np.repeat(start.inputs()[None], len(rows), axis=0)
         here[:, 1 + 2 * len(start.y) :] = rows[:, 1 + 2 * len(start.y) :]
         for axis, columns in self._stages:
@@ -334,9 +336,10 @@ class Jumper:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
         if step is None or after is None or item.sinks == "snap" or not self._load_path.slides(start, after):
             return None
-        rubbed = float(self._made(after.inputs()[None], item, start, energy)[0, -1])
+        made = float(self._made(after.inputs()[None], item, start, energy)[0, -1])
+        broken = energy - float(self._energy(start.inputs())[0]) if item.sinks == "local" else 0.0
         small = self._rounding(after, energy)
-        return self._load_path.shares(step, start, after, rtol * rubbed + small) if rubbed > small else None
+        return self._load_path.shares(step, start, after, broken, rtol * made + small) if made > small else None
 
     def _beyond(self, item: Transition, after: Point | None) -> str:
         """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""

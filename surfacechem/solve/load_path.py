@@ -188,9 +188,10 @@ class LoadPath:
         slip = self.equilibria.slip
         return slip is not None and self.varies and bool(after.parameters[slip])
 
-    def shares(self, step: LoadStep, start: Point, after: Point, small: float) -> Array | None:
+    def shares(self, step: LoadStep, start: Point, after: Point, broken: float, small: float) -> Array | None:
         """The shares of the heat of friction of a jump, shape (nodes,), but for heat that is ``small``.
 
+        It begins with that of bonds that are ``broken`` as sliding begins.
         What slides is at each place at the first part of the way of the loads at which it is pushed on there, warmed
         by what it has rubbed so far, and all else is in equilibrium at that part.
         """
@@ -226,7 +227,7 @@ class LoadPath:
         level = after.inputs()
         level[self.moved] = start.inputs()[self.moved]
         begun, begin, shares = moment(0.0, step.reached, np.zeros(len(self.heat.nodes)))
-        at_once = (float(self.energy(level)[0]) - begin) * shares
+        at_once = (broken + float(self.energy(level)[0]) - begin) * shares
         reached = {0.0: begun}  # at the ends of panels: where sliding eases it runs on at the part it has begun at
 
         def moments(places: Array, taken: Array) -> tuple[Array, Array]:

@@ -247,6 +247,23 @@ def test_friction_heats_by_what_touches_until_a_jump_has_opened_the_gap(load):
     assert abs(excess["T_1"]) < 0.01
 
 
+def test_bonds_that_sliding_breaks_take_their_heat_as_it_begins():
+    """They break where the falling pressure lets go of them, and what conducts then is not what does at its end."""
+
+    def case(jump):
+        given = pressing("spots", "rigid", "p", 0.4, "", jump)
+        bonds = "  sites: 1e18\n  bonding: [linear-affinity: {c_r: 1}]\n  potential: [bond-energy: {K_0: 30}]\n"
+        given = given.replace("  temperature: T_c\n", f"  temperature: T_c\n{bonds}").replace(
+            "T_1: 300", "phi: 1, T_1: 300"
+        )
+        return given.replace("coulomb: {mu: 0.5}", "bonded-coulomb: {mu: 0.3, mu_b: 0.5, mu_ub: 0.3}")
+
+    jumped = solved(case(0))
+    assert [jump.transition.name for jump in jumped.trajectory.jumps] == ["slip forward"]
+    found, limit = temperatures(jumped), limit_of_ramps(case)
+    same({name: found[name] for name in ("T_1", "T_2")}, {name: limit[name] for name in ("T_1", "T_2")}, 1e-9)
+
+
 def weakening(case, of):
     return case.replace("mu: 0.5", f"mu: {{value: 0.5, times: [power: {{of: {of}, exponent: -40}}]}}")
 
