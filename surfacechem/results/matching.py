@@ -40,7 +40,9 @@ PROBES = 7
 """Times at which the equations are tested; as many stretches between events, where there are so many."""
 
 STEEPER = 10.0
-"""A solution jumps where it changes by so many times as much as over an equal time before."""
+"""A solution jumps where it changes by so many times as much as over an equal time before. What is smooth changes as
+much, a power p of the time left 1/(2^p - 1) times as much: 2.4 times for a root. Ten, that of p = 1/7, is a choice; a
+smaller jump is taken for a change, and what is beyond it counts as an error."""
 
 EDGE = 0.01
 """Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""

@@ -26,9 +26,13 @@ RTOL, BEGINS = 1e-4, 1e-3
 STEPS = 20_000
 """Steps after which motion does not come to rest."""
 
-NUDGE, KICK = 1e-7, 1e-6
-"""Parts of a gap: by which it is moved to see how its balance changes, half the digits; and with which motion begins
-from an unstable balance at least, so that the change is seen there."""
+NUDGE = float(np.finfo(float).eps) ** (1 / 3)
+"""Part of a gap by which it is moved either way to see how its balance changes: the error of a central difference,
+NUDGE^2 of its curvature and a rounding over NUDGE, is then the least, two thirds of the digits."""
+
+KICK = 10 * NUDGE
+"""Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
+back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
 
 NEAR, NEWTON = 1e-3, 12
 """Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""

@@ -46,7 +46,9 @@ AT_ONCE = 12
 """Transitions at one moment from which on they are chatter."""
 
 SHARPENED = 1e-9
-"""Part of a run after which the largest margins seen may be forgotten again."""
+"""Part of a run after which the largest margins seen may be forgotten again: a choice, far above the rounding of time
+and far below what is of interest. What follows itself without end within it is chatter even where it would calm down.
+"""
 
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 

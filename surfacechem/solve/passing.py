@@ -24,7 +24,8 @@ COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)
 
 GRID, PARTS_OF_A_PERIOD = 64, 8
 """Parts of a run in each of which a given variable is taken to turn at most once, and of the period of one that repeats
-itself."""
+itself, where a sine turns once in four of them. A choice: what turns twice within a part is not found, and more parts
+cost evaluations of what depends on time alone."""
 
 ENOUGH = 10
 """Parts of periods for each step allowed: two a period end a step, so that the steps are used up before the parts."""

@@ -40,7 +40,10 @@ DEFAULT_RTOL = 1e-11
 """Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
 
 SAMPLES, CLOSER = 60.0, 7.3
-"""Looks at the equations in a run, and how many times more in the second one, which must not share its blindness."""
+"""Looks at the equations in a run, and how many times more in the second one, which must not share its blindness.
+Choices: a look costs an evaluation, and 7.3 is no whole number, so that the looks of the two fall on different times.
+What both miss lasts less than 1/438 of the run, which every estimate says.
+"""
 
 OWN = "radau"
 """The method of this package."""

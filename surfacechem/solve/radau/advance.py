@@ -250,14 +250,17 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
 
 FAR = 3.0
 """Errors in units of what a step may have at its start, beyond which it has not seen what is there: between the stages
-the polynomial is somewhat worse than at the ends.
+the polynomial is somewhat worse than at the ends. A choice: less refuses steps that are right, more passes over what
+changes the state by so many tolerances.
 """
 
 DECADES = 10
 """Points at which what lies beside the end of a segment is looked at, each ten times nearer than the one before."""
 
 BRIEF = 1e-2
-"""Part of the spacing below which a step is taken to see what is there."""
+"""Part of the spacing below which a step is taken to see what is there: a choice that saves the clock. Its stages lie
+closer together than that; what is narrower still is passed over, as it is by a look at each spacing.
+"""
 
 
 @compiled

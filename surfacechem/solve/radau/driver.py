@@ -60,7 +60,9 @@ PATIENCE = 40
 not end a run.
 """
 FEWEST = 4
-"""Points of a segment at which its steps are held against the equations, however short it is."""
+"""Points of a segment at which its steps are held against the equations, however short it is: a choice. Each costs an
+evaluation in every segment; what lasts less than a fourth of a segment may be missed.
+"""
 SAME = 1e-12
 """Difference of times, relative to time, that makes no second event of a kink."""
 SHORTEST = 1e-10

@@ -25,7 +25,8 @@ STEPS = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
 """Relative steps of the data, from 1e-6 to 16 roundings."""
 
 STRAIGHT = 0.1
-"""Relative change of a slope from one step to the next, below which it is one."""
+"""Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
+to one digit. Less would ask for shorter steps, in whose slopes there is more rounding."""
 
 
 def condition(problem: Problem, names: Collection[str]) -> float:
