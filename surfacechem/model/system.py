@@ -153,6 +153,8 @@ class Margin:
     """Whether a law ends there, so that no equilibrium lies beyond."""
     below: tuple[Expression, str] | None = None
     """An expression, and the reason where it is below zero as the margin closes."""
+    bound: tuple[str, float] | None = None
+    """The state whose bound it is, and the bound."""
 
 
 @dataclass(frozen=True)

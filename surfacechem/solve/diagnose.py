@@ -12,6 +12,7 @@ from surfacechem.compile.program import Program
 from surfacechem.model.system import STABLE, Margin, State, System
 from surfacechem.solve.contract import REASONS, Points, Result, Status
 from surfacechem.solve.pacing import too_fast
+from surfacechem.solve.radau.solver import consistent
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,10 @@ BOUNDLESS = 1e12
 
 SMALL = 1e-6
 """Size of a state that is none, in units of its scale."""
+
+ROUNDED = (
+    "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there"
+)
 
 
 def cause(
@@ -58,6 +63,22 @@ def cause(
     if (fast := runaway(system.states, result)) is not None:
         return "stopped", f"{fast} near {where}"
     return "failed", f"{REASONS[result.status]} at {where}{too_fast(system, result, values)}"
+
+
+def is_led_back(system: System, program: Program, margin: Margin, result: Result) -> bool:
+    """Whether the rates at the bound of a bonding variable lead back, so that rounding has carried it beyond."""
+    names, bonds = [state.name for state in system.states], {a.law for a in system.ledger if a.kind == "bonds"}
+    if margin.bound is None or margin.bound[0] not in names:
+        return False
+    (name, limit), y = margin.bound, result.y.copy()
+    for j, other in enumerate(names):
+        if other in bonds:  # where one kind of bonds has all sites there is no other
+            y[j] = max(y[j], 0.0) if limit == 0 else 0.0
+    j = names.index(name)
+    y[j] = limit
+    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
+    found = consistent(program, result.t, y, np.zeros_like(y), parameters)
+    return bool(found.valid and (found.ydot[j] >= 0 if limit == 0 else found.ydot[j] <= 0))
 
 
 def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:

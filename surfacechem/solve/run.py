@@ -22,7 +22,7 @@ from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.adapters.rates import output_rates
 from surfacechem.solve.contract import Problem, Result, Solver, Status
-from surfacechem.solve.diagnose import cause
+from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Hybrid
 from surfacechem.solve.jumps import Jump, Jumper
@@ -379,6 +379,8 @@ class Model:
             return "finished", f"reached the end at {where}"
         if result.status is Status.EVENT:
             margin, fit = self.margins[int(result.events.index[-1])], self.system.fit
+            if is_led_back(self.system, self.program, margin, result):
+                return "failed", f"{margin.reason} at {where}: {ROUNDED}"
             fitted = fit is not None and margin.name == fit.margin
             if fit and fitted:
                 why = fit.reason(values, self._visited(result, fit.temperature)[-1])

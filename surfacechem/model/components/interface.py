@@ -146,8 +146,9 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     slack = build.variables.get("slack", "the bounds")
     spec = Spec("1", f"upper bound of {name}")
     top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)
-    build.margins.append(Margin(f"{name} >= 0", symbol + slack, f"{name} fell below its bound 0"))
-    build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, f"{name} rose above its bound {limit:g}"))
+    below, above = f"{name} fell below its bound 0", f"{name} rose above its bound {limit:g}"
+    build.margins.append(Margin(f"{name} >= 0", symbol + slack, below, bound=(name, 0.0)))
+    build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
 
 
 def free_energy(build: Build) -> None:
