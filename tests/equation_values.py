@@ -35,7 +35,7 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
         ("margin", ((margin.name, margin.expression) for margin in system.margins)),
         ("residual", ((e.state, e.residual) for e in system.equilibria)),
         ("size", ((e.state, e.size) for e in system.equilibria)),
-        ("transition", ((transition.name, transition.margin) for transition in system.transitions)),
+        ("transition", ((transition.name, transition.guard) for transition in system.transitions)),
         ("start of mode", ((m.name, m.start) for m in system.modes if m.start is not None)),
         ("given", system.given.items()),
     ):

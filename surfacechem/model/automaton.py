@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from surfacechem.expressions import Expression
+import symengine
+
+from surfacechem.expressions import Expression, where
 
 SIDE = "mode.side"
 """Path of the mode that says on which side of touch the gap is."""
@@ -57,7 +59,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Transition:
-    """Something that must stay positive in the present modes; where it reaches zero, modes and state jump.
+    """A guard that must stay positive while the modes are those of ``when``; at its zero, modes and state jump.
 
     ``modes`` and ``jump`` give new values as expressions of the old state. Then the gaps in ``settles`` find the next
     equilibrium, and the energy that this releases is heat where ``sinks`` says.
@@ -88,6 +90,16 @@ class Transition:
     """Time in which it may happen again [s], zero where that is open: its margin begins anew at an exact zero."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
+    when: Mapping[Any, Collection[int]] = field(default_factory=dict)
+    """Values of modes, by their symbols, in which it is in play; in any value of the others."""
+
+    @property
+    def guard(self) -> Expression:
+        """The margin while it is in play, else 1."""
+        guard = self.margin
+        for mode, values in self.when.items():
+            guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
+        return guard
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ class Jumper:
 
     @cached_property
     def _moving_margins(self) -> list[Expression]:
-        return [self.system.expand(item.margin) for item in self.system.transitions]
+        return [self.system.expand(item.guard) for item in self.system.transitions]
 
     @cached_property
     def margins_read_rates(self) -> bool:

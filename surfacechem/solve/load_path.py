@@ -167,7 +167,7 @@ class LoadPath:
     @cached_property
     def _margins(self) -> Function:
         return compile_function(
-            self.system.inputs, [self.system.expand(item.margin) for item in self.system.transitions]
+            self.system.inputs, [self.system.expand(item.guard) for item in self.system.transitions]
         )
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:

@@ -197,7 +197,7 @@ class Model:
             inputs[2 * n + 1 :],
             system.local(list(system.rows.values())),
             system.local([account.rate for account in system.ledger]),
-            system.local([m.expression for m in self.margins] + [m.margin for m in system.transitions]),
+            system.local([m.expression for m in self.margins] + [m.guard for m in system.transitions]),
             filler=self._filler(inputs),
             chains=[Chain(*chain) for chain in system.chains],
             groups=[GROUPS.get(account.kind, -1) for account in system.ledger],

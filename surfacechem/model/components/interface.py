@@ -281,10 +281,20 @@ def _sides_of_touch(build: Build) -> None:
     start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
-        margin = where(value * side > 0, value * g, 1)
         other = {side: symengine.Integer(-value)}
         bears = rests and name == "release"
-        build.transitions.append(Transition(name, margin, reason, other, settles=True, to_pass=bears, measure="g_n"))
+        build.transitions.append(
+            Transition(
+                name,
+                value * g,
+                reason,
+                other,
+                settles=True,
+                to_pass=bears,
+                measure="g_n",
+                when={side: (value,)},
+            )
+        )
 
 
 def _by_side(g: Any) -> dict[Any, Any]:

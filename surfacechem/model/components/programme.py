@@ -90,7 +90,7 @@ def stage_ends(build: Build) -> None:
         if item.duration is not None:
             spec = Spec("s", f"length of the stage {item.name}", above=0)
             length = build.parameters.add("length", f"{_path(item)}.for", spec, item.duration)
-            _stage_end(build, item, where(_during(stage, i), begun + length - build.t, 1), advance)
+            _stage_end(build, item, begun + length - build.t, advance, {stage: (i,)})
         elif item.event:
             _at_event(build, item, stage, i, begun)
         elif item.variable:
@@ -101,9 +101,15 @@ def _path(item: Stage) -> str:
     return f"programme.{item.name}"
 
 
-def _stage_end(build: Build, item: Stage, margin: Expression, advance: dict[Expression, Expression]) -> None:
+def _stage_end(
+    build: Build,
+    item: Stage,
+    margin: Expression,
+    advance: dict[Expression, Expression],
+    during: dict[Expression, tuple[int]],
+) -> None:
     reason = f"the stage {item.name} ends"
-    build.transitions.append(Transition(f"end of {item.name}", margin, reason, advance, passes=True))
+    build.transitions.append(Transition(f"end of {item.name}", margin, reason, advance, passes=True, when=during))
 
 
 def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
@@ -114,7 +120,7 @@ def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dic
     name = f"{item.variable}_end" if traction else item.variable
     value = build.parameters.add(name, path, spec, item.value)
     sign = symengine.Integer(1 if item.rising else -1)
-    _stage_end(build, item, where(_during(stage, i), sign * (value - x), 1), advance)
+    _stage_end(build, item, sign * (value - x), advance, {stage: (i,)})
 
 
 def _variable(build: Build, item: Stage) -> Expression:

@@ -101,17 +101,18 @@ def _read(build: Build, expression: Expression) -> set[str]:
 
 def _hold(build: Build, held: Expression, bound: Bound) -> None:
     # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
-    margin = where(held**2 > 0, 1, where(bound.beyond > 0, bound.gap, 1))
+    margin = where(bound.beyond > 0, bound.gap, 1)
     name, reason, *_ = bound.words
     modes, jump = {held: symengine.Integer(bound.side)}, {symengine.Symbol("phi"): bound.value}
-    build.transitions.append(Transition(name, margin, reason, modes, jump, measure="phi"))
+    build.transitions.append(Transition(name, margin, reason, modes, jump, measure="phi", when={held: (0,)}))
 
 
 def _let_go(build: Build, held: Expression, bound: Bound) -> None:
     density = build.bonding["phi"].density
-    turned = where(bound.side * held > 0, build.stretch * bound.beyond / density, 1)
+    turned = build.stretch * bound.beyond / density
     *_, name, reason = bound.words
-    build.transitions.append(Transition(name, turned, reason, {held: symengine.Integer(0)}))
+    free = {held: symengine.Integer(0)}
+    build.transitions.append(Transition(name, turned, reason, free, when={held: (bound.side,)}))
 
 
 def released(build: Build) -> None:

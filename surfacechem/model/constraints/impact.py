@@ -55,9 +55,10 @@ def impacts(build: Build) -> None:
         return
     mount = held(build, "n")
     assert mount is not None
-    margin, shut = where(closed > 0, 1, G), {G: NONE}
+    shut, apart = {G: NONE}, {closed: (0,)}
     if not mount.inertial:
-        build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals, shut, settles=True))
+        closes = Transition("touch", G, "the gap closes", build.motion.heals, shut, settles=True, when=apart)
+        build.transitions.append(closes)
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
@@ -68,19 +69,21 @@ def impacts(build: Build) -> None:
     build.transitions[:0] = [
         Transition(
             "impact",
-            margin,
+            G,
             "the bodies hit each other",
             {landed: rests, **modes, **rubs.begins},
             {**shut, V: where(rests > 0, NONE, far.e * speed)},
             returns=where(pressing > 0, 2 * V / pressing, NONE),
+            when=apart,
         ),
         *rubs.transitions,
         Transition(
             "rest",
-            where(landed > 0, -1, 1),
+            -ONE,
             "the bodies rest on each other",
             {landed: NONE, **build.motion.heals},
             settles=True,
+            when={landed: (1,)},
         ),
     ]
 

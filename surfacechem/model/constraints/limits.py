@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import symengine
@@ -49,20 +50,21 @@ def limits(build: Build) -> None:
         return
     if not build.interface.limits:
         t_n = build.variables.get("t_n", "the rigid interface", "interface")
-        _opening(build, where(closed > 0, -t_n, 1), closed)
+        _opening(build, -t_n, closed, {closed: (1,)})
     build.motion.heals = {closed: symengine.Integer(1), **again}
     gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
-        margin = where(closed > 0, 1, gap)
-        build.transitions.append(Transition("touch", margin, "the gap closes", build.motion.heals))
+        build.transitions.append(Transition("touch", gap, "the gap closes", build.motion.heals, when={closed: (0,)}))
 
 
-def _opening(build: Build, margin: Expression, closed: Expression) -> None:
+def _opening(build: Build, margin: Expression, closed: Expression, when: Mapping[Expression, tuple[int]]) -> None:
     """A rigid interface without bonds opens under tension."""
     modes = {closed: symengine.Integer(0)}
     # A pull that only touches zero does not part bodies that have inertia.
     to_pass = any(state.name == "v_n" for state in build.states)
-    build.transitions.append(Transition("open", margin, "the interface opens", modes, settles=True, to_pass=to_pass))
+    build.transitions.append(
+        Transition("open", margin, "the interface opens", modes, settles=True, to_pass=to_pass, when=when)
+    )
 
 
 def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
@@ -70,8 +72,9 @@ def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
     if not again or "g_n" not in build.motion.gap_rates:
         return
     (bonded,) = again
-    margin = where(bonded > 0, 1, build.variables.get("g_n", "the limit", "interface"))
-    build.transitions.append(Transition("rejoin", margin, "the gap closes, so that bonds can hold again", again))
+    gap = build.variables.get("g_n", "the limit", "interface")
+    reason = "the gap closes, so that bonds can hold again"
+    build.transitions.append(Transition("rejoin", gap, reason, again, when={bonded: (0,)}))
 
 
 def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
@@ -84,22 +87,25 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
     # Closed again, a rigid interface that has debonded bears pressure only.
     holds = bonded if closed is None else closed
     strength = strength if closed is None else bonded * strength
-    margin, modes = where(holds > 0, strength - t_n, 1), [mode for mode in (bonded, closed) if mode is not None]
+    modes = [mode for mode in (bonded, closed) if mode is not None]
+    when = {holds: (1,)}
     if closed is not None and law.release == "local":
-        margin, modes = where(holds > 0, where(bonded > 0, strength - t_n, 1), 1), [bonded]
-        _opening(build, where(holds > 0, where(bonded > 0, 1, -t_n), 1), closed)
+        modes = [bonded]
+        when = {bonded: (1,), closed: (1,)}
+        _opening(build, -t_n, closed, {bonded: (0,), closed: (1,)})
     breaks = broken(build, law, law.breaks)
     _refuse_idle(build, law, {*modes, *breaks})
     build.transitions.append(
         Transition(
             "debond",
-            margin,
+            strength - t_n,
             OPEN,
             dict.fromkeys(modes, none),
             breaks,
             settles=True,
             sinks=law.release,
             violation=law.violation,
+            when=when,
         )
     )
     return follows_bonds(build, strength)

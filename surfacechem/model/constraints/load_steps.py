@@ -38,5 +38,5 @@ def _closing(build: Build) -> dict[Expression, Expression]:
     """A rigid interface that the loads press together closes as they jump."""
     for item in build.transitions:
         if item.name == "touch" and not item.measure:
-            return {mode: where(item.margin < 0, value, mode) for mode, value in item.modes.items()}
+            return {mode: where(item.guard < 0, value, mode) for mode, value in item.modes.items()}
     return {}

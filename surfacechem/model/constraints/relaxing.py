@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import symengine
 
-from surfacechem.expressions import where
 from surfacechem.model.automaton import Transition
 from surfacechem.model.build import Build
 
@@ -21,5 +20,6 @@ def relaxing(build: Build) -> None:
         item = build.transitions[j]
         modes = {**item.modes, loose: symengine.Integer(1)}
         build.transitions[j] = replace(item, modes=modes, settles=False)
-    margin, reason = where(loose > 0, -1, 1), "the gap follows what gave way"
-    build.transitions.insert(0, Transition("relax", margin, reason, {loose: symengine.Integer(0)}, settles=True))
+    always, reason = -symengine.Integer(1), "the gap follows what gave way"
+    done = {loose: symengine.Integer(0)}
+    build.transitions.insert(0, Transition("relax", always, reason, done, settles=True, when={loose: (1,)}))

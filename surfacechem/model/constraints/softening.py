@@ -31,10 +31,10 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
         return []
     g, k = symengine.Symbol("g_n"), far_field(build, mount).k
     slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
-    margin = where(mode > 0, (k + slope) / (k + absolute(slope)), 1)
+    margin, falls = (k + slope) / (k + absolute(slope)), {mode: (1,)}
     lost, none = -symengine.Integer(1), symengine.Integer(0)
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True, sinks="snap")]
+    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True, sinks="snap", when=falls)]
 
 
 def softening_mode(build: Build) -> None:
@@ -98,24 +98,23 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     breaks = {mode: one} if held is None else {mode: one, held: none}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
-    begins = where(mode**2 > 0, 1, present)
-    beyond = where(mode**2 > 0, 1, where(phi > 0, left - phi + NOTHING, 1))
-    ended = where(mode > 0, left, 1)
+    beyond = where(phi > 0, left - phi + NOTHING, 1)
+    keeps, loses, parted = {mode: (0,)}, {mode: (1,)}, {mode: (-1,)}
     remains = where(left < phi, where(left > 0, left, 0), phi)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
         build.motion.follows[phi] = remains
     fewer = "a jump leaves fewer bonds than there were"
     build.transitions += [
-        Transition("yield", beyond, fewer, jump={phi: remains}, settles=True, sinks="snap"),
+        Transition("yield", beyond, fewer, jump={phi: remains}, settles=True, sinks="snap", when=keeps),
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
-        Transition("soften", begins, "bonds begin to break as the gap opens", breaks, to_pass=True),
+        Transition("soften", present, "bonds begin to break as the gap opens", breaks, to_pass=True, when=keeps),
         *_tear(build, mode, phi, left),
-        Transition("part", ended, "the last bonds break", lost, {phi: none}, settles=True, sinks="snap"),
-        Transition("unload", where(mode > 0, overshoot, 1), "bonds do not reach what the gap leaves", {mode: none}),
+        Transition("part", left, "the last bonds break", lost, {phi: none}, settles=True, sinks="snap", when=loses),
+        Transition("unload", overshoot, "bonds do not reach what the gap leaves", {mode: none}, when=loses),
     ]
     if forming != 0:
-        margin, reason = where(mode < 0, where(forming > 0, -left, 1), 1), "the gap is closed enough to bond"
-        build.transitions.append(Transition("rejoin", margin, reason, {mode: none}, to_pass=True))
+        margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
+        build.transitions.append(Transition("rejoin", margin, reason, {mode: none}, to_pass=True, when=parted))
     _start(build, phi, left)
     return build.variables.call(law, law.statement, {"overshoot": overshoot})
 

@@ -160,7 +160,7 @@ def inertia(build: Build, m: Expression) -> Expression:
     return m * build.total_derivative(symengine.Symbol("v") + CREEPS * STILL * symengine.Symbol(PACE))
 
 
-def between_creep_and_sliding(build: Build, law: Friction, driving: Expression, slides: Expression) -> None:
+def between_creep_and_sliding(build: Build, law: Friction, driving: Expression) -> None:
     """Sliding that dies away where friction bears what drives it becomes creep, until it does not bear that any more.
 
     ``driving`` [Pa] is what is left of all tractions.
@@ -169,18 +169,31 @@ def between_creep_and_sliding(build: Build, law: Friction, driving: Expression, 
     slow, fast = SLOW * reference.velocity_unit(), FAST * reference.velocity_unit()
     pull = absolute(driving + _borne(build, law, v))
     left, room = _excess(absolute(v), slow), _excess(pull, _borne(build, law, slow))
-    dies = where(CREEPS > 0, 1, where(slides > 0, where(left > room, left, room), 1))
-    gives = where(CREEPS > 0, where(slides > 0, _borne(build, law, fast) - pull, 1), 1)
+    slip = build.find_mode("slip")
+    sliding = {} if slip is None else {slip: (-1, 1)}
     drive = build.variables.call(law, reference.drive, {**_own(law), "v": v})
     pace = symengine.Symbol(PACE)
     falls = Transition(
-        "creep", dies, "sliding dies away and the interface creeps", {CREEPS: symengine.Integer(1)}, {pace: drive}
+        "creep",
+        where(left > room, left, room),
+        "sliding dies away and the interface creeps",
+        {CREEPS: symengine.Integer(1)},
+        {pace: drive},
+        when={CREEPS: (0,), **sliding},
     )
     reason = "creep does not bear what drives it and the interface slides"
     rises = {pace: v / (GRAIN * reference.velocity_unit())}
     build.transitions += [
         falls,
-        Transition("slide", gives, reason, {CREEPS: symengine.Integer(0)}, rises, to_pass=True),
+        Transition(
+            "slide",
+            _borne(build, law, fast) - pull,
+            reason,
+            {CREEPS: symengine.Integer(0)},
+            rises,
+            to_pass=True,
+            when={CREEPS: (1,), **sliding},
+        ),
     ]
 
 

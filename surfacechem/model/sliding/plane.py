@@ -213,12 +213,12 @@ def _transitions(build: Build, sides: Sequence[Side], still: Expression) -> None
     kind, left, aimed = sides[0].kind, borne(sides), aim(build, sides)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     jump = {**(broken(build, breaking) if breaking is not None else {}), TURNED: NONE}
-    margin = where(SLIDES > 0, 1, left)
     modes, reason = {SLIDES: symengine.Integer(1), **aimed}, "sticking gives way and the interface slides"
-    begins = Transition("slip", margin, reason, modes, jump, rate_independent(kind), "local", to_pass=True)
+    sticks, slides = {SLIDES: (0,)}, {SLIDES: (1,)}
+    begins = Transition("slip", left, reason, modes, jump, rate_independent(kind), "local", to_pass=True, when=sticks)
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = {SLIDES: where(left < 0, 1, 0)} | {b: where(left < 0, x, b) for b, x in aimed.items()}
     modes, rest = (onward, {SPEED: NONE}) if kind.inertial else ({SLIDES: NONE}, {})
-    margin, reason = where(SLIDES > 0, still, 1), "sliding comes to a stop"
-    ends = Transition("stop", margin, reason, modes, {TURNED: NONE, **rest}, sinks="local", to_pass=True)
+    reason = "sliding comes to a stop"
+    ends = Transition("stop", still, reason, modes, {TURNED: NONE, **rest}, sinks="local", to_pass=True, when=slides)
     build.transitions += [begins, ends]

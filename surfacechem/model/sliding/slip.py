@@ -207,7 +207,7 @@ def _balance(
         law = creeping_mass(build) if _has_pace(build, kind) else None
         if law is not None:
             build.rows.momentum_of(PACE, inertia(build, far.m), driving, moves)
-            between_creep_and_sliding(build, law, driving, moves)
+            between_creep_and_sliding(build, law, driving)
         else:
             build.rows.momentum(kind.own_velocity, driving, far.m, moves)
     elif kind.elastic:
@@ -342,18 +342,18 @@ def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression
     balanced = not (kind.inertial and not kind.elastic)
     settles = bool(jump) or (balanced and not kind.rate_dependent)  # other gaps follow the bonds and their heat
     for s, word in ((1, "forward"), (-1, "backward")):
-        margin = where(slip**2 > 0, 1, bears - s * needed)
         reason = f"sticking gives way and the interface slides {word}"
         build.transitions.append(
             Transition(
                 f"slip {word}",
-                margin,
+                bears - s * needed,
                 reason,
                 {slip: symengine.Integer(s)},
                 jump,
                 settles=settles,
                 sinks="local",
                 to_pass=True,
+                when={slip: (0,)},
             )
         )
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
@@ -361,5 +361,5 @@ def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression
     paced, velocity = _has_pace(build, kind), symengine.Symbol(kind.d.velocity)
     stop = {} if balanced else {symengine.Symbol(PACE) if paced else velocity: NONE}
     onto = {CREEPS: symengine.Integer(1)} if paced else {}
-    stops, reason = where(slip**2 > 0, still, 1), "sliding comes to a stop"
-    build.transitions.append(Transition("stop", stops, reason, {slip: onward, **onto}, stop, to_pass=True))
+    reason, moving = "sliding comes to a stop", {slip: (-1, 1)}
+    build.transitions.append(Transition("stop", still, reason, {slip: onward, **onto}, stop, to_pass=True, when=moving))
