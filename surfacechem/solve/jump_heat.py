@@ -31,6 +31,11 @@ class JumpHeat:
         return {sink.node: sink for sinks in self.system.sinks.values() for sink in sinks}
 
     @cached_property
+    def free(self) -> list[int]:
+        """Columns of the temperatures that heat raises, among the inputs."""
+        return [1 + self.states.index(sink.node) for sink in self.nodes.values() if not sink.prescribed]
+
+    @cached_property
     def _columns(self) -> Function:
         """Temperature, energy and capacity of each node, and its part of the heat that each maker makes."""
         shares = [{s.node: s.share for s in sinks} for sinks in self.system.sinks.values()]
@@ -66,7 +71,7 @@ class JumpHeat:
 
     def with_heat(self, rows: Array, taken: Array) -> Array:
         """Inputs with the temperatures of the nodes after each has taken its heat, shape (rows, nodes)."""
-        free = [(j, 1 + self.states.index(s.node)) for j, s in enumerate(self.nodes.values()) if not s.prescribed]
+        free = list(zip([j for j, s in enumerate(self.nodes.values()) if not s.prescribed], self.free, strict=True))
         _, U, C, _ = self.at(rows)
         target, rows = U + taken, rows.copy()
         for _ in range(NEWTON if free else 0):

@@ -207,10 +207,14 @@ class LoadPath:
             y[columns] += place * length * way.moves[columns]
             there = replace(start, y=y, parameters=after.parameters)
 
+            hot = self.heat.with_heat(start.inputs()[None], taken[None])[0, self.heat.free]
+
             def warm(rows: Array) -> Array:
                 if not self.warms_itself:
                     return rows
-                return self.heat.with_heat(rows, np.repeat(taken[None], len(rows), axis=0))
+                warmed = rows.copy()
+                warmed[:, self.heat.free] = hot
+                return warmed
 
             def at(part: float) -> Array:
                 held = self._held(at_part(there, change, part), span, warm)
