@@ -21,6 +21,7 @@ def compare(family, seed: int) -> None:
     model: HandModel = family(np.random.default_rng([seed, FAMILIES.index(family)]))
     solution = Simulation(load_text(model.text)).run()
     assert solution.status == "finished", f"{solution.reason}\n{model.text}"
+    assert not np.isnan(solution.accuracy.error), f"the error is {solution.accuracy.source}\n{model.text}"
     np.testing.assert_allclose(solution.dataset["time"], model.times, rtol=1e-14)
     loose, tight = model.values(TIGHT), model.values(TIGHTER)
     for name, exact in tight.items():

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.advance import finish_step, store_polynomial
+from surfacechem.solve.radau.advance import finish_step, store_polynomial, too_small
 from surfacechem.solve.radau.dense import interpolate_rate, keep_polynomial, put_scanned, scan_step
 from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solve.radau.step import estimate_error
@@ -44,8 +44,10 @@ from surfacechem.solve.radau.work import (
     set_inputs,
 )
 
-LEAVING, AT_ZERO, BEYOND = 0.0, 2.0, -2.0
-"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it."""
+LEAVING, AT_ZERO, BEYOND, RISING, FALLING = 0.0, 2.0, -2.0, 3.0, -3.0
+"""Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it; of
+one that leaves zero in this step.
+"""
 
 SHALLOW = 1e-10
 """Relative depth below zero that a margin must reach to pass where it turns round there. Less than the tolerance may be
@@ -134,12 +136,67 @@ def passed_by(w: Any, kinds: Any, m: int) -> float:
 
 
 @compiled
+def begin_ranges(w: Any) -> bool:
+    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
+    found = False
+    for m in range(w.margin.shape[1]):
+        if w.margin[M_SIDE, m] == RISING:
+            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
+        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
+        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
+    return found
+
+
+@compiled
+def see_range(w: Any) -> None:
+    """Count the margins of now in how far each falls and rises."""
+    for m in range(w.margin.shape[1]):
+        change = w.margin[M_NOW, m] - (w.margin[M_BEFORE, m] if w.margin[M_SIDE, m] == BEYOND else 0.0)
+        w.margin[M_LOW, m] = max(w.margin[M_LOW, m], -change)
+        w.margin[M_HIGH, m] = max(w.margin[M_HIGH, m], change)
+
+
+@compiled
+def _leave(w: Any, m: int, rises: bool, held: float) -> None:
+    """A limit that starts at zero or beyond goes this way; one that rises from zero has this side."""
+    beyond = w.margin[M_SIDE, m] == BEYOND
+    w.margin[M_SIDE, m] = FALLING if not rises else -1.0 if beyond else held
+
+
+@compiled
+def follow_rates(w: Any) -> None:
+    """Sides of limits that start at zero or beyond and leave at the rate at which they start: the change by that alone,
+    in the probe, is what the polynomial says.
+    """
+    for m in range(w.margin.shape[1]):
+        by_rate, change = w.margin[M_PROBE, m] - w.margin[M_BEFORE, m], w.margin[M_NOW, m] - w.margin[M_BEFORE, m]
+        if abs(w.margin[M_SIDE, m]) == AT_ZERO and abs(by_rate) > noise(w, m) and 0.5 < change / by_rate < 2.0:
+            _leave(w, m, by_rate > 0.0, 1.0)
+
+
+@compiled
+def follow_ranges(w: Any, shortest: bool) -> bool:
+    """Sides of limits that start at zero or beyond without a rate, each from how far it falls and rises in this step;
+    whether all are known.
+
+    What a load sets in motion from rest begins as a power of time, far below what the tolerance lets the polynomial be
+    wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
+    goes farther.
+    """
+    known = True
+    for m in range(w.margin.shape[1]):
+        fall, rise = w.margin[M_LOW, m], w.margin[M_HIGH, m]
+        small = max(noise(w, m), w.clock[RTOL] * max(fall, rise))
+        if abs(w.margin[M_SIDE, m]) == AT_ZERO and max(fall, rise) > noise(w, m):
+            known = known and (shortest or min(fall, rise) <= small)
+            _leave(w, m, rise > fall, RISING)
+    return known
+
+
+@compiled
 def falls_from_start(w: Any, m: int) -> bool:
-    """Whether a limit that started at zero or beyond is now found to have gone the wrong way."""
-    side, value = w.margin[M_SIDE, m], w.margin[M_NOW, m]
-    if side == AT_ZERO:
-        return bool(value < -noise(w, m))
-    return bool(side == BEYOND and value < w.margin[M_BEFORE, m] - noise(w, m))
+    """Whether a limit that goes the wrong way from zero, or from beyond it, has left it by now."""
+    return bool(w.margin[M_SIDE, m] == FALLING and w.margin[M_NOW, m] < -noise(w, m))
 
 
 @compiled
@@ -149,8 +206,8 @@ def update_sides(w: Any, kinds: Any) -> None:
     for m in range(w.margin.shape[1]):
         value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        moved = value - w.margin[M_BEFORE, m] if side == BEYOND else value
-        if abs(moved) > (0.0 if abs(side) == 1.0 and kinds[m, 3] == 0 else noise(w, m)):
+        least = 0.0 if abs(side) == 1.0 and kinds[m, 3] == 0 else noise(w, m)
+        if abs(side) < AT_ZERO and abs(value) > least:
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
         w.margin[M_BEFORE, m] = value
 
@@ -168,7 +225,8 @@ def kink_at(w: Any, kinds: Any, first: int) -> int:
 ALIKE = 1e3
 """Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
 
-AT_START = -1.0
+AT_START, SHORTER = -1.0, -2.0
+"""Instead of where margins reach zero: a limit is passed at the start; a shorter step has to tell whether one is."""
 
 
 @compiled
@@ -273,11 +331,38 @@ def _mark_dips(w: Any, h: float, kinds: Any, before: float, x: float) -> None:
 
 
 @compiled
+def _margins_by_rate(w: Any, h: float, x: float) -> None:
+    """Margins at the fraction x of the step if the state changed at the rate at which it starts."""
+    for j in range(w.algebraic.shape[0]):
+        w.vector[TRIAL, j] = w.vector[Y, j] + x * h * w.vector[YDOT, j]
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
+    set_inputs(w, w.vector[TRIAL], w.vector[YDOT])
+    evaluate(w, MARGINS, w.margin[M_PROBE].ctypes.data)
+
+
+@compiled
+def _sides_are_known(w: Any, h: float) -> bool:
+    """Whether the step tells to which sides limits go that start at zero."""
+    if not begin_ranges(w):
+        return True
+    for i in range(4 * w.count[MEMBER] + 9):
+        put_scanned(w, h, i)
+        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+        if i == 0:
+            _margins_by_rate(w, h, EDGE)
+            follow_rates(w)
+        see_range(w)
+    return bool(follow_ranges(w, too_small(w, 0.25 * h)))
+
+
+@compiled
 def _scan(w: Any, h: float, kinds: Any) -> float:
     """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
-    there.
+    there, SHORTER where one may be.
     """
     scan_step(w)
+    if not _sides_are_known(w, h):
+        return SHORTER
     earlier, before = 0.0, 0.0
     for i in range(4 * w.count[MEMBER] + 9):
         x = SCANNED[w.count[MEMBER], i]
@@ -451,12 +536,16 @@ def find_event(w: Any, h: float, kinds: Any) -> float:
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
     """
     end = _scan(w, h, kinds)
+    if end == SHORTER:
+        restore_sides(w)
+        return 0.0
     if end <= 0.0:
         return h if end == 0.0 else AT_START
     first, earliest = _first(w, h, kinds)
     worst = 1.0 if kinds[first, 2] == 1 else np.inf
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:
+        restore_sides(w)
         return 0.0
     _mark_coincident(w, h, size, kinds)
     kink = kink_at(w, kinds, first)
