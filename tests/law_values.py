@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from surfacechem.contracts.terms import Law, Load, RateFactor
-from surfacechem.laws import FAMILIES, forces, laws
+from surfacechem.laws import FAMILIES, bonds, laws
 from surfacechem.quantities import VARIABLES
 
 TABLE = Path(__file__).with_suffix(".json")
@@ -50,7 +50,7 @@ OPTIONS |= {"shear": "parallel", "pressure": "net"}
 
 def every() -> dict[str, type[Law]]:
     """All laws, by contract and name."""
-    of_loads = [law for law in RateFactor.__subclasses__() if law.__module__ == forces.__name__]
+    of_loads = [law for law in RateFactor.__subclasses__() if law.__module__ == bonds.__name__]
     found = {f"{contract.contract} {name}": law for contract in FAMILIES for name, law in laws(contract).items()}
     return found | {f"rate factor {law.name()}": law for law in of_loads}
 

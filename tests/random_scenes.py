@@ -19,10 +19,9 @@ from surfacechem.contracts.terms import (
 )
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.laws import laws
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
+from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, CompliantDebonding
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.loading import Hold
-from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.mechanism import load_mechanism
 from surfacechem.media.coolprop import CoolPropFluid
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites, Stage

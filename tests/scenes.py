@@ -1,12 +1,10 @@
 """Scenes built in Python: one for each thermal regime and coupling."""
 
 from surfacechem.contracts.terms import Varying, parameter  # noqa: F401 - scenes may define laws
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.anisotropic import AnisotropicCoulomb
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import ReversibleBell
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import (
     BondStiffness,
     ConstantInterfaceCapacity,
@@ -24,7 +22,7 @@ from surfacechem.laws.factors import (
     Power,
     Proportional,
 )
-from surfacechem.laws.friction import Coulomb, MohrCoulomb, Viscous
+from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, Viscous
 from surfacechem.laws.heat import Conductance, Radiation
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 
 from scenes import SITES, bodies, path, varying
 
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import (
+    AdhesionIntensity,
+    AdhesionLoss,
+    ExponentialCohesiveZone,
+    TensileStrength,
+    XuNeedleman,
+)
 from surfacechem.laws.contact import (
     BondedContact,
     BondStiffness,
@@ -18,9 +22,16 @@ from surfacechem.laws.contact import (
     TangentialStiffness,
 )
 from surfacechem.laws.factors import Exponential, Linear, LinearInTemperature, Power, Proportional
-from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck, Viscous
+from surfacechem.laws.friction import (
+    AnisotropicCoulomb,
+    AnisotropicViscous,
+    BondedCoulomb,
+    Coulomb,
+    MohrCoulomb,
+    Stribeck,
+    Viscous,
+)
 from surfacechem.laws.kinetics import LinearAffinity
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage

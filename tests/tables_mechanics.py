@@ -9,12 +9,11 @@ from scenes import SITES, path, perfect_contact, varying
 
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondedContact, BondStiffness, InterfaceCapacity, NormalStiffness
 from surfacechem.laws.factors import Linear, Power
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, Viscous
 from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesDerjaguin, LennardJonesFlatFlat, LennardJonesSpherePlane
 from surfacechem.model.assemble import assemble

@@ -22,11 +22,11 @@ from surfacechem.errors import InputError, suggestion
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
-    Potential: ("bonding", "contact", "cohesive", "adhesion", "longrange", "films"),
-    RateLaw: ("kinetics", "bonds", "adhesion", "softening"),
-    Friction: ("friction", "films", "rate_and_state", "anisotropic"),
-    HeatTransfer: ("heat", "contact_conductance", "gap_conductance", "films"),
-    Limit: ("limits",),
+    Potential: ("bonding", "contact", "cohesive", "longrange", "films"),
+    RateLaw: ("kinetics", "bonds", "cohesive"),
+    Friction: ("friction", "films"),
+    HeatTransfer: ("heat", "contact_conductance", "films"),
+    Limit: ("cohesive",),
     Property: ("media",),
     Load: ("loading",),
     Factor: ("factors",),

@@ -1,12 +1,12 @@
-"""Cohesive zones: potentials whose traction rises to a strength and falls to nothing as the gap opens."""
+"""Bonds that give way under load: cohesive zones, adhesion intensity, compliant debonding, tensile strength."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 
-from surfacechem.contracts.terms import TangentialPotential, parameter
-from surfacechem.expressions import EXPONENT_CAP, Expression, decay, sqrt, where
+from surfacechem.contracts.terms import Limit, RateLaw, TangentialPotential, parameter
+from surfacechem.expressions import EXPONENT_CAP, Expression, decay, positive, sqrt, where
 
 CLOSED = 1e-16
 """Mixed gap over g_0 of a closed zone, whose direction is undefined: its square is far below the rounding of one."""
@@ -114,3 +114,126 @@ def _decaying(u: Expression, constant: Expression, linear: Expression) -> Expres
     top, beyond = math.exp(EXPONENT_CAP), u + EXPONENT_CAP
     level = constant - linear * EXPONENT_CAP
     return where(u > -EXPONENT_CAP, constant * bare + linear * u * bare, top * (level + (linear - level) * beyond))
+
+
+class AdhesionIntensity(TangentialPotential):
+    r"""Elastic adhesion of an intensity between zero and one, the bonding state.
+
+    .. math::
+        \Psi = \tfrac12 \phi^2 \left( C_N \langle g_n \rangle^2 + C_T g_t^2 \right)
+        + \tfrac12 E_n \langle -g_n \rangle^2 - w \phi
+
+    Tension is :math:`C_N \phi^2 g_n`. Adhesion begins to break where :math:`C_N g_n^2 + C_T g_t^2 = w / \phi`, and w is
+    Dupré's energy. Contact in compression is elastic and does not lose stiffness; the original is rigid, the limit of
+    large :math:`E_n`. Another energy of adhesion than the linear one is had by a bond energy beside it.
+
+    In parallel with friction :math:`g_t` is the whole displacement. Friction acts on the part that is not bonded,
+    :math:`t_t = \phi^2 C_T g_t + (1 - \phi)\,t_f`, so that shear that begins with complete adhesion peaks no lower
+    than without it, at :math:`\sqrt{w\,C_T}` where nothing delays the loss, and ends on the plateau of friction.
+
+    Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, after Frémond (1987); friction on the
+    part :math:`1 - \phi` as in Raous & Monerie (2002), in Contact Mechanics (Kluwer). Any gaps.
+
+    >>> AdhesionIntensity(C_N=1e12, C_T=1e12, w=1.0, E_n=1e14).energy(g_n=1e-6, g_t=0.0, phi=0.5)
+    -0.375
+    """
+
+    C_N: float = parameter("Pa/m", "normal stiffness of complete adhesion", at_least=0)
+    C_T: float = parameter("Pa/m", "tangential stiffness of complete adhesion", at_least=0)
+    w: float = parameter("J/m^2", "Dupré energy of adhesion", at_least=0)
+    E_n: float = parameter("Pa/m", "contact stiffness in compression", at_least=0)
+
+    def energy(self, g_n: Expression, g_t: Expression, phi: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        normal = where(g_n > 0, self.C_N * phi**2, self.E_n) * g_n**2
+        return (normal + self.C_T * phi**2 * g_t**2) / 2 - self.w * phi
+
+    def unbonded(self, phi: Expression) -> Expression:
+        """Fraction of the interface on which friction acts."""
+        return 1 - phi
+
+
+class AdhesionLoss(RateLaw):
+    r"""Viscous and irreversible loss of adhesion.
+
+    .. math:: b\,\dot\phi = -\langle M \rangle, \quad M = \partial \Psi / \partial \phi = N_c\,\mu
+
+    With the potential of adhesion intensity,
+    :math:`b\,\dot\phi = -\langle (C_N g_n^2 + C_T g_t^2) \phi - w \rangle`. What is lost does not heal: where adhesion
+    would grow, it rests. Where it may heal use the linear law with :math:`c_r = N_c / b`.
+
+    Source: Raous, Cangémi & Cocu (1999), doi 10.1016/S0045-7825(98)00389-2, with the exponent p = 1. Admissible.
+
+    >>> AdhesionLoss(b=2.0).rate(mu=1.5e-18, n_c=1e18, N_c=1e18), AdhesionLoss(b=2.0).rate(mu=-1.0, n_c=1e18, N_c=1e18)
+    (-7.5e+17, 0.0)
+    """
+
+    b: float = parameter("J s/m^2", "viscosity of adhesion", above=0)
+
+    @property
+    def kinks(self) -> Mapping[str, Expression]:
+        """Where loss ends."""
+        return {"mu": 0.0}
+
+    def rate(self, mu: Expression, n_c: Expression, N_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        return -n_c * positive(N_c * mu) / self.b
+
+
+class CompliantDebonding(RateLaw):
+    r"""Bonds break as the gap opens, so that the traction falls along a line to zero.
+
+    .. math:: \phi \le \phi_{env}(g_n) = \frac{t_{max}}{E_b\,g_n}\,\frac{g_f - g_n}{g_f - g_c}, \quad
+              g_c = \frac{t_{max}}{E_b}, \quad \dot\phi = \min(R_o / n_c, \dot\phi_{env}) \text{ on the envelope}
+
+    where :math:`R_o` is the net rate of all other bonding laws. So bonds break as fast as the envelope falls and others
+    form them; where the envelope rises faster than others form bonds, or others break bonds faster than it falls, they
+    leave it. Beyond :math:`g_f` no bond forms.
+    With the potential :math:`\tfrac12 \phi E_b g_n^2` the traction is the bilinear law of cohesive zones: it peaks at
+    :math:`t_{max}` and ends at :math:`g_f`; unloading goes back to zero gap along :math:`\phi E_b`. The break is
+    irreversible by itself. Source: Sauer, Duong & Mandadapu (2021), section 5.2 (the path of finite slope); bilinear
+    form as in Camanho & Davila (2002), NASA/TM-2002-211737. :math:`g_f > g_c`; :math:`E_b` is that of the potential.
+    Admissible where the elastic energy of a bond exceeds its bond energy.
+
+    >>> law = CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)
+    >>> law.envelope(g_n=1e-8), round(law.envelope(g_n=3e-8), 12)
+    (1.0, 0.166666666667)
+    """
+
+    t_max: float = parameter("Pa", "tensile strength", above=0, stretch=1)
+    E_b: float = parameter("Pa/m", "stiffness of complete bonding, per reference area", above=0)
+    g_f: float = parameter("m", "gap at which the last bonds break", above=0)
+
+    def peak(self) -> Expression:
+        """Gap at which complete bonding begins to break [m]."""
+        return self.t_max / self.E_b
+
+    def envelope(self, g_n: Expression) -> Expression:
+        """Bonding state that the gap leaves; it falls through zero where the last bonds break."""
+        start = self.peak()
+        gap = where(g_n > start / 2, g_n, start / 2)
+        return start / gap * (self.g_f - gap) / (self.g_f - start)
+
+    def rate(self, n_c: Expression, softening: Expression, overshoot: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]; ``overshoot`` is how fast the bonding state would pass the envelope [1/s]."""
+        return -n_c * softening * overshoot
+
+
+class TensileStrength(Limit):
+    r"""Tension at which all bonds break at once.
+
+    .. math:: t_n \le t_n^{max}(T_c, \phi)
+
+    Beyond it :math:`\phi = 0` and the interface is no longer bonded. The strength may vary with temperature and bonding
+    state through factors, for instance :math:`t_n^{max} = \phi\,(T_0/T_c)\,t_0^{max}`.
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:debond.
+
+    >>> TensileStrength(t_max=2e6).strength()
+    2000000.0
+    """
+
+    t_max: float = parameter("Pa", "tensile strength", at_least=0)
+
+    def strength(self) -> Expression:
+        """Strength [Pa]."""
+        return self.t_max

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from surfacechem.contracts.terms import HeatTransfer, UnderPressure, Varying, option, parameter
 from surfacechem.expressions import Expression, power
-from surfacechem.laws._tables import ConductanceTable
+from surfacechem.laws.tabulated import ConductanceTable
 
 
 def _value(number: float | Varying) -> float:

@@ -12,9 +12,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from surfacechem.contracts.terms import Potential, parameter
+from surfacechem.contracts.terms import Law, Potential, parameter
 from surfacechem.expressions import Expression, is_symbolic, log, where
-from surfacechem.laws._sites import InteractingSites
+
+
+class InteractingSites(Law):
+    """Densities of sites on both surfaces, strength and range of the interaction of a pair.
+
+    The sites stay with the surfaces: their densities are those on the reference area.
+    """
+
+    positive = ("g_n",)
+
+    n_1: float = parameter("1/m^2", "density of interacting sites on body 1", at_least=0, stretch=-1)
+    n_2: float = parameter("1/m^2", "density of interacting sites on body 2", at_least=0, stretch=-1)
+    psi_0: float = parameter("J", "interaction energy of a pair", at_least=0)
+    g_0: float = parameter("m", "range of the interaction", above=0)
+
+    @property
+    def stiffness(self) -> Expression:
+        """A = 2 pi n_1 n_2 psi_0 [Pa/m]."""
+        return 2 * math.pi * self.n_1 * self.n_2 * self.psi_0
+
 
 WALL = 0.01
 """Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
@@ -23,7 +42,7 @@ ATOMIC = 1.65e-10
 """Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
 
 
-class LennardJonesFlatFlat(InteractingSites):
+class LennardJonesFlatFlat(InteractingSites, Potential):
     r"""Lennard-Jones type attraction and repulsion between sites on two flats.
 
     .. math::
@@ -57,7 +76,7 @@ class LennardJonesFlatFlat(InteractingSites):
         return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8))
 
 
-class LennardJonesSpherePlane(InteractingSites):
+class LennardJonesSpherePlane(InteractingSites, Potential):
     r"""Lennard-Jones type attraction and repulsion between sites on a sphere and on a plane, exact.
 
     .. math::
@@ -95,7 +114,7 @@ class LennardJonesSpherePlane(InteractingSites):
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
 
 
-class LennardJonesDerjaguin(InteractingSites):
+class LennardJonesDerjaguin(InteractingSites, Potential):
     r"""Lennard-Jones type attraction and repulsion between a large sphere and a plane.
 
     .. math::

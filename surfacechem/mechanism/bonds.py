@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from surfacechem.contracts.terms import RateFactor, reads
 from surfacechem.expressions import Expression
-from surfacechem.laws.forces import (
+from surfacechem.laws.bonds import (
     BellFactor,
     DemboFactor,
     DemboFormationFactor,

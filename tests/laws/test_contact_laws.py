@@ -17,10 +17,9 @@ from surfacechem.contracts.terms import Potential, reads
 from surfacechem.expressions import EXPONENT_CAP, derivative
 from surfacechem.format.schema import schema
 from surfacechem.laws import laws
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Quadratic
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import BondStiffness, Penalty
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
 from surfacechem.laws.loading import Hold

@@ -8,12 +8,10 @@ from scenes import bodies
 from scipy.integrate import solve_ivp
 
 from surfacechem.errors import InputError
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.contact import Penalty, TangentialStiffness
-from surfacechem.laws.friction import BondedCoulomb, Coulomb
+from surfacechem.laws.friction import BondedCoulomb, Coulomb, RateAndStateAging
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
-from surfacechem.laws.rate_and_state import RateAndStateAging
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene, Sites

@@ -12,16 +12,14 @@ from surfacechem.errors import InputError
 from surfacechem.laws import laws
 from surfacechem.laws.bonding import BondEnergy, LatticeGas, LinearEnthalpy, PartnerMixing
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import CompliantDebonding, ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
 from surfacechem.laws.heat import Conductance
 from surfacechem.laws.kinetics import Bimolecular
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesFlatFlat
-from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.achieved import computed

@@ -9,11 +9,10 @@ from scenes import SITES, bodies, varying
 
 import surfacechem
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LatticeGas, LinearEnthalpy
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondedContact, BondStiffness
 from surfacechem.laws.factors import LinearInTemperature, Proportional
 from surfacechem.laws.kinetics import Arrhenius, ExponentialAffinity, KamalSourour, LinearAffinity, MassAction
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.model.constraints.enclosure import WHOLE, enclosure

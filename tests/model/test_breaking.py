@@ -7,9 +7,9 @@ import pytest
 from scenes import SITES, bodies, varying
 
 from surfacechem.errors import InputError
+from surfacechem.laws.cohesive import TensileStrength
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import BondedCoulomb
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
 from surfacechem.model.assemble import assemble

@@ -9,11 +9,11 @@ from scenes import SITES, bodies, varying
 from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy, BondSprings, LinearEnthalpy
+from surfacechem.laws.cohesive import CompliantDebonding, TensileStrength
 from surfacechem.laws.contact import BondedContact, BondStiffness, NormalStiffness, Penalty
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import Viscous
 from surfacechem.laws.kinetics import LinearAffinity
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import (
     ElectrostaticFlatFlat,
@@ -23,7 +23,6 @@ from surfacechem.laws.longrange import (
     VanDerWaalsFlatFlat,
     VanDerWaalsSpherePlane,
 )
-from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene

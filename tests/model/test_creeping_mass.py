@@ -8,9 +8,8 @@ import surfacechem
 from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
 from surfacechem.laws.factors import LinearInTemperature
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Mounting, Scene

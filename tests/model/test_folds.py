@@ -9,8 +9,7 @@ from scenes import SITES, bodies, perfect_contact, varying
 from scipy.optimize import brentq, fsolve
 from scipy.special import lambertw
 
-from surfacechem.laws.adhesion import AdhesionIntensity, AdhesionLoss
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
 from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table

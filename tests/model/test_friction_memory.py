@@ -6,12 +6,16 @@ from scenes import SITES, bodies
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
+from surfacechem.laws.cohesive import CompliantDebonding
 from surfacechem.laws.contact import BondStiffness
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import (
+    AnisotropicCoulomb,
+    AnisotropicViscous,
+    Coulomb,
+    RateAndStateAging,
+    RateAndStateSlip,
+)
 from surfacechem.laws.loading import Hold, Ramp, Table
-from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
-from surfacechem.laws.softening import CompliantDebonding
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.runs.check import consistent_start, rates

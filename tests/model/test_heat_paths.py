@@ -23,8 +23,7 @@ from surfacechem.laws.contact_conductance import (
 )
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.gap_conductance import GapConductance, GapTable, GasGap
-from surfacechem.laws.heat import Conductance, Radiation
+from surfacechem.laws.heat import Conductance, GapConductance, GapTable, GasGap, Radiation
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble

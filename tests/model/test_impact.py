@@ -10,14 +10,13 @@ from scipy.integrate import solve_ivp
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.laws.anisotropic import AnisotropicCoulomb
 from surfacechem.laws.bonding import BondEnergy
+from surfacechem.laws.cohesive import TensileStrength
 from surfacechem.laws.contact import Penalty, TangentialStiffness
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear, Proportional
-from surfacechem.laws.friction import Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, Stribeck
 from surfacechem.laws.kinetics import LinearAffinity
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.references import get

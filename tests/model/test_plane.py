@@ -11,12 +11,19 @@ from scipy.integrate import solve_ivp
 from tables_mechanics import Solved, solve
 
 from surfacechem.errors import InputError
-from surfacechem.laws.anisotropic import AnisotropicCoulomb, AnisotropicViscous
 from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.factors import Linear
-from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck, Viscous
+from surfacechem.laws.friction import (
+    AnisotropicCoulomb,
+    AnisotropicViscous,
+    BondedCoulomb,
+    Coulomb,
+    MohrCoulomb,
+    RateAndStateAging,
+    Stribeck,
+    Viscous,
+)
 from surfacechem.laws.loading import Harmonic, Ramp
-from surfacechem.laws.rate_and_state import RateAndStateAging
 from surfacechem.model.assemble import assemble
 from surfacechem.references import get
 from surfacechem.scene import Mounting, Stage

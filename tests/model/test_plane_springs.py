@@ -12,10 +12,9 @@ from scipy.optimize import brentq
 from tables_mechanics import Solved, solve
 
 from surfacechem.errors import InputError
-from surfacechem.laws.anisotropic import AnisotropicCoulomb
 from surfacechem.laws.contact import Penalty
 from surfacechem.laws.factors import Linear
-from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb
+from surfacechem.laws.friction import AnisotropicCoulomb, BondedCoulomb, Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.scene import Interface, Mounting, Scene

@@ -8,10 +8,10 @@ from tables_mechanics import solve
 
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
+from surfacechem.laws.cohesive import TensileStrength
 from surfacechem.laws.contact import BondedContact, InterfaceCapacity, Penalty, TangentialStiffness
 from surfacechem.laws.factors import Linear, LinearInTemperature
 from surfacechem.laws.friction import Coulomb
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit

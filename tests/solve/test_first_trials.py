@@ -7,11 +7,10 @@ import pytest
 from scenes import SITES, bodies, varying
 
 from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondedContact, NormalStiffness, Penalty
 from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.friction import Coulomb, MohrCoulomb
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit

@@ -11,16 +11,14 @@ from surfacechem.contracts.terms import Friction, parameter
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength, XuNeedleman
 from surfacechem.laws.contact import BondStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.films import Film
-from surfacechem.laws.friction import Stribeck
+from surfacechem.laws.friction import RateAndStateAging, RateAndStateSlip, Stribeck
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
-from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene

@@ -6,12 +6,11 @@ from scenes import SITES, bodies, varying
 
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import NormalStiffness
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb
 from surfacechem.laws.kinetics import LinearAffinity
-from surfacechem.laws.limits import TensileStrength
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit

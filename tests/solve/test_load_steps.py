@@ -5,9 +5,8 @@ import pytest
 from scenes import bodies
 
 from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import Coulomb, RateAndStateAging
 from surfacechem.laws.loading import Hold, Table
-from surfacechem.laws.rate_and_state import RateAndStateAging
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from surfacechem.laws.contact import TangentialStiffness
+from surfacechem.laws.friction import RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Table
-from surfacechem.laws.rate_and_state import RateAndStateAging, RateAndStateSlip
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Mounting, Scene

@@ -8,17 +8,16 @@ from scenes_mechanics import TOGETHER, inertial_gap, overdamped_gap
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
-from surfacechem.laws.adhesion import AdhesionIntensity
 from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import DudkoHummerSzabo
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import ExponentialCohesiveZone
+from surfacechem.laws.cohesive import AdhesionIntensity, ExponentialCohesiveZone
 from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
 from surfacechem.laws.friction import Coulomb, Viscous
-from surfacechem.laws.gap_conductance import GasGap
+from surfacechem.laws.heat import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
