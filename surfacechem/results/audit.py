@@ -249,17 +249,18 @@ class _Books:
 
         Nothing where it is less than the last digit of the total, which then is the same with it and without.
         """
-        points = self._points
-        booked = np.diff(points.ledger[:, [self._account(law) for law in laws]].sum(axis=1))
+        points, ledger = self._points, self._points.ledger.copy()
         rates = np.array([self.trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
         if self.trajectory.status == "stopped":  # a law that ends there may have no value
             rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
+            ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:-1])
+        booked = np.diff(ledger[:, [self._account(law) for law in laws]].sum(axis=1))
         seen = rates[1:] * self._lengths
         amount, whole = lost(booked, seen)
         if amount <= SLACK * self.trajectory.run.rtol * whole:
             return 0.0
         rounded = self._rounding_of(laws, np.flatnonzero((booked < 0) | (seen < 0)), len(booked))
-        digits = EPSILON * np.abs(points.ledger).sum(axis=1)
+        digits = EPSILON * np.abs(ledger).sum(axis=1)
         amount, whole = lost(booked, seen, rounded * np.diff(points.t) + digits[1:] + digits[:-1])
         return 0.0 if amount <= EPSILON * self.entropy_stored else _share(float(amount), float(whole))
 
