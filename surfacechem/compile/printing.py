@@ -39,6 +39,24 @@ class Row:
     text: str
 
 
+RELATIONS = (symengine.LessThan, symengine.StrictLessThan, symengine.Equality, symengine.Unequality)
+
+APART = "condition of "
+"""How the names begin of symbols that stand for what is printed by itself."""
+
+
+def _apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
+    """The expression with piecewise terms in its conditions replaced by symbols, and these terms by their symbols.
+
+    SymPy brings conditions into a canonical form, which takes it for ever where piecewise terms are in them.
+    """
+    whole = symengine.sympify(expression)
+    inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
+    outermost = inner - {deep for piece in inner for deep in piece.atoms(symengine.Piecewise) - {piece}}
+    terms = {f"{APART}{k}": piece for k, piece in enumerate(sorted(outermost, key=str))}
+    return whole.xreplace({piece: symengine.Symbol(name) for name, piece in terms.items()}), terms
+
+
 @lru_cache(maxsize=1000)
 def _sympy(expression: Expression) -> Any:
     """The same expression in SymPy, with products of sums left as they are: expanded, they would round differently.
@@ -53,12 +71,21 @@ class _Python(PythonCodePrinter):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True})
         self.reserved_words: set[str] = {*PythonCodePrinter.reserved_words, "math", "ydot", "parameters"}
+        self._terms: dict[str, Any] = {}
 
     def _print_Float(self, expression: Any) -> str:
         return repr(float(expression))
 
+    def _print_Symbol(self, expression: Any) -> str:
+        term = self._terms.get(str(expression))
+        return str(super()._print_Symbol(expression)) if term is None else self.text(term)
+
     def text(self, expression: Expression) -> str:
-        return str(self.doprint(_sympy(expression)))
+        known = self._terms
+        expression, self._terms = _apart(expression)
+        text = str(self.doprint(_sympy(expression)))
+        self._terms = known
+        return text
 
     def name(self, name: str) -> str:
         return str(self.doprint(sympy.Symbol(name)))
@@ -255,6 +282,8 @@ SPACE = r"\,"
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]
+    _terms: Mapping[str, Any] = {}
+
     def _print_Float(self, expression: Any) -> str:
         mantissa, _, power = f"{float(expression)!r}".partition("e")
         number = mantissa.removesuffix(".0")
@@ -263,10 +292,15 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
         return (f"{number} \\cdot " if number != "1" else "") + f"10^{{{int(power)}}}"
 
     def _print_Symbol(self, expression: Any, style: str = "plain") -> str:
-        return symbol(str(expression))
+        term = self._terms.get(str(expression))
+        return symbol(str(expression)) if term is None else rf"\left({self.text(term)}\right)"
 
     def text(self, expression: Expression) -> str:
-        return str(self.doprint(_sympy(expression)))
+        known = self._terms
+        expression, self._terms = _apart(expression)
+        text = str(self.doprint(_sympy(expression)))
+        self._terms = known
+        return text
 
 
 def symbol(name: str) -> str:

@@ -58,7 +58,12 @@ def magnitude(expression, point):
     return value + 1.0 if "log" in str(expression) else value
 
 
-@pytest.mark.parametrize("scene", scenes.ALL, ids=lambda scene: scene.__name__)
+def two_pathways_and_their_limits():
+    """A mechanism whose conditions hold piecewise terms, which hold others."""
+    return surfacechem.load("vinculin-catch-bond").case.scene
+
+
+@pytest.mark.parametrize("scene", [*scenes.ALL, two_pathways_and_their_limits], ids=lambda scene: scene.__name__)
 def test_printed_source_agrees_with_machine_code(scene):
     system = assemble(scene())
     model, module = Model(system), printing.executable(system)
@@ -71,6 +76,12 @@ def test_printed_source_agrees_with_machine_code(scene):
             error = np.abs(np.array(getattr(module, name)(t, y, ydot, parameters)) - exact)
             for i in np.flatnonzero(~(error <= 1e-13 * np.abs(exact))):
                 assert error[i] <= 1e-13 * magnitude(expressions[i], point), name
+
+
+def test_conditions_with_piecewise_terms_have_a_latex_form():
+    text = printing.latex(assemble(two_pathways_and_their_limits()))
+    assert text.count(r"\begin{cases}") == text.count(r"\end{cases}") > 0
+    assert printing.APART not in text
 
 
 def test_parameters_default_to_those_of_the_scene():
