@@ -1,6 +1,6 @@
-"""Exact solutions, one a file, for verifying every solver to rounding.
+"""Exact solutions, a family of them in a file, for verifying every solver to rounding.
 
-`get("endothermic-bonding")` gives one class and imports its file only; `all()` gives every class by name.
+`get("endothermic-bonding")` gives one class and imports the file of bonding only; `all()` gives every class by name.
 """
 
 from __future__ import annotations
@@ -13,32 +13,41 @@ from surfacechem.references.base import Reference
 
 __all__ = ["Reference", "all", "get", "names"]
 
-NO_SOLUTIONS = ("base", "matching")
+NO_SOLUTIONS = ("base", "scene_view")
+"""Modules without an exact solution, beside those that begin with an underscore."""
 
 
 def names() -> list[str]:
-    """Names of all exact solutions, read off the file names."""
-    files = [module.name for module in pkgutil.iter_modules(__path__)]
-    return sorted(file.replace("_", "-") for file in files if file not in NO_SOLUTIONS and not file.startswith("_"))
+    """Names of all exact solutions."""
+    return sorted(all())
 
 
 def get(name: str) -> type[Reference]:
-    """The exact solution called `name`.
+    """The exact solution called `name`: it is in the file whose name is the longest that is part of this one.
 
-    >>> get("sliding").__name__
-    'Sliding'
+    >>> get("sliding-constant-capacity").__name__
+    'SlidingConstantCapacity'
     """
-    known = names()
-    if name not in known:
-        raise InputError(f"no exact solution '{name}'.{suggestion(name, known)}")
-    module = import_module(f"{__name__}.{name.replace('-', '_')}")
-    return next(entry for entry in vars(module).values() if isinstance(entry, type) and _is_called(entry, name))
+    families = [family for family in _families() if family.replace("_", "-") in name]
+    found = _members(max(families, key=len)) if families else {}
+    if name not in found:
+        raise InputError(f"no exact solution '{name}'.{suggestion(name, names())}")
+    return found[name]
 
 
 def all() -> dict[str, type[Reference]]:
     """Every exact solution by name."""
-    return {name: get(name) for name in names()}
+    return {name: kind for family in _families() for name, kind in _members(family).items()}
 
 
-def _is_called(entry: type, name: str) -> bool:
-    return issubclass(entry, Reference) and vars(entry).get("name") == name
+def _families() -> list[str]:
+    """Names of the files with exact solutions."""
+    files = (module.name for module in pkgutil.iter_modules(__path__))
+    return [file for file in files if file not in NO_SOLUTIONS and not file.startswith("_")]
+
+
+def _members(family: str) -> dict[str, type[Reference]]:
+    """The exact solutions of a file by name."""
+    module = import_module(f"{__name__}.{family}")
+    kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__]
+    return {kind.name: kind for kind in kinds if issubclass(kind, Reference) and "name" in vars(kind)}

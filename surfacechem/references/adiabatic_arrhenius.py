@@ -11,12 +11,9 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._quadrature import short_integral
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
-
-EULER_GAMMA = 0.57721566490153286061
-SERIES_LIMIT = 40.0
+from surfacechem.references._inversion import increasing_root, short_integral
+from surfacechem.references._special_functions import scaled_Ei
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class AdiabaticArrhenius(Reference):
@@ -44,6 +41,11 @@ class AdiabaticArrhenius(Reference):
     E_a: float = parameter("J/mol", "activation energy", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
     delta_T: float = parameter("K", "adiabatic temperature rise of the complete reaction", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {name: scene.reaction(name) for name in ("A", "E_a")}
+        return {**own, "T_i": scene.temperature, "delta_T": scene.adiabatic_rise}
 
     @property
     def _initial_exponent(self) -> float:
@@ -79,29 +81,3 @@ class AdiabaticArrhenius(Reference):
     def _slope(self, unreacted: Array) -> Array:
         rise = -self.delta_T * np.expm1(-unreacted)
         return np.asarray(np.exp(-self._initial_exponent * rise / (self.T_i + rise)))
-
-
-def scaled_Ei(x: Array) -> Array:
-    r""":math:`e^{-x}{\rm Ei}(x)` for x > 0: convergent series up to 40, asymptotic series above.
-
-    >>> scaled_Ei(np.array([1.0, 50.0]))
-    array([0.69717488, 0.02041705])
-    """
-    near, far = np.minimum(x, SERIES_LIMIT), np.maximum(x, SERIES_LIMIT)
-    return np.where(x < SERIES_LIMIT, _convergent(near), _asymptotic(far))
-
-
-def _convergent(x: Array) -> Array:
-    term, total = np.ones_like(x), np.zeros_like(x)
-    for n in range(1, 160):
-        term = term * x / n
-        total = total + term / n
-    return np.asarray(np.exp(-x) * (EULER_GAMMA + np.log(x) + total))
-
-
-def _asymptotic(x: Array) -> Array:
-    term, total = 1.0 / x, 1.0 / x
-    for n in range(1, int(SERIES_LIMIT)):
-        term = term * n / x
-        total = total + term
-    return total

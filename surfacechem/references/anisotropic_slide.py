@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._energy import QuadraticEnergy
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._bodies import QuadraticEnergy
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 NEWTON = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""
@@ -49,6 +49,16 @@ class AnisotropicSlide(Reference):
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {
+            "m": scene.support("tangential", "m"),
+            **{name: scene.friction(name) for name in ("mu_1", "mu_2")},
+            **{f"{name}_i": scene.initial(name) for name in ("v", "v_2")},
+            "p": scene.initial("p"),
+            **scene.uniform_body,
+        }
 
     @cached_property
     def ratio(self) -> float:

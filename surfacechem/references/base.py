@@ -1,7 +1,7 @@
 r"""What every exact solution is: parameters in SI, and exact values of named quantities at any time.
 
-A reference is one frozen dataclass in a file of its own. The file carries the reference's name, so that asking for one
-reference imports one file.
+A reference is one frozen dataclass, or a family of them that share a formula, in a file of its own. The file carries
+the name that the family has in common, so that asking for one reference imports one file; to add one, add its file.
 """
 
 from __future__ import annotations
@@ -17,8 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
+from surfacechem.references.scene_view import SceneView
+
+__all__ = ["Array", "Parameters", "Reference", "SceneView"]
 
 Array: TypeAlias = NDArray[np.float64]
+Parameters: TypeAlias = Mapping[str, float | None]
+"""Parameters of an exact solution by name; None, or nothing, where a scene does not tell one."""
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
@@ -27,7 +32,8 @@ class Reference(ABC):
 
     name: ClassVar[str]
     continuous: ClassVar[bool] = False
-    """Whether it solves for bodies without cells, so that a scene meets it but for the error of its cells."""
+    """Whether it solves for bodies without cells: a scene then meets it but for the error of its cells, and
+    `from_scene` alone tells whether it is the scene's."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -37,6 +43,14 @@ class Reference(ABC):
         """Check every parameter against its range."""
         for item in fields(self):  # type: ignore[arg-type]
             item.metadata["spec"].check(f"{self.name}: {item.name}", getattr(self, item.name))
+
+    @classmethod
+    @abstractmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        """The parameters that the solution has in a scene; InputError, which says why, if it cannot be the scene's.
+
+        That it is the scene's is then tested on the scene's equations.
+        """
 
     @property
     def end_time(self) -> float:
@@ -58,6 +72,10 @@ class Reference(ABC):
         for key, value in exact.items():
             if np.isnan(value).any():
                 raise InputError(f"{self.name}: {key} has no real value at t = {t[np.isnan(value)][0]} s.")
+
+    def profile(self, number: int, x: Array, t: Array) -> Array:
+        """Temperatures of body 1 or 2 at distances from the contact [m], shape (times, places), if it is continuous."""
+        raise NotImplementedError(f"{self.name} knows no temperatures inside bodies.")
 
     @abstractmethod
     def quantities(self, t: Array) -> Mapping[str, Array | float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class BilinearDebonding(Reference):
@@ -38,6 +38,11 @@ class BilinearDebonding(Reference):
     H_r: float = parameter("J/m^2", "heat released by complete bonding", default=0.0)
     g_1: float = parameter("m", "gap at which it is first closed again", at_least=0)
     speed: float = parameter("m/s", "speed of the gap", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {name: scene.reaction(name) for name in ("t_max", "E_b", "g_f")}
+        return {**own, "H_r": scene.potential("H_r")}
 
     def __post_init__(self) -> None:
         """Refuse a line that does not fall."""

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._exponentials import first_difference
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._special_functions import first_difference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class BimolecularBonding(Reference):
@@ -37,6 +37,12 @@ class BimolecularBonding(Reference):
     n_2: float = parameter("1/m^2", "density of sites on body 2", above=0)
     n_c: float = parameter("1/m^2", "density of reference sites", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        N_c, N_1, N_2 = (scene.constant(name) for name in ("N_c", "N_1", "N_2"))
+        sites = {"n_c": N_c, "n_1": N_c if N_1 is None else N_1, "n_2": N_c if N_2 is None else N_2}
+        return {**sites, **{name: scene.reaction(name) for name in ("k_f", "k_r")}, "phi_i": scene.initial("phi")}
 
     @property
     def _distance(self) -> float:

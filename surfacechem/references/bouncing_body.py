@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._energy import QuadraticEnergy
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._bodies import QuadraticEnergy
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class BouncingBody(Reference):
@@ -38,6 +38,12 @@ class BouncingBody(Reference):
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {name: scene.support("normal", name) for name in ("m", "e")}
+        start = {"F_n": scene.initial("F_n"), "g_n_i": scene.initial("g_n"), "v_n_i": scene.initial("v_n")}
+        return {**own, **start, **scene.uniform_body}
 
     @property
     def _fall(self) -> float:

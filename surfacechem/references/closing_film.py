@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class ClosingFilm(Reference):
@@ -35,6 +35,12 @@ class ClosingFilm(Reference):
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        opening = scene.ramp("g_n")
+        film = {"eta": scene.friction("eta"), "v": scene.initial("v"), "g_i": scene.initial("g_n")}
+        return {**film, "a": None if opening is None else -opening, **scene.uniform_body}
 
     @property
     def end_time(self) -> float:

@@ -1,17 +1,103 @@
-"""Quasi-static pull-off of bodies that an exponential cohesive zone holds together."""
+"""Quasi-static pull-off of bodies that an exponential cohesive zone holds together, and what its snap heats."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._cohesive import Fold, SpringAndZone
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._bodies import QuadraticEnergy
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.semenov_fold import scaled_rise
+
+SERIES_LIMIT = 0.1
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A state in which the quasi-static gap is lost, and the one it jumps to at the same displacement."""
+
+    g: float
+    w: float
+    t: float
+    g_after: float
+    t_after: float
+    release: float
+    """Energy [J/m^2] that the jump turns into heat."""
+
+
+@dataclass(frozen=True)
+class SpringAndZone:
+    """An exponential cohesive zone in series with a spring: its branches, and where they end.
+
+    Stiffness [Pa/m] of the spring, strength [Pa] of the zone and the gap [m] at which it is reached.
+    """
+
+    k: float
+    t_max: float
+    g_0: float
+
+    @property
+    def severity(self) -> float:
+        """Stiffness over the steepest softening; from one on every displacement has one gap."""
+        return math.e * self.k * self.g_0 / self.t_max
+
+    def traction(self, g: Array) -> Array:
+        """Traction [Pa] of the zone."""
+        return np.asarray(self.t_max * g / self.g_0 * np.exp(1.0 - g / self.g_0))
+
+    def energy(self, g: float, w: float) -> float:
+        """Energy [J/m^2] of spring and zone."""
+        u = g / self.g_0
+        return 0.5 * self.k * (w - g) ** 2 - self.t_max * self.g_0 * (1.0 + u) * math.exp(1.0 - u)
+
+    def gap(self, w: Array, low: float, high: float) -> Array:
+        """The gap [m] at displacements w, on a stable branch between two gaps."""
+        lower = np.minimum(np.full_like(w, low), w)
+        return increasing_root(self._displacement, w, lower, np.maximum(np.minimum(w, high), lower))
+
+    def _displacement(self, g: Array) -> tuple[Array, Array]:
+        slope = self.t_max / self.g_0 * (1.0 - g / self.g_0) * np.exp(1.0 - g / self.g_0)
+        return g + self.traction(g) / self.k, 1.0 + slope / self.k
+
+    def opening(self) -> Fold:
+        """Where the bodies snap apart: the smaller x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
+        x = float(scaled_rise(np.array([self.severity]))[0])
+        g, w, t = self._state(x)
+        after = float(self.gap(np.array([w]), self._state(self._larger())[0], math.inf)[0])
+        return self._fold(g, w, t, after)
+
+    def closing(self) -> Fold:
+        """Where they snap together: the larger such x."""
+        g, w, t = self._state(self._larger())
+        after = float(self.gap(np.array([w]), 0.0, self._state(float(scaled_rise(np.array([self.severity]))[0]))[0])[0])
+        return self._fold(g, w, t, after)
+
+    def _state(self, x: float) -> tuple[float, float, float]:
+        g, t = self.g_0 * (1.0 + x), self.t_max * (1.0 + x) * math.exp(-x)
+        return g, g + t / self.k, t
+
+    def _fold(self, g: float, w: float, t: float, after: float) -> Fold:
+        release = self.energy(g, w) - self.energy(after, w)
+        return Fold(g, w, t, after, float(self.traction(np.array(after))), release)
+
+    def _larger(self) -> float:
+        distance = np.array([-math.log(self.severity)])
+        low, high = np.sqrt(2.0 * distance), distance + np.sqrt(distance * (distance + 2.0))
+        return 1.0 + float(increasing_root(_beyond_the_fold, distance, low, high)[0])
+
+
+def _beyond_the_fold(v: Array) -> tuple[Array, Array]:
+    """The function v - ln(1 + v), by its series where the two would cancel, and its slope."""
+    near = np.minimum(v, SERIES_LIMIT)
+    series = sum((-1) ** n * near**n / n for n in range(2, 18))
+    return np.where(v < SERIES_LIMIT, series, v - np.log1p(v)), v / (1.0 + v)
 
 
 class CohesivePullOff(Reference):
@@ -40,6 +126,12 @@ class CohesivePullOff(Reference):
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
     w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        far = {"k": scene.support("normal", "k"), "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
+        return {**zone, **far}
 
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
@@ -82,3 +174,34 @@ class CohesivePullOff(Reference):
             g = np.where(open_, self.bodies.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
             heat = np.where(open_, fold.release, 0.0)
         return {"w_n": w, "g_n": g, "t_n": self.bodies.traction(g), "heat": heat}
+
+
+class CohesivePullOffHeating(CohesivePullOff):
+    r"""Cohesive pull-off in perfect thermal contact: what the jump releases heats the bodies.
+
+    .. math:: T^2=T_i^2+\frac{2T_0}C\,\big[\tfrac12k(w-g_n)^2+\Psi\big]_{after}^{before}
+
+    Quadratic energies; a strength that does not depend on temperature, so that the gap is that of the pull-off without
+    heat and the temperature changes at the jump only.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, and the quadratic energy.
+
+    >>> bodies = CohesivePullOffHeating(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8, C=2e-4, T_0=300.0, T_i=310.0)
+    >>> f"{bodies.solution(20.0)['T']:.9f}"
+    '433.274971584'
+    """
+
+    name: ClassVar[str] = "cohesive-pull-off-heating"
+
+    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
+    T_0: float = parameter("K", "reference temperature", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), **scene.uniform_body}
+
+    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+        mechanics = super().quantities(t)
+        rise = QuadraticEnergy().rise(np.asarray(mechanics["heat"]), self.C, self.T_0, self.T_i)
+        return {**mechanics, "T": self.T_i + rise}

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._energy import QuadraticEnergy
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._bodies import QuadraticEnergy
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class CoulombStop(Reference):
@@ -36,6 +36,11 @@ class CoulombStop(Reference):
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {"m": scene.support("tangential", "m"), "mu": scene.friction("mu")}
+        return {**own, "p": scene.initial("p"), "v_i": scene.initial("v"), **scene.uniform_body}
 
     @property
     def stop_time(self) -> float:

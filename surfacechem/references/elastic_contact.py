@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class ElasticContact(Reference):
@@ -31,6 +31,11 @@ class ElasticContact(Reference):
     E_n: float = parameter("Pa/m", "contact stiffness", above=0)
     w_i: float = parameter("m", "initial far-field displacement")
     w_dot: float = parameter("m/s", "speed of the far field", default=0.0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {"k": scene.support("normal", "k"), "E_n": scene.potential("E_n")}
+        return {**own, "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         w = self.w_i + self.w_dot * t

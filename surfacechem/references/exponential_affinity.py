@@ -9,7 +9,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class ExponentialAffinity(Reference):
@@ -39,6 +39,12 @@ class ExponentialAffinity(Reference):
     T: float = parameter("K", "temperature", above=0)
     phi_eq: float = parameter("1", "equilibrium bonding state", default=1.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        sites = {"n_c": scene.constant("N_c"), "C_r": scene.reaction("C_r"), "T": scene.temperature}
+        bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
+        return {**sites, **bonds}
 
     @property
     def steepness(self) -> float:

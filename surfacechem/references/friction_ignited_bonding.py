@@ -9,9 +9,9 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._exponential_integrals import scaled_expint
-from surfacechem.references._quadrature import short_integral
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import short_integral
+from surfacechem.references._special_functions import scaled_expint
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class FrictionIgnitedBonding(Reference):
@@ -39,6 +39,12 @@ class FrictionIgnitedBonding(Reference):
     C: float = parameter("J/(m^2 K)", "total heat capacity", above=0)
     D: float = parameter("W/m^2", "friction power", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {name: scene.reaction(name) for name in ("A", "E_a")}
+        heat = {"T_i": scene.temperature, "C": scene.capacity, "D": scene.friction_power()}
+        return {**own, **heat, "phi_i": scene.initial("phi")}
 
     @property
     def heating_rate(self) -> float:

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class IsentropicCohesiveOpening(Reference):
@@ -37,6 +37,11 @@ class IsentropicCohesiveOpening(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
     g_dot: float = parameter("m/s", "opening speed", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        return {**zone, **scene.uniform_body, "g_i": scene.initial("g_n"), "g_dot": scene.ramp("g_n")}
 
     @property
     def open_temperature(self) -> float:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references._lambert import lambert_of_exp
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._special_functions import lambert_of_exp
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class LatticeGasSprings(Reference):
@@ -42,6 +42,14 @@ class LatticeGasSprings(Reference):
     g_n: float = parameter("m", "gap", default=0.0, at_least=0)
     k_i: float = parameter("1/s", "initial rate of phi over the initial free fraction", default=0.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        bonds = {name: scene.potential(name) for name in ("epsilon", "k_b")}
+        phi, rate = scene.initial("phi"), scene.bonding_rate
+        forming = None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)
+        held = {"n_c": scene.constant("N_c"), "T": scene.temperature, "g_n": scene.initial("g_n")}
+        return {**held, **bonds, "k_i": forming, "phi_i": phi}
 
     def exponent(self, gap: ArrayLike) -> Array:
         """Free energy of a bond in units of k_B T."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class LinearAffinity(Reference):
@@ -33,6 +33,12 @@ class LinearAffinity(Reference):
     K_c: float = parameter("J/m^2", "bond energy density", at_least=0)
     phi_eq: float = parameter("1", "equilibrium bonding state", at_least=0, at_most=1)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        sites = {"n_c": scene.constant("N_c"), "c_r": scene.reaction("c_r")}
+        bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
+        return {**sites, **bonds}
 
     @property
     def relaxation_rate(self) -> float:

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._cohesive import SpringAndZone
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.cohesive_pull_off import SpringAndZone
 
 GRID = 200
 """Gaps whose times give the first guess of the gap at a time."""
@@ -46,6 +46,13 @@ class OverdampedPullOff(Reference):
     c: float = parameter("Pa s/m", "damping", above=0)
     delta_w: float = parameter("m", "far-field displacement beyond the fold", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        dampers = [c for c in (scene.support("normal", name) for name in ("c_b", "c_g")) if c is not None]
+        held = {"k": scene.support("normal", "k"), "c": sum(dampers) if dampers else None}
+        return {**zone, **held, "g_i": scene.initial("g_n")}
 
     @property
     def bodies(self) -> SpringAndZone:

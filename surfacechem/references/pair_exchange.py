@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class PairExchange(Reference):
@@ -47,6 +47,11 @@ class PairExchange(Reference):
     T_0: float = parameter("K", "reference temperature", above=0)
     T_1: float = parameter("K", "initial temperature of body 1", above=0)
     T_2: float = parameter("K", "initial temperature of body 2", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        bodies = {name: scene.constant(name) for name in ("C_1", "C_2", "T_0")}
+        return {**bodies, "h": scene.conductance(), "T_1": scene.initial("T_1"), "T_2": scene.initial("T_2")}
 
     @property
     def equilibrium_temperature(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array
+from surfacechem.references.base import Array, Parameters, SceneView
 from surfacechem.references.sudden_debonding import SuddenDebonding
 
 
@@ -32,6 +32,10 @@ class PulledToDebonding(SuddenDebonding):
     name: ClassVar[str] = "pulled-to-debonding"
 
     w_dot: float = parameter("m/s", "speed of the far field", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), "w_dot": scene.ramp("w_n")}
 
     @property
     def debonding_time(self) -> float:

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._exponentials import second_difference
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references._special_functions import second_difference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class ReservoirExchange(Reference):
@@ -37,6 +37,10 @@ class ReservoirExchange(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**scene.uniform_body, "h": scene.conductance(), "T_a": scene.surroundings_temperature}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         scaled = self.h * self.T_0 / (self.C * self.T_a) * t

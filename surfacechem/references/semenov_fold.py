@@ -10,8 +10,8 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 SERIES_LIMIT = 0.1
 
@@ -41,6 +41,11 @@ class SemenovFold(Reference):
     beta: float = parameter("1/K", "growth of the dissipation per kelvin", above=0)
     H: float = parameter("W/(m^2 K)", "sum of the conductances to the bodies", above=0)
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {"T_0": scene.constant("T_0"), "beta": scene.friction("beta")}
+        return {**own, "H": scene.conductance(), "D_0": scene.heating_at_T_0}
 
     def __post_init__(self) -> None:
         """Refuse what has ignited."""

@@ -2,15 +2,60 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._spring_slider import Slip
-from surfacechem.references.base import Array, Reference
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A slip that begins at rest with the spring pulling by `drop` [Pa] more than sliding friction resists."""
+
+    m: float
+    k: float
+    V: float
+    drop: float
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency [1/s] of mass and spring."""
+        return math.sqrt(self.k / self.m)
+
+    @property
+    def stretch(self) -> float:
+        """Elongation [m] of the spring above that of steady sliding, at the start."""
+        return self.drop / self.k
+
+    @property
+    def duration(self) -> float:
+        """Time [s] until the mass rests again."""
+        return (math.pi + 2.0 * math.atan2(self.V, self.stretch * self.omega)) / self.omega
+
+    @property
+    def distance(self) -> float:
+        """Slip [m] from rest to rest."""
+        return self.V * self.duration + 2.0 * self.stretch
+
+    @property
+    def v_max(self) -> float:
+        """Largest velocity [m/s]."""
+        return self.V + math.hypot(self.V, self.stretch * self.omega)
+
+    def motion(self, t: Array) -> tuple[Array, Array, Array]:
+        """Slip [m], velocity [m/s] and spring traction above sliding friction [Pa] at times since the start."""
+        angle = self.omega * t
+        swing = 2.0 * np.sin(0.5 * angle) ** 2  # 1 - cos
+        away = self.V / self.omega
+        slip = self.V * t + self.stretch * swing - away * np.sin(angle)
+        v = self.stretch * self.omega * np.sin(angle) + self.V * swing
+        return slip, v, self.k * (self.stretch * np.cos(angle) + away * np.sin(angle))
 
 
 class StickSlip(Reference):
@@ -37,6 +82,14 @@ class StickSlip(Reference):
     V: float = parameter("m/s", "speed of the spring's end", above=0)
     t_s: float = parameter("Pa", "traction that sticking bears", above=0)
     t_k: float = parameter("Pa", "traction of sliding", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        held = {name: scene.support("tangential", name) for name in ("m", "k")}
+        mu, mu_s, p = scene.friction("mu"), scene.friction("mu_s"), scene.initial("p")
+        if mu is None or p is None:
+            return {**held, "V": scene.ramp("w_t")}
+        return {**held, "V": scene.ramp("w_t"), "t_k": mu * p, "t_s": max(mu, mu_s or 0.0) * p}
 
     def __post_init__(self) -> None:
         """Refuse a limit below the traction of sliding."""

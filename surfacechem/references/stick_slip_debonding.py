@@ -7,10 +7,37 @@ from typing import ClassVar
 
 import numpy as np
 
-from surfacechem.references._bonded_slider import BondedSlider
-from surfacechem.references._spring_slider import Slip
-from surfacechem.references.base import Array
-from surfacechem.references.stick_slip import StickSlip
+from surfacechem.contracts.terms import parameter
+from surfacechem.errors import InputError
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.stick_slip import Slip, StickSlip
+
+
+class BondedSlider(Reference):
+    """A mass on a driven spring whose contact sticks the better the more bonds it has."""
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    k: float = parameter("Pa/m", "tangential stiffness", above=0)
+    V: float = parameter("m/s", "speed of the spring's end", above=0)
+    p: float = parameter("Pa", "contact pressure", above=0)
+    mu_b: float = parameter("1", "static friction coefficient of complete bonding", above=0)
+    mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
+    mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        held = {name: scene.support("tangential", name) for name in ("m", "k")}
+        T, T_0 = scene.temperature, scene.constant("T_0")
+        cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
+        limits = {name: scene.friction(name) for name in ("mu_b", "mu_ub")}
+        static = {name: None if mu is None else mu * cooler for name, mu in limits.items()}
+        return {**held, **static, "V": scene.ramp("w_t"), "p": scene.initial("p"), "mu_k": scene.friction("mu")}
+
+    def __post_init__(self) -> None:
+        """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
+        super().__post_init__()
+        if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
+            raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
 
 
 class StickSlipDebonding(BondedSlider):

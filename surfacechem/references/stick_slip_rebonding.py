@@ -12,10 +12,10 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._bonded_slider import BondedSlider
-from surfacechem.references._roots import increasing_root
-from surfacechem.references._spring_slider import Slip
-from surfacechem.references.base import Array
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references.stick_slip import Slip
+from surfacechem.references.stick_slip_debonding import BondedSlider
 
 CYCLES = 1_000_000
 
@@ -61,6 +61,10 @@ class StickSlipRebonding(BondedSlider):
     name: ClassVar[str] = "stick-slip-rebonding"
 
     tau: float = parameter("s", "time scale of bonding", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), "tau": scene.relaxation_time}
 
     @property
     def critical_speed(self) -> float:

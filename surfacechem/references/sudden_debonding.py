@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._energy import EnergyModel, QuadraticEnergy
-from surfacechem.references.base import Array, Reference
+from surfacechem.references._bodies import ConstantCapacity, EnergyModel, QuadraticEnergy
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class SuddenDebonding(Reference):
@@ -42,6 +42,12 @@ class SuddenDebonding(Reference):
     t_n: float = parameter("Pa", "traction before")
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     compliance: float = parameter("m/Pa", "compliance 1/E_n of the bonded interface", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        loaded = scene.initial("t_n") if scene.is_prescribed("t_n") else scene.limit("t_max")
+        bonds = {"K_0": scene.potential("K_0"), "phi_i": scene.initial("phi")}
+        return {**scene.uniform_body, **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
 
     @property
     def released_energy(self) -> float:
@@ -77,3 +83,21 @@ class SuddenDebonding(Reference):
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         return {"T": self.final_temperature, "entropy_change": self.entropy_change}
+
+
+class SuddenDebondingConstantCapacity(SuddenDebonding):
+    r"""Temperature after sudden debonding under a traction, constant capacities, uniform temperature, and its verdict.
+
+    .. math:: C(T_f-T_i)=E:=\frac{t_n^2}2\Big(\frac1k+\frac1{E_n}\Big)-\frac{K_0}2\phi_i(2-\phi_i)
+
+    Admissible iff :math:`E\ge0`; impossible at :math:`E\le-CT_i`.
+
+    Source: Sauer, Duong & Mandadapu (2021), section 6.3, with constant capacities and the entropy of the jump.
+
+    >>> bonds = SuddenDebondingConstantCapacity(C=2.0, T_0=300.0, T_i=300.0, K_0=600.0, t_n=1e8, k=1e13)
+    >>> bonds.final_temperature, bonds.verdict
+    (400.0, 'admissible')
+    """
+
+    name: ClassVar[str] = "sudden-debonding-constant-capacity"
+    model: ClassVar[EnergyModel] = ConstantCapacity()

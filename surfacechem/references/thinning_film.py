@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._exponentials import first_difference, second_difference
-from surfacechem.references._heated_body import FrictionallyHeated
-from surfacechem.references._roots import increasing_root
-from surfacechem.references.base import Array
+from surfacechem.references._bodies import FrictionallyHeated
+from surfacechem.references._inversion import increasing_root
+from surfacechem.references._special_functions import first_difference, second_difference
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
 class ThinningFilm(FrictionallyHeated):
@@ -36,6 +36,10 @@ class ThinningFilm(FrictionallyHeated):
     name: ClassVar[str] = "thinning-film"
 
     beta: float = parameter("1/K", "decay of the viscosity per kelvin", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), "beta": scene.friction("beta")}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         initial = self.D_0 * np.exp(-self.beta * (self.T_i - self.T_0))

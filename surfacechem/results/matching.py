@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
-from surfacechem.references._across import across
-from surfacechem.references._start import Start
-from surfacechem.references.base import Reference
+from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
+from surfacechem.references.base import Reference, SceneView
 from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Trajectory
@@ -53,12 +51,12 @@ BRIEF = 1e-7
 
 def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
-    start = Start(run, scene)
-    reference = match(references.get(name), options, start)
-    solution = partial(_solution, reference, start)
+    view = SceneView(scene, run)
+    reference = match(references.get(name), options, view)
+    solution = partial(_solution, reference, view)
     exact = beside_events(solution, run)
     if reference.continuous:
-        return across(reference, exact, scene, run)
+        return _with_profiles(reference, exact, scene, run)
     _check_start(exact, run)
     _check(solution, run)
     return exact
@@ -98,14 +96,14 @@ def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Traj
             exact[name][at] = np.where(nearer, other, exact[name][at])
 
 
-def match(kind: type[Reference], options: Mapping[str, float], start: Start) -> Reference:
+def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) -> Reference:
     """The reference with the parameters of the scene, and with ``options`` for those that the scene does not tell.
 
     InputError where an option is not what the scene has, as after a change of the scene alone.
     """
-    values = dict(options)
+    values, told = dict(options), kind.from_scene(view)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
-        found, spec = start.find(item.name), item.metadata["spec"]
+        found, spec = told.get(item.name), item.metadata["spec"]
         if found is None and item.name not in values and item.default is dataclasses.MISSING:
             raise InputError(f"it needs {item.name} ({spec.text}), which the scene has not.")
         if found is not None and not _same(values.setdefault(item.name, found), found, 0.0):
@@ -118,13 +116,38 @@ def _same(a: float, b: float, scale: float) -> bool:
     return abs(a - b) <= max(SAME * max(abs(a), abs(b)), NOTHING * scale)
 
 
-def _solution(reference: Reference, start: Start, t: Array) -> dict[str, Array]:
+def _solution(reference: Reference, view: SceneView, t: Array) -> dict[str, Array]:
     """Exact values under the names of the scene; from the heat also the temperature that it gives."""
     exact = reference.solution(t)
-    if "T" not in exact and "heat" in exact:
-        with suppress(KeyError):
-            exact["T"] = start.heated(exact["heat"])
-    return renamed(exact, start.run)
+    energies = {body.energy.name() for body in view.scene.bodies if body.energy is not None}
+    if "T" not in exact and "heat" in exact and energies in ({"quadratic"}, {"constant"}) and view.temperature:
+        model = QuadraticEnergy() if energies == {"quadratic"} else ConstantCapacity()
+        T, T_0 = view.temperature, view.constant("T_0")
+        exact["T"] = T + model.rise(exact["heat"], view.capacity, T if T_0 is None else T_0, T)
+    return renamed(exact, view.run)
+
+
+def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scene, run: Trajectory) -> dict[str, Array]:
+    """Exact values of bodies without cells by the names of the scene, with their profiles.
+
+    Two bodies have no temperature where they touch at the instant when they do: ours is taken.
+    """
+    system, times = run.model.system, run.result.times
+    states = [state.name for state in system.states]
+    known = [*states, *(item.name for item in system.outputs)]
+    result = {name: np.array(values) for name, values in exact.items() if name in known}
+    shared = scene.bodies[0].temperature
+    if "T" in exact and shared == scene.bodies[1].temperature and isinstance(shared, str):
+        result[shared] = np.array(exact["T"])
+    for item in system.profiles:
+        places = np.array(item.points) * run.values[item.thickness]
+        result[item.name] = reference.profile(item.number, places, times)
+        if item.surface in states:
+            ours = run.result.outputs[0, states.index(item.surface)]
+            result[item.name][0, 0] = ours
+            if item.surface in result:
+                result[item.surface][0] = ours
+    return result
 
 
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:

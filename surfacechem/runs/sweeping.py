@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.format import Case, Reference
-from surfacechem.references._start import Start
+from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
 from surfacechem.results.achieved import apart, floor, second_run, stated
 from surfacechem.results.matching import beside_events, exact_values, match, renamed
@@ -65,7 +65,7 @@ def _against_exact(case: Case, done: Sweep, named: Reference) -> SweepAccuracy:
     errors = np.full(len(done), np.nan)
     found = {which: np.full(len(done), np.nan) for which in WORDS if done.statistics}
     for i in begun:
-        reference = match(references.get(named.name), named.options, Start(done[i], case.scene))
+        reference = match(references.get(named.name), named.options, SceneView(case.scene, done[i]))
         for which, values in found.items():
             values[i] = getattr(reference, which)
         errors[i] = _of_statistics(done, i, reference) if found else _of_quantities(done, i, reference)

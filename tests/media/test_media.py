@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from oracles import CouetteFlow
 from scipy.integrate import simpson, solve_bvp
 from scipy.optimize import brentq
 
@@ -23,7 +24,6 @@ from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
-from surfacechem.references.couette_flow import CouetteFlow
 from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
 from surfacechem.runs import simulation

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles import get
 from scenes import varying
 
 from surfacechem.laws.bonding import BondEnergy
@@ -14,7 +15,7 @@ from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.model.assemble import assemble
-from surfacechem.references import Reference, get
+from surfacechem.references import Reference
 from surfacechem.scene import Body, Interface, Mounting, Scene, Sites
 from surfacechem.solve.run import Model, Run, Trajectory
 

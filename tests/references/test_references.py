@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles import get
 
 from surfacechem.errors import InputError
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references import Reference, get
+from surfacechem.references import Reference
 from surfacechem.references.semenov_fold import scaled_rise
 
 FOLDER = Path(__file__).parent

@@ -5,9 +5,10 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from oracles import get
 
 from surfacechem.errors import InputError
-from surfacechem.references import Reference, get
+from surfacechem.references import Reference
 
 TIMES = np.array([0.0, 1e-17, 1e-9, 1e-3, 0.1, 0.7, 3.0, 20.0, 1e3, 1e6])
 BODIES = {"C_1": 1.5, "C_2": 0.7, "C_c": 0.3, "T_0": 300.0}

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles import get
 from test_references import assert_exact, effect_of_rounding
 
 from surfacechem.errors import InputError
-from surfacechem.references import get
-from surfacechem.references._energy import ConstantCapacity, QuadraticEnergy
+from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 
 FOLDER = Path(__file__).parent
 EPS = np.finfo(float).eps

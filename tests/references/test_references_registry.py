@@ -1,21 +1,25 @@
 """Names, files and laziness of the exact solutions."""
 
+import importlib.util
 import subprocess
 import sys
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
+import surfacechem
 from surfacechem import references
 from surfacechem.errors import InputError
+from surfacechem.format.schema import schema
 from surfacechem.references import Reference
 
 
-def test_every_file_holds_the_solution_it_is_named_after():
+def test_every_file_holds_the_solutions_it_is_named_after():
     for name, kind in references.all().items():
         assert issubclass(kind, Reference)
-        assert kind.name == name
-        assert kind.__module__.rpartition(".")[2] == name.replace("-", "_")
+        assert references.get(name) is kind
+        assert kind.__module__.rpartition(".")[2].replace("_", "-") in name
 
 
 @pytest.mark.parametrize("name", references.names())
@@ -45,7 +49,7 @@ loaded = [m.rpartition(".")[2] for m in sys.modules if m.startswith("surfacechem
 print(sorted(loaded), "scipy" in sys.modules)
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "['base', 'sliding'] False"
+    assert run.stdout.strip() == "['base', 'scene_view', 'sliding'] False"
 
 
 def test_times_of_any_shape():
@@ -54,3 +58,83 @@ def test_times_of_any_shape():
         assert all(value.shape == shape for value in sliding.solution(t).values())
     with pytest.raises(InputError, match="exact for 0 <= t"):
         sliding.solution(-1.0)
+
+
+ADDED = '''
+"""A body that a reservoir cools."""
+
+import numpy as np
+
+from surfacechem.contracts.terms import parameter
+from surfacechem.references.base import Array, Reference, SceneView
+
+
+class NewtonCooling(Reference):
+    r"""A body of constant capacity that relaxes to the temperature of a reservoir.
+
+    .. math:: T = T_a + (T_i - T_a)\\,e^{-ht/C}
+
+    Any t >= 0. Source: Newton (1701), integrated.
+    """
+
+    name = "newton-cooling"
+
+    C: float = parameter("J/(m^2 K)", "heat capacity", above=0)
+    h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+    T_a: float = parameter("K", "temperature of the reservoir", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView):
+        start = {"T_i": scene.temperature, "T_a": scene.surroundings_temperature}
+        return {"C": scene.capacity, "h": scene.conductance(), **start}
+
+    def quantities(self, t: Array):
+        return {"T": self.T_a + (self.T_i - self.T_a) * np.exp(-self.h * t / self.C)}
+'''
+
+
+@pytest.fixture
+def added(tmp_path, monkeypatch):
+    """One more file beside those of the package."""
+    (tmp_path / "newton_cooling.py").write_text(ADDED)
+    monkeypatch.setattr(references, "__path__", [*references.__path__, str(tmp_path)])
+    yield
+    sys.modules.pop("surfacechem.references.newton_cooling", None)
+
+
+CHANGES = ["bodies.body.capacity=constant", "reference=newton-cooling"]
+
+
+def test_an_exact_solution_is_added_by_its_file_alone(added):
+    """It is found, listed, offered by the schema, shown in the documentation, read off the scene and compared."""
+    assert "newton-cooling" in references.names()
+    assert references.get("newton-cooling").name == "newton-cooling"
+    names, _ = schema()["properties"]["reference"]["anyOf"]
+    assert "newton-cooling" in names["enum"]
+    solution = surfacechem.run("reservoir-exchange", CHANGES)
+    assert solution.accuracy.source == "exact solution newton-cooling"
+    assert solution.accuracy.error < 1e-9
+    assert {"T_1", "T_1_exact"} <= set(solution.dataset)
+    hooks = Path(__file__).parents[2] / "docs" / "hooks.py"
+    spec = importlib.util.spec_from_file_location("hooks_of_the_documentation", hooks)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    assert "## `newton-cooling` { #newton-cooling }" in made.made_references()
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("bodies.body.capacity=quadratic", "it misses the equation of T_1 by"),
+        (
+            "heat=[radiation: {between: [body, reservoir], epsilon_1: 0.9}]",
+            "it needs h (conductance",
+        ),
+        ("reference={name: newton-cooling, h: 44}", "it is given for h = 44 W/(m^2 K); the scene has 40 W/(m^2 K)."),
+    ],
+)
+def test_an_added_solution_is_of_its_own_scene_only(added, change, reason):
+    source = surfacechem.run("reservoir-exchange", [*CHANGES, change]).accuracy.source
+    assert "the exact solution newton-cooling is not of this scene" in source
+    assert reason in source

@@ -10,10 +10,8 @@ import numpy as np
 
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
-from surfacechem.references.bonding import Bonding
+from surfacechem.references.bonding import Bonding, EndothermicBonding, ExothermicBonding
 from surfacechem.references.cooling_to_zero import CoolingToZero
-from surfacechem.references.endothermic_bonding import EndothermicBonding
-from surfacechem.references.exothermic_bonding import ExothermicBonding
 from surfacechem.references.exponential_affinity import ExponentialAffinity
 from surfacechem.studies.stability.regime import Array, Exact, Problem, Refused, Regime, Stops
 

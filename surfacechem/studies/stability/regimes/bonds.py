@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references.bell_constant_force import BellConstantForce
-from surfacechem.references.shared_load_cluster import SharedLoadCluster
+from surfacechem.references.bell import BellConstantForce
+from surfacechem.references.cluster import SharedLoadCluster
 from surfacechem.references.sudden_debonding import SuddenDebonding
 from surfacechem.studies.stability.regime import Array, Exact, Problem, Refused, Regime, Stops
 

@@ -1,0 +1,89 @@
+r"""Heat in the bodies: the two energy models and what shares one temperature.
+
+The models are written in the excess temperature :math:`\theta=T-T_0`, so that nothing cancels close to the reference
+temperature. Source: Sauer, Duong & Mandadapu (2021), quadratic model; Callen (1985), Thermodynamics, constant capacity.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from fractions import Fraction
+
+import numpy as np
+
+from surfacechem.contracts.terms import parameter
+from surfacechem.references.base import Array, Parameters, Reference, SceneView
+
+
+class EnergyModel(ABC):
+    """How energy and entropy of a capacity `C` depend on temperature; both are zero at `T_0`."""
+
+    @abstractmethod
+    def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
+        """Temperature rise above `T_i` when `energy` is added."""
+
+    @abstractmethod
+    def energy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Energy at the temperature `T_0 + excess`."""
+
+    @abstractmethod
+    def entropy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Entropy at the temperature `T_0 + excess`."""
+
+
+class QuadraticEnergy(EnergyModel):
+    r""":math:`U=\frac{C}{2T_0}(T^2-T_0^2)`, :math:`S=C\,(T/T_0-1)`, capacity :math:`C\,T/T_0`."""
+
+    def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
+        difference_of_squares = 2.0 * T_0 * energy / C
+        return np.asarray(difference_of_squares / (T_i + np.sqrt(T_i**2 + difference_of_squares)))
+
+    def energy(self, excess: Array, C: float, T_0: float) -> Array:
+        return C * excess * (1.0 + excess / (2.0 * T_0))
+
+    def entropy(self, excess: Array, C: float, T_0: float) -> Array:
+        return C * excess / T_0
+
+
+class ConstantCapacity(EnergyModel):
+    r""":math:`U=C\,(T-T_0)`, :math:`S=C\ln(T/T_0)`."""
+
+    def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
+        return energy / C
+
+    def energy(self, excess: Array, C: float, T_0: float) -> Array:
+        return C * excess
+
+    def entropy(self, excess: Array, C: float, T_0: float) -> Array:
+        return np.asarray(C * np.log1p(excess / T_0))
+
+
+class PerfectContact(Reference):
+    """The capacities that share one temperature."""
+
+    C_1: float = parameter("J/(m^2 K)", "heat capacity of body 1 at T_0", above=0)
+    C_2: float = parameter("J/(m^2 K)", "heat capacity of body 2 at T_0", above=0)
+    C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface at T_0", default=0.0, at_least=0)
+    T_0: float = parameter("K", "reference temperature", above=0)
+
+    @property
+    def C(self) -> float:
+        """Total heat capacity at T_0."""
+        return float(self._exact_C)
+
+    @property
+    def _exact_C(self) -> Fraction:
+        return Fraction(self.C_1) + Fraction(self.C_2) + Fraction(self.C_c)
+
+
+class FrictionallyHeated(Reference):
+    """A total capacity and the dissipation it would see at the reference temperature."""
+
+    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
+    T_0: float = parameter("K", "reference temperature", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+    D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**scene.uniform_body, "D_0": scene.heating_at_T_0}
