@@ -115,14 +115,6 @@ def lambert_of_exp(a: Array) -> Array:
     array([1.00000000e+00, 9.99079058e+03])
     """
     low, high = np.minimum(a, 1.0), np.maximum(a, 1.0)
-    small = np.exp(increasing_root(_of_logarithm, low, low - np.exp(low), low))
-    large = increasing_root(_of_w, high, 0.5 * (1.0 + high), high)
+    small = np.exp(increasing_root(lambda s: (s + np.exp(s), 1.0 + np.exp(s)), low, low - np.exp(low), low))
+    large = increasing_root(lambda w: (w + np.log(w), 1.0 + 1.0 / w), high, 0.5 * (1.0 + high), high)
     return np.where(a < 1.0, small, large)
-
-
-def _of_logarithm(s: Array) -> tuple[Array, Array]:
-    return s + np.exp(s), 1.0 + np.exp(s)
-
-
-def _of_w(w: Array) -> tuple[Array, Array]:
-    return w + np.log(w), 1.0 + 1.0 / w

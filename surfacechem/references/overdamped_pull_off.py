@@ -100,15 +100,11 @@ class OverdampedPullOff(Reference):
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         low, high = np.full_like(t, self.g_i), np.full_like(t, self.end_gap)
-        grid = self._x_gap + self.width * np.sinh(np.linspace(*self._ends(), GRID))
+        first, last = np.arcsinh((np.array([self.g_i, self.end_gap]) - self._x_gap) / self.width)
+        grid = self._x_gap + self.width * np.sinh(np.linspace(first, last, GRID))
         guess = np.where(t > 0, np.interp(t, self._times(grid), grid), low)
         g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self._x_gap)), t, low, high, guess)
         return {"g_n": g, "t_n": self.bodies.traction(g), "v_n": self._force(g - self._x_gap) / self.c}
-
-    def _ends(self) -> tuple[float, float]:
-        """Both ends of the passage in arsinh of the distance from the fold."""
-        first, last = ((g - self._x_gap) / self.width for g in (self.g_i, self.end_gap))
-        return math.asinh(first), math.asinh(last)
 
     @property
     def _x_gap(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -62,16 +62,15 @@ class SceneView:
         """A constant of what supports the bodies in the direction 'normal' or 'tangential'."""
         return self.run.values.get(f"mechanics.{direction}.{name}")
 
-    def conductance(self, chosen: Callable[[tuple[str, str]], bool] = lambda ends: True) -> float | None:
-        """Sum of the constant conductances of the chosen heat paths [W/(m^2 K)]; None if there is none, or one varies
-        by a law of its own.
-        """
-        found = [self.run.values.get(f"{law.path}.h") for law in self.scene.heat if chosen(law.between)]
-        return sum(h for h in found if h is not None) if found and None not in found else None
+    def conductance(self, into: int | None = None) -> float | None:
+        """Sum of the conductances of all heat paths, or of those between the interface and body 1 or 2 [W/(m^2 K)].
 
-    def conductance_into(self, k: int) -> float | None:
-        """Sum of the conductances between the interface and body k."""
-        return self.conductance(lambda ends: set(ends) == {"interface", self.scene.bodies[k - 1].name})
+        None if there is no path, or one has no constant h.
+        """
+        ends = {"interface", self.scene.bodies[into - 1].name} if into else None
+        chosen = [law for law in self.scene.heat if ends is None or set(law.between) == ends]
+        found = [self.run.values.get(f"{law.path}.h") for law in chosen]
+        return sum(h for h in found if h is not None) if found and None not in found else None
 
     # -- bodies and sites ----------------------------------------------------------------------------------------------
 
@@ -117,10 +116,6 @@ class SceneView:
     def initial(self, name: str) -> float | None:
         """Initial value of a state, or of a named quantity: a load for instance."""
         return self._states[name] if name in self._states else self._outputs.get(name)
-
-    def is_prescribed(self, variable: str) -> bool:
-        """Whether the scene's loading gives the variable."""
-        return any(path.startswith(f"loading.{variable}.") for path in self.run.values)
 
     @property
     def bonding_rate(self) -> float | None:

@@ -45,7 +45,7 @@ class SuddenDebonding(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        loaded = scene.initial("t_n") if scene.is_prescribed("t_n") else scene.limit("t_max")
+        loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.limit("t_max")
         bonds = {"K_0": scene.potential("K_0"), "phi_i": scene.initial("phi")}
         return {**scene.uniform_body, **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
 
@@ -64,13 +64,9 @@ class SuddenDebonding(Reference):
     @property
     def entropy_change(self) -> float:
         """Entropy [J/(m^2 K)] that the event produces; nan if it is impossible."""
-        before, after = (
-            float(self.model.entropy(np.array(T - self.T_0), self.C, self.T_0)) for T in self._temperatures()
-        )
-        return after - before
-
-    def _temperatures(self) -> tuple[float, float]:
-        return self.T_i, self.final_temperature
+        excess = np.array([self.T_i, self.final_temperature]) - self.T_0
+        before, after = self.model.entropy(excess, self.C, self.T_0)
+        return float(after - before)
 
     @property
     def verdict(self) -> str:

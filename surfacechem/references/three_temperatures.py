@@ -29,7 +29,7 @@ class HeatedMedium(Reference):
     def from_scene(cls, scene: SceneView) -> Parameters:
         bodies = {name: scene.constant(name) for name in ("C_1", "C_2")}
         start = {name: scene.initial(name) for name in ("T_1", "T_2")}
-        paths = {f"h_{k}": scene.conductance_into(k) for k in (1, 2)}
+        paths = {f"h_{k}": scene.conductance(into=k) for k in (1, 2)}
         return {**bodies, **start, **paths, "D_0": scene.heating_at_T_0}
 
 
@@ -155,7 +155,9 @@ class ThreeTemperaturesNoCapacity(HeatedMedium):
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         share_1, share_2 = self.h_1 / (self.h_1 + self.h_2), self.h_2 / (self.h_1 + self.h_2)
         h = share_1 * self.h_2
-        source, source_energy = self._source(t)
+        decay = -self.gamma * t
+        source = self.D_0 + self.D_1 * np.exp(decay)
+        source_energy = self.D_0 * t + self.D_1 * t * first_difference(np.zeros_like(t), decay)
         difference, difference_integral = self._difference(t, h, share_2 / self.C_2 - share_1 / self.C_1)
         T_1 = self.T_1 + (share_1 * source_energy + h * difference_integral) / self.C_1
         T_2 = self.T_2 + (share_2 * source_energy - h * difference_integral) / self.C_2
@@ -166,11 +168,6 @@ class ThreeTemperaturesNoCapacity(HeatedMedium):
             "q_1": share_1 * source + h * difference,
             "q_2": share_2 * source - h * difference,
         }
-
-    def _source(self, t: Array) -> tuple[Array, Array]:
-        decay = -self.gamma * t
-        released = self.D_0 * t + self.D_1 * t * first_difference(np.zeros_like(t), decay)
-        return self.D_0 + self.D_1 * np.exp(decay), released
 
     def _difference(self, t: Array, h: float, drive: float) -> tuple[Array, Array]:
         """T_2 - T_1 and its integral over time."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles import get
 from test_references import assert_exact, effect_of_rounding
 
 from surfacechem.errors import InputError
+from surfacechem.references import get
 from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 
 FOLDER = Path(__file__).parent
@@ -18,7 +18,6 @@ EPS = np.finfo(float).eps
 FRICTION = {"m": 10.0, "k": 1e8, "t_s": 6e4, "t_k": 4e4}
 REBONDING = {"m": 10.0, "k": 1e8, "p": 1e5, "mu_b": 0.7, "mu_ub": 0.4, "mu_k": 0.4, "tau": 2.0}
 ZONE = {"t_max": 1e6, "g_0": 1e-8}
-FLATS = {"n_1": 2e19, "n_2": 3e19, "psi_0": 4e-21, "g_0": 3e-10}
 
 
 def read(name: str) -> tuple[dict[str, np.ndarray], dict[str, float]]:
@@ -236,44 +235,6 @@ class TestCohesion:
         assert np.all(np.diff(T) < 0.0)
         assert T[-1] > 0.0
 
-    def test_bond_springs_in_equilibrium(self):
-        columns, expect = read("h_damage_equilibrium")
-        bonds = get("bond-springs-in-equilibrium")(E_b=1e16, K_0=0.2, g_dot=1e-9)
-        exact = bonds.solution(columns["g"] / 1e-9)
-        assert_exact(exact["phi"], columns["phi"], absolute=2 * EPS)
-        assert_exact(exact["t_n"], columns["t_n"], absolute=2 * EPS * expect["t_peak"])
-        found = [bonds.peak_gap, bonds.strength, bonds.work_of_separation]
-        assert found == pytest.approx([expect[name] for name in ("g_peak", "t_peak", "work")], rel=1e-15)
-
-
-class TestLongRange:
-    def test_flats(self):
-        columns, expect = read("i_lj_flat_flat")
-        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
-        assert_exact(flats.energy(columns["g"]), columns["W"])
-        assert_exact(flats.traction(columns["g"]), columns["t_n"])
-        found = [flats.A, flats.equilibrium_gap, flats.strength_gap, flats.strength, flats.adhesion_energy]
-        assert found == pytest.approx(list(expect.values()), rel=1e-14)
-        assert list(expect) == ["A", "g_zero", "g_peak", "t_peak", "W_adh"]
-        moving = get("lennard-jones-flats")(**FLATS, g_i=1e-9, g_dot=-1e-10)
-        assert moving.end_time == pytest.approx(10.0)
-        assert_exact(moving.solution(5.0)["t_n"], flats.traction(np.array(5e-10)), relative=1e-12)
-
-    @pytest.mark.parametrize("row", rows("i_lj_snap"), ids=lambda row: f"{row['k_over_kmax']:g}")
-    def test_snap(self, row):
-        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
-        assert flats.largest_softening == pytest.approx(read("i_lj_snap")[1]["k_max"], rel=1e-14)
-        snap, pull = flats.snap_in(float(row["k_eff"])), flats.pull_off(float(row["k_eff"]))
-        rounding = 1e-14 + 8 * EPS / math.sqrt(1.0 - row["k_over_kmax"])
-        exact = [row[name] for name in ("g_snap_in", "w_snap_in", "g_pull_off", "w_pull_off")]
-        assert [snap.g, snap.w, pull.g, pull.w] == pytest.approx(exact, rel=rounding)
-
-    def test_a_stiff_spring_holds(self):
-        flats = get("lennard-jones-flats")(**FLATS, g_i=1e-9)
-        for k in (0.0, 1.5e19):
-            with pytest.raises(InputError, match="no jump with k"):
-                flats.snap_in(k)
-
 
 class TestContact:
     def test_closing_film(self):
@@ -293,13 +254,6 @@ class TestContact:
         exact = get("elastic-contact")(k=1e12, E_n=float(row["E_n"]), w_i=1e-8).solution(0.0)
         for column, quantity in {"g": "g_n", "t_n": "t_n", "U_el_bulk": "E_spring_n", "U_contact": "U_contact"}.items():
             assert exact[quantity] == pytest.approx(row[column], rel=1e-14)
-
-    @pytest.mark.parametrize("row", rows("x13_negative_capacity_growth"), ids=lambda row: f"{row['Cc']:g}")
-    def test_growth_of_a_deviation(self, row):
-        given = {"K_2": 240.0, "phi": 0.0, "T": 300.0, "T_0": 300.0, "h_1": 500.0, "h_2": 300.0}
-        medium = get("endothermic-medium")(C_c=float(row["Cc"]), **given)
-        assert medium.capacity == pytest.approx(row["C_eff"], rel=1e-13)
-        assert medium.growth_rate == pytest.approx(row["growth_rate"], rel=1e-13)
 
 
 VERDICTS = {"ok": "admissible", "entropy-violating": "entropy-violating", "impossible": "impossible"}
