@@ -15,7 +15,7 @@ run: $(RUNTIME)  ## the main case: its error, its run time, its plot
 	$(BIN)/surfacechem run exothermic -o results/exothermic.nc
 	$(BIN)/surfacechem plot results/exothermic.nc -o results/exothermic.png
 
-test: lint unit docs cases wheel  ## everything
+test: lint unit docs wheel  ## everything; the tests run every case
 
 lint: $(TOOLS)  ## style, types and which room imports which
 	$(BIN)/ruff check

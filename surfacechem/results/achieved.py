@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.results.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
 from surfacechem.results.audit import audit
-from surfacechem.results.event_table import SIDE, event_times
+from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.results.profiles import profile_values
 from surfacechem.results.solution import EARLIER, Accuracy
 from surfacechem.scene import Scene
@@ -219,19 +219,25 @@ def _names(trajectory: Trajectory) -> list[str]:
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
-    """In which events two runs differ, in words; empty where they have the same.
+    """In which events two runs differ, in words; empty where they have the same. Kinks do not count.
 
     >>> difference({"slip": [0.1]}, {"slip": [0.1, 0.2], "stop": [0.3]})
     'other events: 2 slip instead of 1, 1 stop instead of 0'
     """
-    counts = {name: (len(expected.get(name, ())), len(found.get(name, ()))) for name in {**expected, **found}}
+    names = [name for name in {**expected, **found} if not name.startswith(KINK)]
+    counts = {name: (len(expected.get(name, ())), len(found.get(name, ()))) for name in names}
     parts = [f"{theirs} {name} instead of {ours}" for name, (theirs, ours) in counts.items() if theirs != ours]
     return f"other events: {', '.join(parts)}" if parts else ""
 
 
 def event_error(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> float:
-    """Largest error of the times of events, each relative to its own time, or to FLOOR of the run if that is more."""
+    """Largest error of the times of events, each relative to its own time, or to FLOOR of the run if that is more.
+
+    Kinks of which one of the two has more are left out.
+    """
     errors = [
-        np.abs(found[name] - times) / np.maximum(times, FLOOR * end) for name, times in expected.items() if len(times)
+        np.abs(found[name] - times) / np.maximum(times, FLOOR * end)
+        for name, times in expected.items()
+        if len(times) == len(found.get(name, ())) > 0
     ]
     return float(max((error.max() for error in errors), default=0.0))

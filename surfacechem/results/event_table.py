@@ -25,6 +25,9 @@ SLOW = 1e-3
 
 REST = "rest"
 
+KINK = "kink of "
+"""How the names of events begin that change nothing but a formula."""
+
 
 @dataclass(frozen=True)
 class EventColumn:
@@ -76,15 +79,19 @@ def _rows(trajectory: Trajectory) -> list[Row]:
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
     """Times [s] of the events by name, in order; where physics stopped the run, also that of its end.
 
+    Names of kinks, at which a formula changes and nothing else, begin with KINK: whether one that is only grazed is met
+    is a matter of rounding.
+
     Impacts slower than a thousandth of the fastest so far are left out, with what happens at their time but rest: of
     endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
     rounding decides whether it still happens.
     """
     last = trajectory.run.times[-1] * (1 - SIDE)
     rows = [row for row in _telling(trajectory, _rows(trajectory)) if row.t < last]
-    found = {
-        name: np.array([row.t for row in rows if row.name == name]) for name in dict.fromkeys(r.name for r in rows)
-    }
+    times: dict[str, list[float]] = {}
+    for row in rows:
+        times.setdefault(row.name if row.jump else f"{KINK}{row.name}", []).append(row.t)
+    found = {name: np.array(values) for name, values in times.items()}
     ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
     return found | ended
 
