@@ -18,8 +18,7 @@ from mkdocs.structure.files import File, Files
 
 import surfacechem
 from surfacechem import format as case
-from surfacechem.plots import run as plots
-from surfacechem.plots import sweep as sweep_plots
+from surfacechem import plots
 
 BLUE, RED, GREEN, PINK = plots.COLOURS[:4]
 
@@ -172,7 +171,7 @@ def _temperatures(ax: Any, run: Any, *names: str) -> None:
 
 def force_spectrum() -> Figure:
     """Rupture forces over six decades of loading rate on the exact lines."""
-    return sweep_plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
+    return plots.figure(surfacechem.sweep("force-spectroscopy").dataset)
 
 
 def precision() -> Figure:
@@ -258,7 +257,7 @@ SWEPT = ("biotin-streptavidin", "catch-bond", "force-spectroscopy", "l-selectin-
 def gallery(name: str) -> Figure:
     """A case of the gallery."""
     if name in SWEPT:
-        return sweep_plots.figure(surfacechem.sweep(name).dataset)
+        return plots.figure(surfacechem.sweep(name).dataset)
     variables, against = GALLERY.get(name, (None, None))
     return plots.figure(surfacechem.run(name).dataset, variables, against)
 

@@ -16,16 +16,14 @@ from mkdocs.structure.files import File, Files
 
 import surfacechem
 from surfacechem import format as cases
-from surfacechem import references
+from surfacechem import plots, references
 from surfacechem.contracts.terms import Law, Potential, Spec, reads
 from surfacechem.documents import shipped as data
 from surfacechem.laws import FAMILIES, laws
-from surfacechem.plots import run as plots
 from surfacechem.quantities import VARIABLES
 from surfacechem.runs import listing
-from surfacechem.studies.stability import page as matrix
+from surfacechem.studies.regimes import regimes
 from surfacechem.studies.stability import stability
-from surfacechem.studies.stability.regimes import regimes
 
 PLACES = {
     "capacity": "bodies.NAME.capacity, with its parameters beside it",
@@ -66,7 +64,7 @@ def on_files(files: Files, config: Any) -> Files:
     for path, content in pages.items():
         files.append(File.generated(config, path, content=content))
     buffer = BytesIO()
-    plots.save(stability_study().figure, buffer, "svg")
+    plots.save(stability_study().figure(), buffer, "svg")
     files.append(File.generated(config, "images/stability.svg", content=buffer.getvalue()))
     return files
 
@@ -326,7 +324,7 @@ def stability_study() -> Any:
 
 def made_stability() -> str:
     """What each solver keeps of each regime."""
-    summary = matrix.summary(stability_study().matrix)
+    summary = stability_study().sections[0].tables[0]
     return table(("regime", "from .. to", *summary.heading[2:]), [tuple(row) for row in summary.rows])
 
 

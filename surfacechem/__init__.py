@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation, load, run, sweep
-    from surfacechem.studies.precision.comparing import precision
+    from surfacechem.studies.precision import precision
 
 __all__ = ["Simulation", "load", "precision", "run", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
     if name == "precision":
-        from surfacechem.studies.precision import comparing
+        from surfacechem.studies import precision
 
-        return comparing.precision
+        return precision.precision
     if name in __all__:
         from surfacechem.runs import simulation
 

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperGroup
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
 from surfacechem.results.waiting import wait_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from surfacechem.runs.simulation import Simulation
     from surfacechem.solve.run import Run
@@ -30,16 +31,27 @@ STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 
 BAD_INPUT, DIFFERENT, UNWRITTEN, SIGNALLED = 2, 1, 5, 128
 
-EXIT_CODES = """\b
-Exit codes:
-  0    finished
-  1    rerun: the new values are not bit for bit those of the file
-  2    bad input; nothing was computed
-  3    the run was stopped by physics, of a sweep every run; what it reached is written, with the reason
-  4    the run failed numerically; what it reached is written
-  5    what was computed could not be written where it should be
-  130  interrupted, or 128 and the number of another signal; nothing was written
-"""
+
+def exit_codes(own: Mapping[int, str]) -> str:
+    """What the help of a command says of its exit codes: its own, and those of every command."""
+    every = {
+        **own,
+        BAD_INPUT: "bad input; nothing was computed",
+        UNWRITTEN: "what was computed could not be written where it should be",
+        SIGNALLED + 2: f"interrupted, or {SIGNALLED} and the number of another signal; nothing was written",
+    }
+    return "\b\nExit codes:\n" + "".join(f"  {code:<4} {text}\n" for code, text in sorted(every.items()))
+
+
+EXIT_CODES = exit_codes(
+    {
+        STATUS["finished"]: "finished",
+        DIFFERENT: "rerun: the new values are not bit for bit those of the file",
+        STATUS["stopped"]: "the run was stopped by physics, of a sweep every run; what it reached is written, with the "
+        "reason",
+        STATUS["failed"]: "the run failed numerically; what it reached is written",
+    }
+)
 
 
 class SignalledError(BaseException):
@@ -111,14 +123,17 @@ class Commands(TyperGroup):
             raise typer.Exit(UNWRITTEN) from None
 
 
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
+CaseName = Annotated[str, Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
 Changes = Annotated[
-    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
+    list[str] | None, Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
 ]
-SolverName = Annotated[str | None, typer.Option("--solver", help="Another solver than the case's.")]
-Tolerance = Annotated[float | None, typer.Option("--rtol", help="Another relative tolerance than the case's.")]
-Wanted = Annotated[float | None, typer.Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
+SolverName = Annotated[str | None, Option("--solver", help="Another solver than the case's.")]
+SolverNames = Annotated[
+    str | None, Option("--solvers", help="Names of solvers, with commas between; all if not given.")
+]
+Tolerance = Annotated[float | None, Option("--rtol", help="Another relative tolerance than the case's.")]
+Wanted = Annotated[float | None, Option("--accuracy", help="Relative accuracy; solver and tolerance follow.")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print nothing unless something is wrong.")]
 
 
 def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accuracy: float | None = None) -> Run:
@@ -137,9 +152,10 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     run = simulation.case.run
     if accuracy is not None:
         return replace(run, solver=solver or AUTO, rtol=first_tolerance(accuracy), accuracy=accuracy)
-    if rtol is not None:
-        return replace(run, solver=solver or (OWN if run.solver == AUTO else run.solver), rtol=rtol, accuracy=None)
-    return replace(run, solver=solver or run.solver)
+    run = replace(run, solver=solver or run.solver)
+    if rtol is None:
+        return run
+    return replace(run, solver=OWN if run.solver == AUTO else run.solver, rtol=rtol, accuracy=None)
 
 
 def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
@@ -150,26 +166,41 @@ def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
 
     if brief:
         stepper.load_briefly()
-
     if not (quiet or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
-
     return wait_for(run)
 
 
-def studied(run: Callable[[], S], quiet: bool) -> S:
-    """The same for a study, which takes minutes: it says on a terminal what it is at."""
-    if sys.stderr.isatty() and not quiet:
-        import logging
+class _TriedError(Exception):
+    """Ends the trial of an output."""
 
-        logging.basicConfig(format="%(message)s ...")
-        logging.getLogger("surfacechem").setLevel(logging.INFO)
-    return solved(run, quiet)
+
+def refuse_unwritable(*targets: Path) -> None:
+    """InputError where a file could not be written, so that nothing is computed in vain; leaves no trace."""
+    from surfacechem.results.netcdf import replacing
+
+    for target in targets:
+        with suppress(_TriedError), replacing(target):
+            raise _TriedError
 
 
 def picture_kind(target: Path) -> str:
-    """The kind of picture that a file name asks for."""
+    """The kind of picture that a file name asks for; InputError where it is none or could not be written."""
     kind = target.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf"):
         raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
+    refuse_unwritable(target)
     return kind
+
+
+def listed(text: str) -> list[str]:
+    """Words with commas between."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def leave_with(status: str, reason: str = "") -> None:
+    """End with the exit code of a status, which a reason explains on stderr."""
+    if code := STATUS[status]:
+        if reason:
+            _tell(f"{status}: {reason}")
+        raise typer.Exit(code)

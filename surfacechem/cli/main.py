@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from surfacechem.cli import precision as cli_precision
-from surfacechem.cli import stability as cli_stability
+from surfacechem.cli import studies
 from surfacechem.cli.commands import (
     DIFFERENT,
     EXIT_CODES,
-    STATUS,
     CaseName,
     Changes,
     Commands,
@@ -22,17 +21,13 @@ from surfacechem.cli.commands import (
     Tolerance,
     Wanted,
     chosen,
+    leave_with,
+    listed,
     picture_kind,
+    refuse_unwritable,
     solved,
 )
-from surfacechem.cli.guard import refuse_unwritable
 from surfacechem.errors import InputError, Place, suggestion
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from xarray import Dataset
-
-    from surfacechem.results.solution import Solution
 
 app = typer.Typer(
     cls=Commands,
@@ -44,8 +39,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-app.command(epilog=cli_precision.CODES)(cli_precision.precision)
-app.command(epilog=cli_stability.CODES)(cli_stability.stability)
+app.command(epilog=studies.PRECISION_CODES)(studies.precision)
+app.command(epilog=studies.STABILITY_CODES)(studies.stability)
 
 
 def _version(wanted: bool) -> None:
@@ -58,9 +53,7 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def main(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
 ) -> None:
     """Contact interfaces that bond, slide, break and heat."""
 
@@ -68,16 +61,14 @@ def main(
 @app.command(epilog=EXIT_CODES)
 def run(
     case: CaseName,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>.nc if not given.")
-    ] = None,
+    output: Annotated[Path | None, Option("--output", "-o", help="netCDF file; <case name>.nc if not given.")] = None,
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
     accuracy: Wanted = None,
     error: Annotated[
         str,
-        typer.Option(
+        Option(
             "--error",
             help="Where the error is from: auto (the exact solution, else a second run), estimate (a second run at a "
             "tighter tolerance), balances (no second run).",
@@ -87,6 +78,7 @@ def run(
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.results.netcdf import dataset_path
+    from surfacechem.runs.report import run_summary
     from surfacechem.runs.simulation import load
 
     simulation = load(case, changes or ())
@@ -97,37 +89,25 @@ def run(
     refuse_unwritable(dataset_path(target))
     solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
     solution.write(target)
-    _conclude(solution, target, quiet)
-
-
-def _conclude(solution: Solution, written: Path | None, quiet: bool) -> None:
-    from surfacechem.runs.report import run_summary
-
-    code = STATUS[solution.status]
     if not quiet:
-        typer.echo(run_summary(solution, written))
-    elif code:
-        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
+        typer.echo(run_summary(solution, target))
     for warning in solution.warnings if quiet else ():
         typer.echo(f"surfacechem: warning: {warning}", err=True)
-    if code:
-        raise typer.Exit(code)
+    leave_with(solution.status, solution.reason if quiet else "")
 
 
 @app.command(epilog=EXIT_CODES)
 def sweep(
     case: CaseName,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="netCDF file; <case name>-sweep.nc if not given.")
+        Path | None, Option("--output", "-o", help="netCDF file; <case name>-sweep.nc if not given.")
     ] = None,
     over: Annotated[
         list[str] | None,
-        typer.Option(
-            "--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."
-        ),
+        Option("--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."),
     ] = None,
     until: Annotated[
-        str | None, typer.Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
+        str | None, Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
     ] = None,
     changes: Changes = None,
     quiet: Quiet = False,
@@ -146,8 +126,7 @@ def sweep(
     solution.write(target)
     if not quiet:
         typer.echo(sweep_summary(solution, target))
-    if STATUS[solution.status]:
-        raise typer.Exit(STATUS[solution.status])
+    leave_with(solution.status)
 
 
 @app.command(epilog=EXIT_CODES)
@@ -184,7 +163,7 @@ def check(
 @app.command()
 def equations(
     case: CaseName,
-    form: Annotated[str, typer.Option("--format", help="python (runs) or latex.")] = "python",
+    form: Annotated[str, Option("--format", help="python (runs) or latex.")] = "python",
     changes: Changes = None,
 ) -> None:
     """Print the equations of a case, as Python that runs or as LaTeX."""
@@ -202,7 +181,7 @@ def equations(
 
 
 @app.command()
-def laws(name: Annotated[str | None, typer.Argument(help="Show all about this law.")] = None) -> None:
+def laws(name: Annotated[str | None, Argument(help="Show all about this law.")] = None) -> None:
     """List the laws, or show one."""
     from surfacechem.runs.listing import law_page, law_table
 
@@ -229,107 +208,68 @@ def cases() -> None:
 
 @app.command(epilog=EXIT_CODES)
 def mechanism(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
-    phase: Annotated[str | None, typer.Option("--phase", help="The phase, where the file has several.")] = None,
-    temperature: Annotated[str, typer.Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
-    force: Annotated[str, typer.Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
+    file: Annotated[str, Argument(metavar="FILE", help="A Cantera surface mechanism, or a shipped one.")],
+    phase: Annotated[str | None, Option("--phase", help="The phase, where the file has several.")] = None,
+    temperature: Annotated[str, Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
+    force: Annotated[str, Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
+    output: Annotated[Path | None, Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
 ) -> None:
     """Print species, reactions, rates over temperature and force, and what is consistent."""
-    from surfacechem.studies.mechanisms.sheet import sheet, span
+    from surfacechem.studies import mechanism_report as report
 
-    temperatures = span(temperature, "K", "--temperature", above=0.0)
-    forces = span(force, "N", "--force")
+    temperatures = report.span(temperature, "K", "--temperature", above=0.0)
+    forces = report.span(force, "N", "--force")
     kind = picture_kind(output) if output else ""
-    if output:
-        refuse_unwritable(output)
     from surfacechem.mechanism import load_mechanism
-    from surfacechem.studies.mechanisms.rate_tables import Curves
+    from surfacechem.studies.mechanism_rates import Curves
 
     curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase))
-    typer.echo(sheet(curves, temperatures, forces))
+    typer.echo(report.sheet(curves, temperatures, forces))
     if output:
-        from surfacechem.plots import run as plots
+        from surfacechem import plots
         from surfacechem.results.netcdf import replacing
-        from surfacechem.studies.mechanisms import figure as rateplots
 
         with replacing(output) as temporary:
-            plots.save(rateplots.figure(curves, temperatures, forces), temporary, kind)
+            plots.save(report.figure(curves, temperatures, forces), temporary, kind)
         typer.echo(f"\nwritten to {output}")
 
 
 @app.command(epilog=EXIT_CODES)
 def plot(
-    source: Annotated[str, typer.Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
+    source: Annotated[str, Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help=".png, .svg or .pdf; <name>.png if not given.")
+        Path | None, Option("--output", "-o", help=".png, .svg or .pdf; <name>.png if not given.")
     ] = None,
-    variables: Annotated[
-        str | None, typer.Option("--variables", help="Variables to plot, with commas between.")
-    ] = None,
+    variables: Annotated[str | None, Option("--variables", help="Variables to plot, with commas between.")] = None,
     against: Annotated[
-        str | None, typer.Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
+        str | None, Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
     ] = None,
     changes: Changes = None,
 ) -> None:
     """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
-    from surfacechem.plots import run as plots
+    from surfacechem import plots
     from surfacechem.results.netcdf import SUFFIXES, replacing
+    from surfacechem.runs.simulation import load
 
     is_file = source.endswith(SUFFIXES)
-    target = output or Path(f"{Path(source).stem}.png")
-    kind = picture_kind(target)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
-    refuse_unwritable(target)
-    solution = None if is_file else _solved_case(source, changes)
-    names = [name.strip() for name in variables.split(",") if name.strip()] if variables else None
-    dataset = solution.dataset if solution else plots.opened(Path(source))
-    figure = _figure(dataset, names, against)
+    target = output or Path(f"{Path(source).stem}.png")
+    kind = picture_kind(target)
+    solution = None if is_file else solved(load(source, changes or ()).run, quiet=False, brief=True)
+    names = listed(variables) if variables else None
+    figure = plots.figure(solution.dataset if solution else source, names, against)
     with replacing(target) as temporary:
         plots.save(figure, temporary, kind)
     typer.echo(str(target))
-    if solution and STATUS[solution.status]:
-        typer.echo(f"surfacechem: {solution.status}: {solution.reason}", err=True)
-        raise typer.Exit(STATUS[solution.status])
-
-
-def _figure(dataset: Dataset, variables: list[str] | None, against: str | None) -> Figure:
-    """The figure that suits a dataset: of a run, of a sweep, or of a study."""
-    if "study" in dataset.attrs:
-        if variables or against:
-            raise InputError("the figure of a study has no choice of variables.")
-        return _study_figure(dataset)
-    from surfacechem.plots import run as plots
-    from surfacechem.plots import sweep as sweep_plots
-
-    swept = "sweep" in dataset.attrs
-    if swept and against:
-        raise InputError("a sweep is plotted over what it sweeps; runs have other axes.", Place(path="--against"))
-    return sweep_plots.figure(dataset, variables) if swept else plots.figure(dataset, variables, against)
-
-
-def _study_figure(dataset: Dataset) -> Figure:
-    if dataset.attrs["study"] == "stability":
-        from surfacechem.studies.stability.figure import figure as heat_map
-
-        return heat_map(dataset)
-    from surfacechem.studies.precision.figure import figure
-
-    return figure(dataset)
-
-
-def _solved_case(name: str, changes: list[str] | None) -> Solution:
-    from surfacechem.runs.simulation import load
-
-    simulation = load(name, changes or ())
-    return solved(simulation.run, quiet=False, brief=True)
+    if solution:
+        leave_with(solution.status, solution.reason)
 
 
 @app.command(epilog=EXIT_CODES)
 def rerun(
-    file: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the new dataset here.")] = None,
+    file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
+    output: Annotated[Path | None, Option("--output", "-o", help="Write the new dataset here.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""

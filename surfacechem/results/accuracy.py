@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -66,9 +66,30 @@ def relative_errors(values: Array, exact: Array, floor: float) -> Array:
     return np.asarray(np.abs(values - exact) / np.where(scale > 0, scale, 1.0))
 
 
-def relative_error(values: Array, exact: Array, floor: float) -> float:
-    """The largest of the relative errors."""
-    return float(np.max(relative_errors(values, exact, floor), initial=0.0))
+def errors_over_time(
+    values: Mapping[str, Array], true: Mapping[str, Array], floor: Callable[[str], float]
+) -> dict[str, Array]:
+    """Relative errors of the variables that have true values, at the times that both have; ``floor`` gives the size of
+    a variable below which its errors are relative to this.
+    """
+    found = {}
+    for name, exact in true.items():
+        n = min(len(values[name]), len(exact))
+        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floor(name))
+    return found
+
+
+def largest_errors(
+    values: Mapping[str, Array], true: Mapping[str, Array], floor: Callable[[str], float]
+) -> dict[str, float]:
+    """The largest relative error of each variable that has true values: how far a run is from an exact solution, or
+    from another run.
+
+    >>> largest_errors({"T": np.array([301.0, 303.0])}, {"T": np.array([300.0, 300.0])}, {"T": 1.0}.__getitem__)
+    {'T': 0.01}
+    """
+    errors = errors_over_time(values, true, floor)
+    return {name: float(np.max(found, initial=0.0)) for name, found in errors.items()}
 
 
 UNKNOWN = "the error of the cells across bodies does not fall as their number grows"

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.results.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.results.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, largest_errors, second_tolerance
 from surfacechem.results.audit import audit
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.results.profiles import profile_values
@@ -75,8 +76,7 @@ def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapp
     from surfacechem.results.matching import exact_values
 
     exact = exact_values(name, options, scene, trajectory)
-    columns = computed(trajectory)
-    errors = {key: relative_error(columns[key], values, floor(trajectory, key)) for key, values in exact.items()}
+    errors = largest_errors(computed(trajectory), exact, partial(floor, trajectory))
     if event_times(trajectory):
         errors |= _event_errors(trajectory)
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
@@ -137,8 +137,8 @@ def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]
     errors: dict[str, float] = {}
     if len(times) > 1:
         shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
-        ours, theirs = states(first), states(second)
-        errors = {name: relative_error(ours[name][shared], theirs[name][shared], floor(first, name)) for name in ours}
+        ours, theirs = ({name: values[shared] for name, values in states(run).items()} for run in (first, second))
+        errors = largest_errors(ours, theirs, partial(floor, first))
     if found and not note:
         errors[EVENTS] = event_error(found, expected, first.run.times[-1])
     return errors, note

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +24,7 @@ from scipy.interpolate import CubicSpline
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts import grids
 from surfacechem.model.system import System
-from surfacechem.results.accuracy import MARGIN, UNKNOWN, CellErrors, relative_error
+from surfacechem.results.accuracy import MARGIN, UNKNOWN, CellErrors, largest_errors
 from surfacechem.results.achieved import EVENTS, beside_jumps, difference, event_error, floor
 from surfacechem.results.event_table import event_times
 from surfacechem.results.profiles import profile_values
@@ -238,8 +239,9 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
     other = bool(difference(found, expected)) or better.status != worse.status
     shared = 1 + np.flatnonzero(np.full(len(times), True) if other else beside_jumps(times, better, worse))
     exact, values = _curves(better), _curves(worse)
-    names = [name for name in exact if name in values]
-    errors = {name: relative_error(*_on_same(values[name], exact[name], shared), floor(better, name)) for name in names}
+    pairs = {name: _on_same(values[name], exact[name], shared) for name in exact if name in values}
+    ours, theirs = ({name: pair[k] for name, pair in pairs.items()} for k in (0, 1))
+    errors = largest_errors(ours, theirs, partial(floor, better))
     if other:
         errors[EVENTS] = math.inf
     elif found:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +14,7 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.format import Case, Reference
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, relative_error, second_tolerance
+from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, largest_errors, second_tolerance
 from surfacechem.results.achieved import apart, floor, second_run, stated
 from surfacechem.results.matching import beside_events, exact_values, match, renamed
 from surfacechem.runs import sweep_runs
@@ -83,7 +84,7 @@ def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> floa
     run, reached = done[i], done.reached[i]
     exact = beside_events(lambda t: renamed(reference.solution(t), run), run)
     ours = {name: done.named[name][i][reached] for name in exact}
-    return stated({name: relative_error(ours[name], exact[name], floor(run, name)) for name in exact})
+    return stated(largest_errors(ours, exact, partial(floor, run)))
 
 
 def _against_tighter(

@@ -1,9 +1,8 @@
-"""What a study of many runs hands over: a table in the terminal, a netCDF file, and one HTML page with all of it.
+"""What a study of many runs hands over: a table in the terminal, a netCDF file, a figure, and one HTML page of it all.
 
-A study is described by a :class:`Page`: title, the command that makes it again, sections of text, tables and figures,
-and what was left out with the reason. ``page.html()`` is one file that needs no other: figures are inline SVG, the
-machine and the versions are in it. ``page.text()`` is the same for a terminal, without figures. ``write`` saves the
-dataset, the figure as SVG and PNG and the page side by side; each file appears whole or not at all.
+A study declares what lies along its axes, the variables that are read off there, and the sections of its report; the
+dataset, the figure, the page and the files follow. The page needs no other file: its figure is inline SVG, the machine
+and the versions are in it. Each file appears whole or not at all.
 
 >>> from surfacechem.studies.report import Page, Section, Table
 >>> table = Table(("solver", "error"), [("radau", "1e-10")])
@@ -23,23 +22,23 @@ from __future__ import annotations
 import os
 import platform
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from html import escape
+from functools import cache, cached_property
 from importlib.metadata import version
 from io import StringIO
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from surfacechem.results.netcdf import Column, replacing, save
+import numpy as np
+
+from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
 from surfacechem.runs.report import columns
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-Attributes: TypeAlias = Mapping[str, str | float | int]
 
 LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "scikit-sundae", "xarray", "matplotlib")
 """Packages whose versions a report states."""
@@ -47,19 +46,8 @@ LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "
 SUFFIXES = (".nc", ".svg", ".png", ".html")
 """The files of a study, in the order in which they are written."""
 
-STYLE = """\
-body{font:15px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;max-width:72rem;margin:2rem auto;padding:0 1rem}
-h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem;border-bottom:1px solid #ddd}
-table{border-collapse:collapse;font-size:13px;margin:.8rem 0;display:block;overflow-x:auto}
-caption{text-align:left;color:#555;padding-bottom:.3rem}
-th,td{text-align:left;padding:.15rem .7rem .15rem 0;border-bottom:1px solid #eee;vertical-align:top}
-td{font-variant-numeric:tabular-nums}pre{background:#f5f5f5;padding:.6rem;overflow-x:auto}
-tr.marked td{color:#b00020}figure{margin:1rem 0}figure svg{max-width:100%;height:auto}
-"""
 
-
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of texts under a heading; ``marked`` are the numbers of rows that stand out, such as failures."""
 
     heading: Sequence[str]
@@ -67,39 +55,15 @@ class Table:
     caption: str = ""
     marked: Sequence[int] = ()
 
-    def text(self) -> str:
-        """The table in columns, indented."""
-        lines = [f"  {line}" for line in columns([self.heading, *self.rows])]
-        return "\n".join([*([self.caption] if self.caption else []), *lines])
 
-    def html(self) -> str:
-        """The table as HTML."""
-        rows = "".join(
-            f"<tr{' class=marked' if i in self.marked else ''}>{_cells('td', row)}</tr>\n"
-            for i, row in enumerate(self.rows)
-        )
-        caption = f"<caption>{escape(self.caption)}</caption>" if self.caption else ""
-        return f"<table>{caption}<thead><tr>{_cells('th', self.heading)}</tr></thead>\n<tbody>{rows}</tbody></table>"
-
-
-def _cells(kind: str, row: Sequence[str]) -> str:
-    return "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in row)
-
-
-@dataclass(frozen=True)
-class Section:
-    """A part of a report: paragraphs, tables and figures under a heading; details are for the page only."""
+class Section(NamedTuple):
+    """A part of a report: paragraphs, the figure and tables under a heading; details are for the page only."""
 
     title: str
     paragraphs: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    figures: Sequence[Figure] = ()
+    figure: bool = False
     details: bool = False
-    """Whether the terminal does without this section."""
-
-    def text(self) -> str:
-        """The section for a terminal."""
-        return "\n".join([self.title, *(f"  {line}" for line in self.paragraphs), *(t.text() for t in self.tables)])
 
 
 @dataclass(frozen=True)
@@ -108,76 +72,156 @@ class Page:
 
     title: str
     command: str
-    """The command line that makes the study again."""
     sections: Sequence[Section]
     omissions: Sequence[str] = ()
     """What was left out, each with its reason."""
-    settings: Mapping[str, str] = field(default_factory=dict)
+    draw: Callable[[], Figure] | None = None
 
     def text(self) -> str:
-        """The study for a terminal."""
-        parts = [self.title, *(section.text() for section in self.sections if not section.details)]
+        """The study for a terminal, without its figure."""
+        parts = [self.title]
+        for section in self.sections:
+            lines = [section.title, *(f"  {line}" for line in section.paragraphs)]
+            for table in section.tables:
+                lines += [table.caption] if table.caption else []
+                lines += [f"  {line}" for line in columns([table.heading, *table.rows])]
+            parts += [] if section.details else ["\n".join(lines)]
         if self.omissions:
             parts.append("\n".join(["Left out", *(f"  {line}" for line in self.omissions)]))
         return "\n\n".join(parts)
 
     def html(self) -> str:
         """The study as one HTML page that needs no other file."""
-        return "\n".join(self._html())
+        from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    def _html(self) -> Iterator[str]:
-        title = escape(self.title)
-        yield f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        yield f"<style>\n{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n<pre>{escape(self.command)}</pre>"
-        number = 0
-        for section in self.sections:
-            yield f"<h2>{escape(section.title)}</h2>"
-            yield from (f"<p>{escape(text)}</p>" for text in section.paragraphs)
-            for figure in section.figures:
-                yield f"<figure>{inline_svg(figure, f'f{number}-')}</figure>"
-                number += 1
-            yield from (table.html() for table in section.tables)
-        yield "<h2>Left out</h2>"
-        items = [f"<li>{escape(line)}</li>" for line in self.omissions]
-        yield f"<ul>{''.join(items)}</ul>" if items else "<p>Nothing.</p>"
-        yield "<h2>Machine and versions</h2>"
-        yield Table(("", ""), [*self.settings.items(), *machine().items()]).html()
-        yield "</body></html>\n"
+        loader = FileSystemLoader(Path(__file__).parent)
+        template = Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("page.html")
+        figure = inline_svg(self.draw()) if self.draw else ""
+        return template.render(page=self, figure=figure, machine=machine())
 
 
-def inline_svg(figure: Figure, prefix: str) -> str:
-    """A figure as an SVG element whose names differ from those of other figures on the page."""
-    from surfacechem.plots import run as plots
+def inline_svg(figure: Figure) -> str:
+    """A figure as an SVG element of a page."""
+    from surfacechem import plots
 
     buffer = StringIO()
     plots.save(figure, buffer, "svg")
     text = buffer.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{prefix}', text)
-    return re.sub(r'(url\(#|href="#)', rf"\g<1>{prefix}", text)
+    # Names of the figure must differ from those of the page.
+    return re.sub(r'(\bid="|url\(#|href="#)', r"\g<1>f0-", text)
 
 
 @cache
 def machine() -> dict[str, str]:
-    """What a study ran on: processor, system, Python and libraries."""
+    """Processor, system, Python and libraries on which a study was made."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8", errors="replace").splitlines() if info.exists() else []
     processor = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    python = f"{platform.python_implementation()} {platform.python_version()}"
     return {
         "processor": f"{processor or platform.processor() or platform.machine()}, {os.cpu_count()} cores",
-        "system": f"{platform.system()} {platform.machine()}, {platform.python_implementation()} "
-        f"{platform.python_version()}",
+        "system": f"{platform.system()} {platform.machine()}, {python}",
         "versions": ", ".join(f"{name} {version(name)}" for name in LIBRARIES),
     }
 
 
-def as_dataset(data: Sequence[Column], coordinates: Sequence[str], attributes: Attributes) -> xarray.Dataset:
-    """Columns as an xarray Dataset; ``coordinates`` are the names of those that are coordinates."""
-    import xarray
+class Variable(NamedTuple):
+    """A variable of a study: the axes that it goes over, and how it is read off what lies at a place of each."""
 
-    variables = {c.name: (c.dimensions, c.values, c.attributes) for c in data}
-    axes = {name: variables.pop(name) for name in coordinates}
-    return xarray.Dataset(variables, coords=axes, attrs=dict(attributes))
+    name: str
+    over: tuple[str, ...]
+    read: Callable[..., float | str]
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True, repr=False)
+class Study:
+    """What a study hands back. ``dataset`` is the xarray Dataset, ``page`` the report; ``write`` saves all of it."""
+
+    kind: str
+    title: str
+    command: str
+    """The command line that makes the study again."""
+    axes: Mapping[str, Sequence[Any]]
+    """What lies along each dimension."""
+    variables: Sequence[Variable]
+    """The variables of the dataset, the coordinates first."""
+    coordinates: Sequence[str]
+    sections: Sequence[Section]
+    omissions: Sequence[str]
+    settings: Mapping[str, str | float | int] = field(default_factory=dict)
+    """Global attributes of its own."""
+    status: str = "finished"
+    """'failed' where a study lacks what it is to compare with; else 'finished'."""
+
+    def __repr__(self) -> str:
+        """Size in a line."""
+        return f"<Study of {self.kind}: {', '.join(f'{name} {len(items)}' for name, items in self.axes.items())}>"
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Every variable of the dataset."""
+        found = []
+        for name, over, read, unit, text in self.variables:
+            values = [read(*place) for place in product(*(self.axes[axis] for axis in over))]
+            kind = object if isinstance(values[0], str) else float
+            table = np.array(values, dtype=kind).reshape([len(self.axes[axis]) for axis in over])
+            found.append(Column(name, over, table, unit, text))
+        return tuple(found)
+
+    @cached_property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+        return {
+            "Conventions": CONVENTIONS,
+            "title": self.title,
+            "source": "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')}: {self.command}",
+            "study": self.kind,
+            "command": self.command,
+            **self.settings,
+            **machine(),
+        }
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The study as an xarray Dataset over its axes.
+
+        In that of ``precision`` ``dataset.set_index(case="case_name", solver="solver_name")`` lets ``sel`` find cases
+        and solvers by name; since ``tolerance`` is also an argument of ``sel``, tolerances are asked for by
+        ``sel({"tolerance": 1e-8})``.
+        """
+        import xarray
+
+        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
+        coordinates = {name: data.pop(name) for name in self.coordinates}
+        return xarray.Dataset(data, coords=coordinates, attrs=self.attributes)
+
+    def figure(self) -> Figure:
+        """The figure of the study, which its dataset alone is enough for."""
+        from surfacechem.plots.study import figure
+
+        return figure(self.dataset)
+
+    @property
+    def page(self) -> Page:
+        """The report; ``page.text()`` is its tables, ``page.html()`` all of it."""
+        return Page(self.title, self.command, self.sections, self.omissions, self.figure)
+
+    def write(self, path: str | Path) -> list[Path]:
+        """Save as netCDF, SVG, PNG and HTML side by side; returns the files."""
+        from surfacechem import plots
+
+        files, figure = targets(path), self.figure()
+        save(files[".nc"], self.columns, self.attributes)
+        for suffix in (".svg", ".png"):
+            with replacing(files[suffix]) as temporary:
+                plots.save(figure, temporary, suffix.removeprefix("."))
+        with replacing(files[".html"]) as temporary:
+            temporary.write_text(self.page.html(), encoding="utf-8")
+        return list(files.values())
 
 
 def targets(path: str | Path) -> dict[str, Path]:
@@ -189,20 +233,3 @@ def targets(path: str | Path) -> dict[str, Path]:
     stem = Path(path)
     stem = stem.with_suffix("") if stem.suffix in SUFFIXES else stem
     return {suffix: stem.with_name(stem.name + suffix) for suffix in SUFFIXES}
-
-
-def write(path: str | Path, data: Sequence[Column], attributes: Attributes, figure: Figure, page: Page) -> list[Path]:
-    """Save dataset, figure and page; returns the files."""
-    from surfacechem.plots import run as plots
-
-    files = targets(path)
-    for suffix, target in files.items():
-        if suffix == ".nc":
-            save(target, data, attributes)
-            continue
-        with replacing(target) as temporary:
-            if suffix == ".html":
-                temporary.write_text(page.html(), encoding="utf-8")
-            else:
-                plots.save(figure, temporary, suffix.removeprefix("."))
-    return list(files.values())

@@ -14,8 +14,8 @@ import surfacechem
 from mechanisms import mechanism_texts, number, states
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
-from surfacechem.studies.mechanisms.rate_tables import Curves
-from surfacechem.studies.mechanisms.sheet import remarks
+from surfacechem.studies.mechanism_rates import Curves
+from surfacechem.studies.mechanism_report import remarks
 
 TEXT = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}

@@ -8,9 +8,8 @@ import pytest
 import surfacechem
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.studies.mechanisms.figure import figure
-from surfacechem.studies.mechanisms.rate_tables import Curves
-from surfacechem.studies.mechanisms.sheet import Span, sheet, verdict
+from surfacechem.studies.mechanism_rates import Curves
+from surfacechem.studies.mechanism_report import Span, figure, sheet, verdict
 
 T, K_0, STIFFNESS, REST = 300.0, 10.0, 5e-3, 10e-9
 KT = BOLTZMANN * T

@@ -10,10 +10,10 @@ import slabs
 from scipy.special import erfc, erfcx
 
 import surfacechem
+from surfacechem import plots
 from surfacechem.contracts.grids import points
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.plots import run as plots
 from surfacechem.references import get
 from surfacechem.references.conducting_slabs import HELD
 from surfacechem.results import spatial

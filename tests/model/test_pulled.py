@@ -11,7 +11,7 @@ from surfacechem.errors import InputError
 from surfacechem.laws import laws
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.studies.mechanisms.rate_tables import Curves
+from surfacechem.studies.mechanism_rates import Curves
 
 KT = BOLTZMANN * 298.15
 LENGTH = 3.8e-9  # 0.4 nm + 3.4 nm

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import xarray
 
+import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.plots.panels import merged
-from surfacechem.plots.run import figure, logarithmic, opened, save, symbol
+from surfacechem.plots import figure, save
+from surfacechem.plots.run import logarithmic, merged
+from surfacechem.plots.style import symbol
 
 pytestmark = pytest.mark.around
 
@@ -176,6 +178,12 @@ def test_a_file_is_read(tmp_path):
         figure(tmp_path / "nothing.nc")
 
 
+def test_a_run_with_events_is_drawn_from_its_file(tmp_path):
+    """Whatever else the dataset holds, such as the reasons of the events in words."""
+    path = surfacechem.run("coulomb-stop").write(tmp_path / "stop.nc")
+    assert texts(figure(path).axes[0]) == ["stop"]
+
+
 @pytest.mark.parametrize("count", [0, 1])
 def test_runs_that_ended_at_once(count):
     short = dataset(np.linspace(0.0, 1.0, count))
@@ -204,4 +212,4 @@ def test_a_dataset_that_misses_a_variable_is_named(tmp_path):
     path = tmp_path / "foreign.nc"
     xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(path)
     with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
-        figure(opened(path))
+        figure(path)

@@ -12,9 +12,8 @@ import pytest
 import xarray
 
 import surfacechem
-from surfacechem.cli.main import _figure
+from surfacechem import plots
 from surfacechem.errors import InputError
-from surfacechem.plots import run as plots
 from surfacechem.results import netcdf
 from surfacechem.runs import rerun
 
@@ -41,7 +40,7 @@ def files(tmp_path_factory):
 
 def is_used_or_refused(path: Path, again: bool) -> None:
     with suppress(InputError):
-        _figure(plots.opened(path), None, None)
+        plots.figure(path)
     with suppress(InputError):
         record = rerun.read(path)
         if again:
@@ -50,7 +49,7 @@ def is_used_or_refused(path: Path, again: bool) -> None:
 
 @pytest.mark.parametrize("which", ["run", "sweep", "study"])
 def test_datasets_that_are_whole_are_drawn_and_read(files, which):
-    _figure(plots.opened(files[which]), None, None)
+    plots.figure(files[which])
     assert rerun.read(files[which]).variables
 
 
@@ -73,9 +72,8 @@ def damaged(data: bytes, random: Random) -> bytes:
 EACH = """
 import faulthandler, sys, warnings
 from contextlib import suppress
-from surfacechem.cli.main import _figure
 from surfacechem.errors import InputError
-from surfacechem.plots import run as plots
+from surfacechem import plots
 from surfacechem.results import netcdf
 from surfacechem.runs import rerun
 
@@ -84,7 +82,7 @@ netcdf._try_elsewhere = lambda path, seconds: None  # this is that process
 for name in sys.argv[1:]:
     print(name, flush=True)
     faulthandler.dump_traceback_later(5, exit=True)
-    for use in (lambda: _figure(plots.opened(name), None, None), lambda: rerun.read(name)):
+    for use in (lambda: plots.figure(name), lambda: rerun.read(name)):
         with suppress(InputError):
             use()
 """

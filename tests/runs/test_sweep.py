@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 import surfacechem
 from surfacechem import format as cases
+from surfacechem import plots
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.plots import sweep as sweep_plots
 from surfacechem.references import get
 from surfacechem.runs import rerun
 from surfacechem.runs.report import sweep_summary
@@ -291,7 +291,7 @@ def test_a_case_without_a_sweep(bonding):
 
 
 def test_figure_of_a_spectrum(spectrum):
-    plot = sweep_plots.figure(spectrum.dataset)
+    plot = plots.figure(spectrum.dataset)
     (ax,) = plot.axes
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["most probable", "median", "mean", "exact"]
     assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "Rate of change [N s$^{-1}$]")
@@ -299,13 +299,13 @@ def test_figure_of_a_spectrum(spectrum):
 
 
 def test_figure_of_final_values(bonding):
-    plot = sweep_plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
+    plot = plots.figure(bonding.sweep({"initial.T": [280.0, 300.0], K_0: [100.0, 200.0, 300.0]}).dataset)
     assert [ax.get_ylabel() for ax in plot.axes] == ["final [K]", "final [1]"]
     ax = plot.axes[0]
     assert len(ax.get_lines()) == 3
     assert ax.get_legend().get_texts()[0].get_text() == "$T$ K 0 = 100 J m$^{-2}$"
     with pytest.raises(InputError, match="no variable 'x' in the sweep"):
-        sweep_plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
+        plots.figure(bonding.sweep({K_0: [1.0]}).dataset, ["x"])
 
 
 def test_command_line(tmp_path, monkeypatch):

@@ -10,17 +10,15 @@ from typer.testing import CliRunner
 
 import surfacechem
 from surfacechem.cli.main import app
+from surfacechem.plots.study import LABELS, figure
 from surfacechem.results.accuracy import relative_errors
 from surfacechem.results.achieved import computed
 from surfacechem.solve import names
 from surfacechem.solve.adapters import sundials
-from surfacechem.studies.precision import truth as truths
-from surfacechem.studies.precision.columns import LABELS
-from surfacechem.studies.precision.comparing import _subject
-from surfacechem.studies.precision.errors import KINDS
-from surfacechem.studies.precision.figure import figure
-from surfacechem.studies.precision.truth import establish, numerical
+from surfacechem.studies import precision
+from surfacechem.studies import truth as truths
 from surfacechem.studies.report import LIBRARIES
+from surfacechem.studies.truth import KINDS, Subject, establish, numerical
 
 pytestmark = pytest.mark.around
 
@@ -50,7 +48,7 @@ def named(study):
 
 
 def subject_of(name, *overrides):
-    return _subject(surfacechem.load(name, list(overrides)))
+    return precision.subject(surfacechem.load(name, list(overrides)))
 
 
 # -- errors ------------------------------------------------------------------------------------------------------------
@@ -223,8 +221,6 @@ def test_a_run_with_other_events_has_failed(monkeypatch):
 
 
 def test_a_solver_that_cannot_run_a_case_is_left_out(monkeypatch):
-    from surfacechem.studies.precision.subject import Subject
-
     reason = "rates of the mechanism come from Cantera itself, which this solver cannot ask"
     monkeypatch.setattr(Subject, "unable", lambda _, name: reason if name == "ida" else "")
     study = surfacechem.precision("exothermic", ["radau", "ida"], [1e-6], repeat=1)
@@ -317,11 +313,11 @@ def test_the_report_contains_everything(written):
     assert png.read_bytes().startswith(b"\x89PNG")
     for word in (study.command, "<svg", "How it was measured", "Left out", "processor", "warms", *LIBRARIES):
         assert word in text, word
-    for case in study.cases:
+    for case in study.axes["case"]:
         assert case.reference in text
         assert f"uncertain  final {case.truth.uncertainty.worst('final'):.1e}" in text
-        assert case.subject.text.splitlines()[0] in text
-    for solver in study.plan.solvers:
+        assert case.subject.case.text.splitlines()[0] in text
+    for solver in study.axes["solver"]:
         assert f"<td>{solver}</td><td>1e-08</td>" in text
     assert not re.search(r'(src|href)="(?!#)', text)
 
@@ -358,7 +354,7 @@ def test_the_command_in_the_report_makes_the_study_again(written, tmp_path, monk
 )
 def test_bad_input_is_refused_before_anything_runs(arguments, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("surfacechem.studies.precision.plan.measure", None)
+    monkeypatch.setattr("surfacechem.studies.precision.attempt", None)
     done = CliRunner().invoke(app, ["precision", *arguments])
     assert done.exit_code == 2, done.output
     assert message in done.output
@@ -366,11 +362,11 @@ def test_bad_input_is_refused_before_anything_runs(arguments, message, tmp_path,
 
 
 def test_tolerances_may_be_decades(study):
-    from surfacechem.cli.precision import _tolerances
+    from surfacechem.cli.studies import _tolerances
 
     assert _tolerances("1e-4..1e-12") == [float(f"1e-{k}") for k in range(4, 13)]
-    assert study.plan.tolerances == (1e-4, 1e-7, 1e-10)
-    assert set(study.plan.solvers) < set(names)
+    assert study.axes["tolerance"] == [1e-4, 1e-7, 1e-10]
+    assert set(study.axes["solver"]) < set(names)
 
 
 def test_all_that_is_compared_is_computed():

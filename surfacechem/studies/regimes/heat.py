@@ -10,7 +10,7 @@ import numpy as np
 
 from surfacechem.references.semenov_fold import SemenovFold
 from surfacechem.references.three_temperatures import ThreeTemperatures
-from surfacechem.studies.stability.regime import Exact, Problem, Refused, Regime, Stops
+from surfacechem.studies.regimes import Exact, Problem, Refused, Regime, Stops
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 

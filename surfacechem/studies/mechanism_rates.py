@@ -1,19 +1,26 @@
-"""Numbers of a mechanism over temperature and force: standard thermo, equilibrium constants, rates, and their verdicts.
+"""Numbers of a mechanism over temperature and force: standard thermo, equilibrium constants, rates, and cycles.
 
 Everything is kept as logarithms, so that no exponent is too large to be shown. Rates are those at coverages of one, per
 possible bond, so that forward over reverse is the equilibrium constant of the coverages whatever the order.
+
+Cycles are reactions that lead back to where they began: they change nothing, so that in equilibrium the product of
+their k_f/k_r is one, whatever the thermo of the species. Rates whose product is not one keep the cycle running without
+end. Source: Wegscheider (1901), Monatsh. Chem. 22, 849, doi 10.1007/BF01517498.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import lcm
+from typing import NamedTuple
 
 import numpy as np
 import symengine
 from numpy.typing import NDArray
 
-from surfacechem.contracts.terms import Potential, reads
+from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
@@ -21,14 +28,17 @@ from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.model.components.pulled import lengths
 from surfacechem.model.pairs import Opposed, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
+from surfacechem.results.detailed_balance import ROUNDED
 
 Array = NDArray[np.float64]
+
+Step = str | Opposed
+"""A reaction, by its label, or a pair of one-way reactions."""
 
 TEMPERATURE, FORCE = symengine.symbols("T_c f")
 
 
-@dataclass(frozen=True)
-class Thermo:
+class Thermo(NamedTuple):
     """Standard enthalpy, entropy and Gibbs energy of a species [J/mol, J/(mol K), J/mol]."""
 
     h: float
@@ -43,17 +53,24 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, SurfaceReaction)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
-        symbols = {label: _symbols(law) for label, law in self.laws.items()}
-        self._bound = {label: law.bind(symbols[label]) for label, law in self.laws.items()}
-        self._numbers = {
-            symbol: float(getattr(self.laws[label], name))
-            for label in symbols
-            for name, symbol in symbols[label].items()
-        }
+        # Every number of a law is a symbol: the logarithm of one that is zero is infinite only when it is evaluated.
+        self._bound: dict[str, SurfaceReaction] = {}
+        self._numbers: dict[Expression, float] = {}
+        for label, law in self.laws.items():
+            symbols = {name: symengine.Symbol(f"{label}.{name}") for name, _ in law.specs()}
+            self._bound[label] = law.bind(symbols)
+            self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in symbols.items()}
         self._amounts = {variable.name: variable.density for variable in mechanism.variables}
         self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
         self._lengths = lengths(self.laws, self.pairs)
-        self._psi = sum(self._call(_alone(law).statement) for law in mechanism.potentials)
+        # Without interactions, so that standard states depend on no coverage.
+        laws = (
+            law.bind({"species": tuple(replace(item, interactions=()) for item in law.species)})
+            if isinstance(law, IdealMixture)
+            else law
+            for law in mechanism.potentials
+        )
+        self._psi = sum(self._call(law.statement) for law in laws)
 
     @property
     def loaded(self) -> bool:
@@ -81,7 +98,13 @@ class Curves:
 
     def thermo(self, temperature: float) -> dict[str, Thermo]:
         """Standard thermo of every species at a temperature [K], without force."""
-        return {name: _thermo(item, temperature) for name, item in self.species.items()}
+        found = {}
+        for name, item in self.species.items():
+            g = symengine.sympify(item.gibbs(TEMPERATURE))
+            function = symengine.Lambdify([TEMPERATURE], [g, derivative(g, TEMPERATURE)], cse=True)
+            value, slope = (GAS_CONSTANT * float(x) for x in function([temperature]))
+            found[name] = Thermo(value - temperature * slope, -slope, value)
+        return found
 
     def log_forward(self, label: str, temperatures: Array, forces: Array) -> Array:
         """Logarithm of the forward rate per possible bond [1/s]."""
@@ -139,20 +162,70 @@ class Curves:
         return np.asarray(function(points), dtype=np.float64)[..., 0]
 
 
-def _symbols(law: SurfaceReaction) -> dict[str, Expression]:
-    """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
-    return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
+@dataclass(frozen=True)
+class Cycle:
+    """Steps that together change nothing, each with how often it is taken; backwards where that is negative."""
+
+    steps: Sequence[tuple[Step, int]]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of all its reactions."""
+        pairs = (step.labels if isinstance(step, Opposed) else (step,) for step, _ in self.steps)
+        return tuple(label for labels in pairs for label in labels)
+
+    def departure(self, curves: Curves, temperatures: Array, forces: Array) -> Array:
+        """Logarithm of the product of k_f/k_r around the cycle."""
+        total = np.zeros(np.broadcast_shapes(np.shape(temperatures), np.shape(forces)))
+        for step, times in self.steps:
+            if isinstance(step, Opposed):
+                total = total + times * curves.departure(step, temperatures, forces)
+        return total
 
 
-def _alone(law: Potential) -> Potential:
-    """The potential without interactions, so that standard states depend on no coverage."""
-    if not isinstance(law, IdealMixture):
-        return law
-    return law.bind({"species": tuple(replace(item, interactions=()) for item in law.species)})
+def cycles(curves: Curves) -> list[Cycle]:
+    """Independent cycles that hold at least one pair or one-way reaction; others agree by construction."""
+    paired = {label for pair in curves.pairs for label in pair.labels}
+    steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
+    changes = [curves.laws[step].change if isinstance(step, str) else step.change for step in steps]
+    found = []
+    for row in _null_space(changes):
+        taken = [(step, times) for step, times in zip(steps, row, strict=True) if times]
+        if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
+            found.append(Cycle(taken))
+    return found
 
 
-def _thermo(species: Species, temperature: float) -> Thermo:
-    g = symengine.sympify(species.gibbs(TEMPERATURE))
-    function = symengine.Lambdify([TEMPERATURE], [g, derivative(g, TEMPERATURE)], cse=True)
-    value, slope = (GAS_CONSTANT * float(x) for x in function([temperature]))
-    return Thermo(value - temperature * slope, -slope, value)
+def cycle_verdict(cycle: Cycle, curves: Curves, temperatures: Array, forces: Array) -> str:
+    """Whether a cycle can come to rest, in words."""
+    one_way = {step: times for step, times in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible}
+    if one_way and min(one_way.values()) < 0 < max(one_way.values()):
+        return "goes round neither way, since it has one-way reactions in both directions"
+    if one_way:
+        return f"nothing stops it, since there is no way back from {', '.join(one_way)}: give each a reverse"
+    values = cycle.departure(curves, temperatures, forces)
+    worst = float(values.flat[int(np.abs(values).argmax())])
+    if abs(worst) <= ROUNDED:
+        return f"the product of k_f/k_r is 1 to within {abs(worst):.1e}"
+    return f"INCONSISTENT: the product of k_f/k_r is not 1 but exp({worst:.3g}) at most, which no thermo allows"
+
+
+def _null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
+    """Integer combinations of changes that are none, one for each change that depends on those before it."""
+    reduced: list[tuple[str, dict[str, Fraction], list[Fraction]]] = []
+    found = []
+    for k, change in enumerate(changes):
+        rest = {name: Fraction(nu).limit_denominator(1000) for name, nu in change.items() if nu}
+        made = [Fraction(int(i == k)) for i in range(len(changes))]
+        for pivot, other, combination in reduced:
+            factor = rest.get(pivot, Fraction(0)) / other[pivot]
+            for name, value in other.items():
+                rest[name] = rest.get(name, Fraction(0)) - factor * value
+            made = [a - factor * b for a, b in zip(made, combination, strict=True)]
+        rest = {name: value for name, value in rest.items() if value}
+        if rest:
+            reduced.append((next(iter(rest)), rest, made))
+        else:
+            scale = lcm(*(value.denominator for value in made))
+            found.append([int(value * scale) for value in made])
+    return found

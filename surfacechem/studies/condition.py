@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.results.accuracy import FLOOR, relative_errors
-from surfacechem.studies.stability.regime import Exact, Problem, Stops
+from surfacechem.studies.regimes import Exact, Problem, Stops
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def condition(problem: Problem, names: Collection[str]) -> float:
 
     Data are the parameters of the exact solution and the output times; those that are zero stay so.
 
-    >>> from surfacechem.studies.stability.regimes import regimes
+    >>> from surfacechem.studies.regimes import regimes
     >>> [f"{condition(regimes()['cold'].problem(part), ['T']):.0e}" for part in (1e-3, 1e-6)]
     ['3e+06', '3e+12']
     """

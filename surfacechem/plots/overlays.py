@@ -1,15 +1,15 @@
-"""What happened on the way: events as thin lines with their names, modes and stages as bands."""
+"""What lies over the curves of a run: events as thin lines with their names, modes and stages as bands."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
-from surfacechem.plots.panels import MODE
+from surfacechem.plots import style
 
 FEW = 8
 """Up to this many events, or spans of a mode, have their names written to them."""
@@ -20,41 +20,41 @@ MANY = 60
 WIDE = 0.09
 """Part of the run that a stage must last for its name to fit."""
 
-GREY = "#555555"
+
+def is_mode(values: xarray.DataArray) -> bool:
+    """Whether a variable is a mode of the automaton, as its long name says."""
+    return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 
 def events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """Thin vertical lines at the events; ends of stages show as bands."""
     if "event_time" not in dataset:
         return
+    named = {"event_name": ("event",)} if "event_name" in dataset else {}
+    style.check(dataset, {"event_time": ("event",)}, named)
     times = dataset["event_time"].values
-    names = dataset["event_name"].values.astype(str) if "event_name" in dataset else np.full(times.shape, "")
+    names = dataset["event_name"].values.astype(str) if named else np.full(times.shape, "")
     moments = dict(zip(times.tolist(), names.tolist(), strict=True))
     for moment in moments if len(moments) <= MANY else ():
         for ax in axes:
             ax.axvline(moment, color="black", linewidth=0.6, linestyle=":")
     told = {t: name for t, name in moments.items() if not name.startswith("end of ")}
-    if len(told) <= FEW:
-        for moment, name in told.items():
-            _write(axes[0], moment, name, rotation=90, ha="right", va="top", y=0.97)
+    for moment, name in told.items() if len(told) <= FEW else ():
+        _write(axes[0], moment, name, rotation=90, ha="right", va="top", y=0.97)
 
 
 def bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
     """The stages of a programme; else spans of time in which a mode is not what it was at the start."""
-    modes = [name for name in map(str, dataset.data_vars) if _long_name(dataset, name).startswith(MODE)]
+    modes = [str(name) for name, values in dataset.data_vars.items() if is_mode(values) and values.dims == ("time",)]
     if dataset.sizes["time"] < 2:
         return
-    if "stage" in modes:
-        _stages(axes, dataset)
+    if "stage" not in modes:
+        for name in modes:
+            first, *rest = _spans(dataset, name)
+            _shade(axes, [span for span in rest if span[2] != first[2]])
         return
-    for name in modes:
-        first, *_ = spans = list(_spans(dataset, name))
-        _shade(axes, [span for span in spans if span[2] != first[2]])
-
-
-def _stages(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    spans, length = list(_spans(dataset, "stage")), float(np.ptp(dataset["time"].values))
-    words = dict(re.findall(r"(-?\d+): ([^,)]+)", _long_name(dataset, "stage")))
+    spans, length = _spans(dataset, "stage"), float(np.ptp(dataset["time"].values))
+    words = dict(re.findall(r"(-?\d+): ([^,)]+)", str(dataset["stage"].attrs["long_name"])))
     _shade(axes, [span for span in spans if span[2] % 2])
     for start, end, value in spans:
         if end - start > WIDE * length:
@@ -67,13 +67,9 @@ def _shade(axes: Sequence[Axes], spans: Sequence[tuple[float, float, float]]) ->
             ax.axvspan(start, end, color="black", alpha=0.05, linewidth=0)
 
 
-def _long_name(dataset: xarray.Dataset, name: str) -> str:
-    return str(dataset[name].attrs.get("long_name", ""))
-
-
-def _spans(dataset: xarray.Dataset, name: str) -> Iterator[tuple[float, float, float]]:
+def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
     """Start, end and value of a mode between events; what lies between two outputs is too short to be seen."""
-    times, values = dataset["time"].values, dataset[name].values
+    times, values = dataset["time"].values, dataset[name].values.astype(float)
     known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
     changes = [j for j in range(1, len(values)) if values[j] != values[j - 1]]
     edges = [float(times[0])]
@@ -81,10 +77,11 @@ def _spans(dataset: xarray.Dataset, name: str) -> Iterator[tuple[float, float, f
         inside = known[(known >= times[j - 1]) & (known <= times[j])]
         edges.append(float(inside[-1]) if len(inside) else float(times[j]))
     ends = [*edges[1:], float(times[-1])]
-    return zip(edges, ends, (float(values[j]) for j in [0, *changes]), strict=True)
+    return list(zip(edges, ends, (float(values[j]) for j in [0, *changes]), strict=True))
 
 
 def _write(ax: Axes, x: float, text: str, y: float, **how: object) -> None:
     """A small word at a time, at a height relative to the panel."""
     if text:
-        ax.text(x, y, text, transform=ax.get_xaxis_transform(), fontsize=7, color=GREY, clip_on=True, **how)  # type: ignore[arg-type]
+        where = ax.get_xaxis_transform()
+        ax.text(x, y, text, transform=where, fontsize=7, color="#555555", clip_on=True, **how)  # type: ignore[arg-type]

@@ -15,9 +15,9 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError
 from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.studies.mechanisms import figure as rateplots
-from surfacechem.studies.mechanisms.rate_tables import Curves
-from surfacechem.studies.mechanisms.sheet import Span, power_of_ten, remarks, sheet, span, verdict
+from surfacechem.studies import mechanism_report
+from surfacechem.studies.mechanism_rates import Curves
+from surfacechem.studies.mechanism_report import Span, power_of_ten, remarks, sheet, span, verdict
 
 pytestmark = pytest.mark.around
 
@@ -144,7 +144,7 @@ def test_plots(call, kind, tmp_path):
 
 
 def test_the_figure_shows_every_reaction_once():
-    figure = rateplots.figure(Curves(load("dna-film.yaml")), T, F)
+    figure = mechanism_report.figure(Curves(load("dna-film.yaml")), T, F)
     rates, constants = figure.axes
     assert [line.get_label() for line in rates.lines] == ["R1: A(s) + B(s) <=> AB(s)", "R1, reverse"]
     assert len(constants.lines) == 1

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from surfacechem.mechanism import load_mechanism
-from surfacechem.studies.mechanisms.cycles import cycles, verdict
-from surfacechem.studies.mechanisms.rate_tables import Curves
-from surfacechem.studies.mechanisms.sheet import Span, sheet
+from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
+from surfacechem.studies.mechanism_report import Span, sheet
 
 HEAD = """
 units: {length: m, quantity: mol, activation-energy: kJ/mol}
@@ -50,7 +49,7 @@ def test_rates_that_some_thermo_allows(curves):
     (cycle,) = cycles(found)
     assert cycle.labels == ("R1", "R2", "R3", "R4", "R5", "R6")
     np.testing.assert_allclose(cycle.departure(found, T, NONE), 0.0, atol=1e-12)
-    assert "is 1 to within" in verdict(cycle, found, T, NONE)
+    assert "is 1 to within" in cycle_verdict(cycle, found, T, NONE)
     assert all(np.max(np.abs(found.departure(pair, T, NONE))) > 0.1 for pair in found.pairs)
 
 
@@ -81,7 +80,7 @@ def test_what_cannot_run_back_never_stops(curves):
     found = curves(one_way("a(s) => b(s)", "b(s) => c(s)", "c(s) => a(s)"))
     (cycle,) = cycles(found)
     assert cycle.labels == ("R1", "R2", "R3")
-    assert "no way back from R1, R2, R3" in verdict(cycle, found, T, NONE)
+    assert "no way back from R1, R2, R3" in cycle_verdict(cycle, found, T, NONE)
 
 
 def test_reactions_of_second_order_close_cycles_too(curves):
@@ -90,4 +89,4 @@ def test_reactions_of_second_order_close_cycles_too(curves):
     found = curves(second + one_way("d(s) => a(s) + b(s)", "a(s) <=> b(s)"))
     (cycle,) = cycles(found)
     assert set(cycle.labels) == {"R1", "R2", "R3", "R4"}
-    assert "INCONSISTENT" in verdict(cycle, found, T, NONE)
+    assert "INCONSISTENT" in cycle_verdict(cycle, found, T, NONE)

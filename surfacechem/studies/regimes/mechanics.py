@@ -13,7 +13,7 @@ from surfacechem.references.coulomb_stop import CoulombStop
 from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.overdamped_pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.stability.regime import Array, Exact, Problem, Regime, Stops
+from surfacechem.studies.regimes import Array, Exact, Problem, Regime, Stops
 
 SHORTEST = 1e-5
 

@@ -1,12 +1,13 @@
-"""A mechanism as text: species, reactions, equilibrium constants, rates over temperature and force, and verdicts."""
+"""A mechanism as text and as a figure: species, reactions, equilibrium constants, rates over temperature and force."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +18,20 @@ from surfacechem.mechanism.source import Source
 from surfacechem.results.detailed_balance import said
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.report import columns
-from surfacechem.studies.mechanisms.cycles import cycles
-from surfacechem.studies.mechanisms.cycles import verdict as around
-from surfacechem.studies.mechanisms.rate_tables import Curves
+from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
 from surfacechem.units import parse
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
 STANDARD = 298.15
 """Temperature [K] at which the thermo of the species is shown, where it is in range."""
 
-COLUMNS = 5
+COLUMNS, POINTS = 5, 200
+"""Values of a range that tables and curves show."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Span:
         """Evenly spaced values; one where the ends are the same."""
         return np.linspace(self.low, self.high, number if self.high > self.low else 1)
 
-    def words(self, unit: str, scale: float = 1.0) -> str:
+    def text(self, unit: str, scale: float = 1.0) -> str:
         """The range in a unit of which ``scale`` make one in SI."""
         ends = dict.fromkeys(f"{end * scale:g}" for end in (self.low, self.high))
         return f"{' to '.join(ends)} {unit}"
@@ -71,38 +75,37 @@ def reference(temperatures: Span) -> float:
 
 def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     """Everything about a mechanism, one fact a line."""
-    mechanism = curves.mechanism
-    shown = reference(temperatures)
+    shown, grid = reference(temperatures), _grid(curves, temperatures, forces)
+    T, f = temperatures.values(), forces.values()
+    hot = _table(curves, "T [K]", T, T, np.zeros(1))
+    pulled = _table(curves, "f [pN]", f * 1e12, np.array(shown), f) if curves.loaded else ()
+    around = [(" ".join(cycle.labels), cycle_verdict(cycle, curves, *grid)) for cycle in cycles(curves)]
     sections = [
-        f"phase {mechanism.phase}, {curves.site_density:.6g} sites/m^2",
+        f"phase {curves.mechanism.phase}, {curves.site_density:.6g} sites/m^2",
         _section(f"Species at {shown:g} K, without force", _species(curves, shown)),
         "\n".join(["Reactions", *_reactions(curves, temperatures, forces)]),
-        _section("Cycles", _cycles(curves, temperatures, forces)),
-        _section("Against temperature, without force; rates per bond at coverages of one", _hot(curves, temperatures)),
-        _section(f"Against the force on {curves.pulled or 'a bond'}, at {shown:g} K", _loaded(curves, shown, forces)),
-        "\n".join(["Rate types", *(_source(law) for law in _types(curves))]),
+        _section("Cycles", around),
+        _section("Against temperature, without force; rates per bond at coverages of one", hot),
+        _section(f"Against the force on {curves.pulled or 'a bond'}, at {shown:g} K", pulled),
+        "\n".join(["Rate types", *map(_source, dict.fromkeys(map(type, curves.laws.values())))]),
         _section("Remarks", [(remark,) for remark in remarks(curves)]),
     ]
     return "\n\n".join(part for part in sections if part)
 
 
-def _section(heading: str, rows: Any) -> str:
-    rows = list(rows)
-    return "\n".join([heading, *(f"  {line}" for line in columns(rows))]) if rows else ""
+def _section(heading: str, rows: Iterable[Sequence[str]]) -> str:
+    lines = [f"  {line}" for line in columns(rows)]
+    return "\n".join([heading, *lines]) if lines else ""
 
 
 def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
     text = Source("", curves.mechanism.text)
-    made_of = {str(entry.get("name")): entry.get("composition") for entry in text.all_species()}
+    made_of = {str(entry.get("name")): entry.get("composition") or {} for entry in text.all_species()}
     yield "", "made of", "sites", "h [kJ/mol]", "s [J/(mol K)]", "g [kJ/mol]"
     for name, value in curves.thermo(temperature).items():
-        sites = f"{curves.species[name].sites:g}"
+        elements = " ".join(f"{element}{count:g}" for element, count in made_of.get(name, {}).items())
         numbers = (_number(value.h / 1e3), _number(value.s), _number(value.g / 1e3))
-        yield name, _composition(made_of.get(name)), sites, *numbers
-
-
-def _composition(elements: Mapping[str, float] | None) -> str:
-    return " ".join(f"{name}{number:g}" for name, number in (elements or {}).items()) or "-"
+        yield name, elements or "-", f"{curves.species[name].sites:g}", *numbers
 
 
 def _number(value: float, digits: int = 6) -> str:
@@ -112,15 +115,11 @@ def _number(value: float, digits: int = 6) -> str:
 def _reactions(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:
     for label, law in curves.laws.items():
         place = f"{law.place.file}:{law.place.line}" if law.place else ""
+        units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
+        numbers = [f"{name} = {getattr(law, name):.6g} {unit}".removesuffix(" 1") for name, unit in units.items()]
         yield f"  {label}  {law.equation}  ({law.kind}, {place})"
-        yield f"      {_parameters(law)}"
+        yield f"      {', '.join(numbers)}"
         yield f"      {verdict(curves, label, temperatures, forces)}"
-
-
-def _parameters(law: SurfaceReaction) -> str:
-    numbers = ((name, law.refine(name, spec).unit, getattr(law, name)) for name, spec in law.specs())
-    given = [f"{name} = {value:.6g}" + ("" if unit == "1" else f" {unit}") for name, unit, value in numbers]
-    return ", ".join(given)
 
 
 def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str:
@@ -130,35 +129,19 @@ def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str
     pair = next((pair for pair in curves.pairs if label in pair.labels), None)
     if pair is None:
         return "runs one way only: it has no equilibrium, and destroys entropy where its affinity is against it"
-    grid = np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
-    values = curves.departure(pair, *grid)
+    values = curves.departure(pair, *_grid(curves, temperatures, forces))
     others = " and ".join(other for other in pair.labels if other != label)
-    where = temperatures.words("K") + (f", {forces.words('pN', 1e12)}" if curves.loaded else "")
+    where = temperatures.text("K") + (f", {forces.text('pN', 1e12)}" if curves.loaded else "")
     return f"pair with {others}: {said(float(values.min()), float(values.max()))} ({where})"
 
 
-def _cycles(curves: Curves, temperatures: Span, forces: Span) -> Iterator[tuple[str, ...]]:
-    grid = np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
-    for cycle in cycles(curves):
-        yield " ".join(cycle.labels), around(cycle, curves, *grid)
+def _grid(curves: Curves, temperatures: Span, forces: Span) -> Sequence[Array]:
+    return np.meshgrid(temperatures.values(20), forces.values(20) if curves.loaded else np.zeros(1))
 
 
-def _hot(curves: Curves, temperatures: Span) -> Iterator[tuple[str, ...]]:
-    T = temperatures.values()
-    yield "", "T [K]", *(f"{value:.6g}" for value in T)
-    yield from _rows(curves, T, np.zeros(1), list(curves.laws))
-
-
-def _loaded(curves: Curves, temperature: float, forces: Span) -> Iterator[tuple[str, ...]]:
-    if not curves.loaded:
-        return
-    f = forces.values()
-    yield "", "f [pN]", *(f"{value * 1e12:.6g}" for value in f)
-    yield from _rows(curves, np.array(temperature), f, list(curves.laws))
-
-
-def _rows(curves: Curves, T: Array, f: Array, labels: list[str]) -> Iterator[tuple[str, ...]]:
-    for label in labels:
+def _table(curves: Curves, name: str, x: Array, T: Array, f: Array) -> Iterator[tuple[str, ...]]:
+    yield "", name, *(f"{value:.6g}" for value in x)
+    for label in curves.laws:
         reverse = curves.log_reverse(label, T, f)
         yield label, "K [1]", *map(power_of_ten, curves.log_equilibrium(label, T, f))
         yield "", "forward [1/s]", *map(power_of_ten, curves.log_forward(label, T, f))
@@ -183,17 +166,13 @@ def power_of_ten(logarithm: float) -> str:
     return f"{math.exp(logarithm - exponent * math.log(10)):.3g}e{exponent:+03d}"
 
 
-def _types(curves: Curves) -> list[type[SurfaceReaction]]:
-    return list(dict.fromkeys(type(law) for law in curves.laws.values()))
-
-
 def _source(law: type[SurfaceReaction]) -> str:
     text = f"{law.kind}: {source(law)}".replace("``", "")
     return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
 
 
 def remarks(curves: Curves) -> Iterator[str]:
-    """What is odd about a mechanism, though not wrong."""
+    """Peculiarities of a mechanism that are not wrong."""
     yield from curves.mechanism.remarks
     idle = set(curves.mechanism.species.values())
     around = [name for name, item in curves.species.items() if item.interactions]
@@ -201,14 +180,47 @@ def remarks(curves: Curves) -> Iterator[str]:
         yield f"The thermo of {', '.join(around)} depends on coverages; everything above is without that."
     for law in curves.laws.values():
         idle -= set(law.change)
-        yield from _odd(law)
+        where = f"{law.place.file}:{law.place.line}: " if law.place else ""
+        if any(nu < 0 and not law.orders.get(name) for name, nu in law.change.items()):
+            yield f"{where}{law.equation} goes on where nothing is left to react: its order in a reactant is zero."
     for name, variable in curves.mechanism.species.items():
         if variable in idle:
             yield f"{name} takes part in no reaction: its coverage stays as it is."
 
 
-def _odd(law: SurfaceReaction) -> Iterator[str]:
-    where = f"{law.place.file}:{law.place.line}: " if law.place else ""
-    missing = [name for name, nu in law.change.items() if nu < 0 and not law.orders.get(name)]
-    if missing:
-        yield f"{where}{law.equation} goes on where nothing is left to react: its order in a reactant is zero."
+def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
+    """Rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
+    from surfacechem.plots.style import panels
+
+    rows = 2 if curves.loaded else 1
+    with panels(7.2, 0.6 + 2.5 * rows, rows, 2) as (plot, axes):
+        T = temperatures.values(POINTS)
+        _row(axes[0], curves, T, T, np.zeros(1), "Temperature [K]")
+        if curves.loaded:
+            f = forces.values(POINTS)
+            shown, label = reference(temperatures), f"Force on {curves.pulled or 'a bond'} [pN]"
+            _row(axes[1], curves, f * 1e12, np.array([shown]), f, label)
+            axes[1][0].set_title(f"at {shown:g} K", loc="left", fontsize=8, color="#555555")
+        handles, labels = axes[0][0].get_legend_handles_labels()
+        plot.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3))
+        plot.suptitle(f"Phase {curves.mechanism.phase}", x=0.01, ha="left", fontsize=11, fontweight="bold")
+    return plot
+
+
+def _row(axes: tuple[Axes, Axes], curves: Curves, x: Array, T: Array, f: Array, label: str) -> None:
+    from surfacechem.plots import COLOURS
+
+    rates, constants = axes
+    for (name, law), colour in zip(curves.laws.items(), itertools.cycle(COLOURS), strict=False):
+        drawn = [
+            (rates, curves.log_forward(name, T, f), "-", f"{name}: {law.equation}"),
+            (rates, curves.log_reverse(name, T, f), "--", f"{name}, reverse"),
+            (constants, curves.log_equilibrium(name, T, f), "-", "_"),
+        ]
+        for ax, logarithm, style, text in drawn:
+            if logarithm is not None:
+                values = np.broadcast_to(logarithm, x.shape) / math.log(10)
+                ax.plot(x, values, style, color=colour, label=text, marker="o" if len(x) == 1 else "")
+    for ax, text in ((rates, "Rate per bond [1/s]"), (constants, "K [1]")):
+        ax.set_xlabel(label)
+        ax.set_ylabel(f"log$_{{10}}$ {text}")

@@ -1,15 +1,25 @@
-"""What a regime is: a case, a parameter taken over decades until something breaks, and what is expected there."""
+"""Regimes of the stability matrix: a case, a parameter taken over decades until it breaks, and what is expected there.
+
+A class in any file of this folder is a regime; finding it needs nothing else.
+
+>>> list(regimes())[:3]
+['affinity', 'bell', 'capacity']
+"""
 
 from __future__ import annotations
 
+import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
+from importlib import import_module
 from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.errors import InputError, suggestion
 from surfacechem.references.base import Reference
 
 Array: TypeAlias = NDArray[np.float64]
@@ -111,3 +121,20 @@ class Regime(ABC):
     def label(self, value: float) -> str:
         """A value as in a heading."""
         return f"{value:g}"
+
+
+@cache
+def regimes() -> dict[str, Regime]:
+    """Every regime by name."""
+    modules = [import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+    kinds = [kind for kind in Regime.__subclasses__() if kind.__module__ in {module.__name__ for module in modules}]
+    return {kind.name: kind() for kind in sorted(kinds, key=lambda kind: kind.name)}
+
+
+def chosen(names: tuple[str, ...]) -> list[Regime]:
+    """The regimes of these names, or all; InputError with the nearest guess."""
+    known = regimes()
+    for name in names:
+        if name not in known:
+            raise InputError(f"no regime '{name}'.{suggestion(name, known)}")
+    return [known[name] for name in names or known]

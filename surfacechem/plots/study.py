@@ -1,0 +1,178 @@
+"""Figures of studies: run time against error over solvers and tolerances, and digits kept in dangerous regimes."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import NullFormatter
+
+from surfacechem.plots import style
+from surfacechem.plots.style import COLOURS, Array
+
+
+def figure(dataset: xarray.Dataset) -> Figure:
+    """The figure of a study, by the attribute that names it."""
+    return stability(dataset) if str(dataset.attrs["study"]) == "stability" else precision(dataset)
+
+
+# -- run time against error --------------------------------------------------------------------------------------------
+
+LABELS = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
+"""Variables that name what lies along a dimension; CF allows coordinate variables of numbers only."""
+
+ERRORS = {
+    "error_max": "largest relative error",
+    "error_event": "error of the times of events",
+    "energy_error": "energy residual",
+}
+"""What is drawn on x."""
+
+POINT, CASE = ("case", "solver", "tolerance"), ("case",)
+NUMBERS = {
+    "tolerance": ("tolerance",),
+    **dict.fromkeys((*ERRORS, "run_seconds", "run_seconds_median", "stepping_seconds"), POINT),
+    **dict.fromkeys(("uncertainty_max", "uncertainty_event"), CASE),
+}
+TEXTS = {"status": POINT, **{name: (dimension,) for dimension, name in LABELS.items()}}
+"""Variables that are read, with their dimensions."""
+
+SMALLEST = 1e-17
+"""Errors below this are drawn as this."""
+
+BELOW, INSIDE = "below the uncertainty of the reference", "inside the library's own steps"
+
+
+def precision(dataset: xarray.Dataset) -> Figure:
+    """Run time against error, a row for each case.
+
+    Bars reach from the least to the median time. Dashed lines are the times inside a library's own steps, without what
+    an adapter adds for events and outputs. Hollow marks in the shaded region are below the uncertainty of the
+    reference; crosses at the right edge are failed solves, at the time that they took to fail.
+    """
+    style.check(dataset, NUMBERS, TEXTS)
+    drawn = [name for name in ERRORS if bool((dataset[name] > 0).any())] or ["energy_error"]
+    rows, looks = dataset.sizes["case"], list(zip(cycle(COLOURS), "osD^vPX" * dataset.sizes["solver"], strict=False))
+    with style.panels(0.6 + 3.2 * len(drawn), 0.7 + 2.6 * rows, rows, len(drawn), sharey="row") as (plot, grid):
+        for i in range(rows):
+            case = dataset.isel(case=i)
+            for ax, name in zip(grid[i], drawn, strict=True):
+                ax.set(xscale="log", yscale="log")
+                for axis in (ax.xaxis, ax.yaxis):
+                    axis.set_minor_formatter(NullFormatter())  # labels within a decade would overlap
+                limit = float(case[name.replace("error_", "uncertainty_")]) if name.startswith("error_") else np.nan
+                for k in range(dataset.sizes["solver"]):
+                    _draw_solver(ax, case.isel(solver=k), name, limit, *looks[k])
+                if np.isfinite(limit):
+                    ax.axvspan(SMALLEST, max(limit, SMALLEST), color="0.5", alpha=0.12, linewidth=0)
+                    finite = case[name].values[np.isfinite(case[name].values)]
+                    ax.set_xlim(left=max(min([limit, *finite]) / 3, SMALLEST / 2))
+                ax.set_xlabel(ERRORS[name] if i == rows - 1 else "")
+            grid[i, 0].set_ylabel("run time [s]")
+            grid[i, 0].set_title(str(case["case_name"].values), loc="left")
+        plot.legend(handles=_legend(dataset, looks), loc="outside lower center", ncols=4)
+    return plot
+
+
+def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colour: str, marker: str) -> None:
+    x, y = np.maximum(cells[name].values, SMALLEST), cells["run_seconds"].values
+    shown = np.isfinite(x) & np.isfinite(y) & ((cells[name].values > 0) | np.isfinite(limit))
+    ax.plot(x[shown], y[shown], color=colour, linewidth=1.0)
+    inside = cells["stepping_seconds"].values
+    stepped = shown & np.isfinite(inside)
+    ax.plot(x[stepped], inside[stepped], "--", color=colour, linewidth=0.8, alpha=0.8)
+    # Single precision may round the median of a few equal times below them.
+    spread = np.array([np.zeros(shown.sum()), np.maximum(cells["run_seconds_median"].values - y, 0.0)[shown]])
+    ax.errorbar(x[shown], y[shown], spread, fmt="none", ecolor=colour, elinewidth=0.6, alpha=0.6)
+    for below, fill in ((True, "white"), (False, colour)):
+        some = shown & ((x < limit) == below)
+        ax.plot(x[some], y[some], marker, color=colour, markerfacecolor=fill, markersize=4.5)
+    lost = (cells["status"].values == "failed") & np.isfinite(y)
+    edge = np.full(int(lost.sum()), 0.985)
+    ax.plot(edge, y[lost], "x", color=colour, markersize=5, transform=ax.get_yaxis_transform())
+
+
+def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2D]:
+    status, handles = dataset["status"], []
+    for k, (colour, marker) in enumerate(looks[: dataset.sizes["solver"]]):
+        out = bool((status.isel(solver=k) == "omitted").all())
+        label = f"{dataset['solver_name'].values[k]}{' (left out)' if out else ''}"
+        handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.0, label=label))
+    if bool(np.isfinite(dataset["stepping_seconds"]).any()):
+        handles.append(Line2D([], [], color="0.4", linestyle="--", linewidth=0.8, label=INSIDE))
+    grey: dict[str, Any] = {"color": "0.4", "linestyle": "none"}
+    if bool((status == "failed").any()):
+        handles.append(Line2D([], [], marker="x", label="failed", **grey))
+    if any(bool((dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"]).any()) for kind in ("max", "event")):
+        handles.append(Line2D([], [], marker="o", markerfacecolor="white", label=BELOW, **grey))
+    return handles
+
+
+# -- digits kept -------------------------------------------------------------------------------------------------------
+
+MARKS = {"refused": "R", "failed": "×", "wrong": "!", "sensitive": "~"}
+"""Marks of the outcomes that are not a plain solution."""
+
+NO_ANSWER = {"failed": "0.75", "wrong": "#d62728", "sensitive": "#f0c36d"}
+"""Colours of the outcomes whose digits say nothing."""
+
+MEANING = {
+    "refused": "ended for the right reason",
+    "failed": "failed, and said so",
+    "wrong": "wrong",
+    "sensitive": "too sensitive for the tolerance",
+}
+
+DARK = 8.0
+"""Digits above which the colour of a cell is dark."""
+
+
+def stability(dataset: xarray.Dataset) -> Figure:
+    """Digits as a heat map, a row for each regime: those that the problem's condition leaves, then those that each
+    solver keeps; to the right is more extreme.
+    """
+    cell = ("regime", "decade", "solver")
+    numbers = {"decade": ("decade",), "possible": cell[:2], "digits": cell}
+    style.check(dataset, numbers, {"regime": ("regime",), "solver": ("solver",), "outcome": cell})
+    height, width, count = (dataset.sizes[name] for name in cell)
+    size = 2.2 + 0.23 * width * (count + 1), 1.3 + 0.26 * height
+    with style.panels(*size, 1, count + 1, sharey=True) as (plot, (axes,)):
+        image = _heat_map(axes[0], "possible", dataset["possible"].values)
+        for j, ax in enumerate(axes[1:]):
+            digits, outcomes = dataset["digits"].values[:, :, j].copy(), dataset["outcome"].values[:, :, j].astype(str)
+            for i, k in np.argwhere(np.isfinite(digits)):
+                dark = outcomes[i, k] not in NO_ANSWER and digits[i, k] > DARK
+                how: Any = {"ha": "center", "va": "center", "fontsize": 7, "color": "white" if dark else "black"}
+                ax.text(k, i, MARKS.get(outcomes[i, k], ""), **how)
+                if outcomes[i, k] in NO_ANSWER:
+                    colour = NO_ANSWER[outcomes[i, k]]
+                    ax.add_patch(Rectangle((k - 0.5, i - 0.5), 1.0, 1.0, facecolor=colour, edgecolor="none"))
+                    digits[i, k] = np.nan
+            _heat_map(ax, str(dataset["solver"].values[j]), digits)
+        axes[0].set_yticks(range(height), dataset["regime"].values.astype(str).tolist())
+        axes[(count + 1) // 2].set_xlabel("towards the extreme →")
+        plot.colorbar(image, ax=list(axes), label="digits", fraction=0.03, pad=0.01)
+        handles = [
+            Patch(facecolor="none", edgecolor="none", label=f"{MARKS[n]}  {text}") for n, text in MEANING.items()
+        ]
+        plot.legend(handles=handles, loc="outside lower center", ncols=4, handlelength=0, frameon=False, fontsize=8)
+    return plot
+
+
+def _heat_map(ax: Axes, title: str, digits: Array) -> AxesImage:
+    image = ax.imshow(digits, norm=Normalize(0.0, 14.0), cmap="YlGnBu", aspect="auto")
+    ax.set_title(title, fontsize=9)
+    ax.grid(visible=False)
+    ax.set_xticks([])
+    ax.tick_params(length=0)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    return image

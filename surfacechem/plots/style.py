@@ -1,0 +1,187 @@
+"""What all figures share: colours, symbols and units as text, headings, and datasets that are fit to be drawn."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError, Place
+from surfacechem.results.netcdf import reading
+
+Array = NDArray[np.float64]
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
+"""The palette of Okabe and Ito, which colour-blind readers can tell apart."""
+
+STYLE: Any = {
+    "axes.grid": True,
+    "axes.linewidth": 0.7,
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "font.size": 9.0,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.6,
+    "mathtext.fontset": "dejavusans",
+    "svg.hashsalt": "surfacechem",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+}
+
+FLAT = 1e-9
+"""A curve that changes by less than this part of its size is constant."""
+
+GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
+
+
+class Plot(Figure):
+    """A figure that notebooks show by themselves."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        save(self, buffer, "png")
+        return buffer.getvalue()
+
+
+@contextmanager
+def panels(width: float, height: float, rows: int = 1, columns: int = 1, **sharing: Any) -> Iterator[tuple[Plot, Any]]:
+    """A figure of this size [inch] and its axes, shape (rows, columns), in the style of this package meanwhile."""
+    with matplotlib.rc_context(STYLE):
+        plot = Plot(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(plot)
+        yield plot, plot.subplots(rows, columns, squeeze=False, **sharing)
+
+
+def save(plot: Figure, target: Any, kind: str) -> None:
+    """Write a figure as png, svg or pdf; the same figure gives the same bytes."""
+    metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    with matplotlib.rc_context(STYLE):
+        plot.savefig(target, format=kind, dpi=160, metadata=metadata)
+
+
+def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:
+    """A dataset, read from its netCDF file if need be; InputError where the file is none."""
+    if isinstance(data, xarray.Dataset):
+        return data
+    path = Path(data)
+
+    def load() -> xarray.Dataset:
+        with xarray.open_dataset(path, engine="netcdf4") as file:
+            return file.load()
+
+    return reading(path, load)
+
+
+def check(
+    dataset: xarray.Dataset, numbers: Mapping[str, tuple[str, ...]], texts: Mapping[str, tuple[str, ...]] | None = None
+) -> None:
+    """InputError where variables that are drawn are missing, or not what surfacechem writes: numbers in double
+    precision, or texts, over these dimensions.
+    """
+    for name, dimensions in {**numbers, **(texts or {})}.items():
+        if name not in dataset.variables:
+            raise InputError(f"has no variable '{name}', as datasets of surfacechem have.", place(dataset))
+        if dataset[name].dims != dimensions:
+            raise InputError(f"{name} does not go over {' and '.join(dimensions)}.", place(dataset))
+        if name in numbers and dataset[name].dtype.kind != "f":
+            raise InputError(f"{name} does not hold numbers in double precision.", place(dataset))
+
+
+def number(dataset: xarray.Dataset, name: str) -> float | None:
+    """The value of a global attribute; None where there is none."""
+    value = dataset.attrs.get(name)
+    if value is not None and not isinstance(value, (float, int, np.number)):
+        raise InputError(f"the attribute '{name}' is no number.", place(dataset))
+    return None if value is None else float(value)
+
+
+def place(dataset: xarray.Dataset) -> Place | None:
+    """The file of a dataset."""
+    source = dataset.encoding.get("source")
+    return Place(str(source)) if source else None
+
+
+def headings(plot: Figure, ax: Axes, dataset: xarray.Dataset) -> None:
+    """Title, how it ended, error and solver."""
+    attributes = dataset.attrs
+    plot.suptitle(str(attributes.get("title", "")), x=0.01, ha="left", fontsize=11, fontweight="bold")
+    facts = [str(attributes.get("reason", ""))]
+    if (error := number(dataset, "error")) is not None:
+        exact = str(attributes.get("error_source", "")).startswith("exact")
+        exact = exact or any(str(name).endswith("_exact") for name in dataset)
+        facts.append(f"error {error:.1e} ({'exact solution' if exact else 'estimate'})")
+    if "solver" in attributes and (rtol := number(dataset, "rtol")) is not None:
+        facts.append(f"{attributes['solver']}, rtol {rtol:g}")
+    if dataset.sizes.get("event", 0) > dataset.sizes.get("time", 0):
+        facts.append(f"{dataset.sizes['event']} events between {dataset.sizes.get('time', 0)} outputs")
+    ax.set_title("   ".join(fact for fact in facts if fact), loc="left", fontsize=8, color="#555555")
+
+
+def legend(ax: Axes) -> None:
+    """The legend beside the axes."""
+    _, labels = ax.get_legend_handles_labels()
+    if labels:
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), borderaxespad=0.4, handlelength=1.6)
+
+
+def meaning(values: xarray.DataArray, end: str = ":") -> str:
+    """What a variable is: its long name up to where details begin.
+
+    >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
+    'State of bonds'
+    """
+    text = str(values.attrs.get("long_name", values.name)).partition(end)[0]
+    return text[:1].upper() + text[1:]
+
+
+def unit(values: xarray.DataArray) -> str:
+    """The unit of a variable in the notation of the CF conventions."""
+    return str(values.attrs.get("units", "1"))
+
+
+def symbol(name: str) -> str:
+    r"""A variable's name in mathematics.
+
+    >>> symbol("T_1"), symbol("phi"), symbol("D_coulomb"), symbol("R_linear_affinity")
+    ('$T_{1}$', '$\\phi$', '$D_{\\mathrm{coulomb}}$', '$R_{\\mathrm{linear\\ affinity}}$')
+    """
+    head, _, subscript = name.partition("_")
+    base = f"\\{head}" if head in GREEK else (head if len(head) == 1 else rf"\mathrm{{{head}}}")
+    if not subscript:
+        return f"${base}$"
+    words = subscript.replace("_", r"\ ")
+    inside = words if len(words) <= 2 else r"\mathrm{" + words + "}"
+    return f"${base}_{{{inside}}}$"
+
+
+def unit_text(unit: str) -> str:
+    """A CF unit with its powers raised.
+
+    >>> unit_text("W m-2 K-1")
+    'W m$^{-2}$ K$^{-1}$'
+    """
+    return re.sub(r"([A-Za-z])(-?\d+)", r"\1$^{\2}$", unit)
+
+
+def varies(values: Array) -> bool:
+    """Whether a curve is more than a constant with rounding."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 2:
+        return len(finite) == 1
+    return bool(np.ptp(finite) > FLAT * np.max(np.abs(finite), initial=0.0))

@@ -1,0 +1,121 @@
+"""The grid of a study: every solver at every value of a problem, run once for what it gives and again for its time.
+
+A first run warms up and gives errors and counts. The rounds that follow are timed and interleaved, so that a busy
+moment of the machine does not hit one solver alone; brief runs are repeated within a round. Compilation is apart.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.solve import names, solver
+from surfacechem.solve.contract import Counters
+from surfacechem.solve.run import Trajectory
+
+BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
+"""Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
+
+BUDGET = 10.0
+"""A solver at one value is not timed again once it has taken this long [s]."""
+
+FAULTS = (ArithmeticError, RuntimeError, ValueError)
+"""Errors with which libraries end that cannot even say how a run failed."""
+
+
+@dataclass
+class Cell:
+    """What one solver made of one problem at one value; studies add what they judge it by."""
+
+    outcome: str
+    reason: str
+    counters: Counters | None = field(default=None, kw_only=True)
+    """Counts of the solver; None where nothing was run."""
+    seconds: list[float] = field(default_factory=list, kw_only=True)
+    """Run times; of a failed solve, the time that it took to fail."""
+    stepping: list[float] = field(default_factory=list, kw_only=True)
+    """Parts of the run times inside a library's own steps; NaN for a method that does everything itself."""
+    again: Callable[[], Trajectory] | None = field(default=None, kw_only=True, repr=False)
+    """Runs it once more."""
+
+    def count(self, name: str, by: str) -> float:
+        """A count by a solver; not a number where its library does not tell."""
+        counters = self.counters
+        if counters is None or (name == "rejected" and not solver(by).counts_rejected):
+            return math.nan
+        if name == "factorizations" and counters.jacobians > 0 and counters.factorizations == 0:
+            return math.nan
+        return float(getattr(counters, name))
+
+
+C = TypeVar("C", bound=Cell)
+
+
+def attempt(solve: Callable[[], Trajectory], judge: Callable[[Trajectory | Exception], C]) -> C:
+    """A run and what the study makes of it, or of the error with which a library ended."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")  # libraries warn of what the status says
+            done = solve()
+            cell = judge(done)
+    except (*FAULTS, InputError) as error:
+        return judge(error)
+    cell.counters, cell.seconds, cell.stepping = done.result.counters, [done.seconds], [done.result.stepping]
+    cell.again = solve
+    return cell
+
+
+def filled(
+    solvers: Sequence[str], values: Sequence[float], prepare: Callable[[float], Callable[[str], C]], rounds: int = 0
+) -> dict[tuple[str, float], C]:
+    """The cells of a problem by solver and value: what does not depend on the solver is prepared once for each value;
+    each cell is run once, then timed in so many rounds.
+    """
+    prepared = {value: prepare(value) for value in values}
+    cells = {(name, value): prepared[value](name) for name in solvers for value in values}
+    for _ in range(rounds):
+        for cell in cells.values():
+            if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < BUDGET:
+                _time_again(cell)
+    for cell in cells.values():
+        if len(cell.seconds) > 1:  # the first run warmed up, unless it was the only one
+            del cell.seconds[0], cell.stepping[0]
+    return cells
+
+
+def _time_again(cell: Cell) -> None:
+    """A round of a cell; one that ends otherwise, where the machine is too busy for its time limit, does not count."""
+    spent: list[float] = []
+    while cell.again and not _enough(cell, spent):
+        done = attempt(cell.again, lambda done: Cell(done.status if isinstance(done, Trajectory) else "failed", ""))
+        if done.outcome != cell.outcome:
+            return
+        spent += done.seconds
+        cell.seconds += done.seconds
+        cell.stepping += done.stepping
+
+
+def _enough(cell: Cell, spent: Sequence[float]) -> bool:
+    most = MOST_REPEATS if min(cell.seconds) <= BRIEF else 1
+    return len(spent) >= most or (len(spent) >= LEAST_REPEATS and sum(spent) > BRIEF)
+
+
+def check_solvers(wanted: Sequence[str], path: str) -> None:
+    """InputError for a solver that there is not, and for none."""
+    for name in wanted:
+        if name not in names:
+            raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=path))
+    if len(wanted) == 0:
+        raise InputError("at least one is needed.", Place(path=path))
+
+
+def check_range(value: float, inside: bool, allowed: str, path: str) -> None:
+    """InputError for a value that is not ``inside`` of what is ``allowed``."""
+    if not inside:
+        raise InputError(f"{value:g} is outside its range: {allowed}.", Place(path=path))

@@ -1,1 +1,0 @@
-"""A mechanism by itself: equilibria, rates over temperature and force, cycles."""

@@ -1,0 +1,374 @@
+"""What the solvers make of the dangerous regimes: solved to so many digits, refused for the right reason, or failed.
+
+>>> study = stability("seconds", solvers=["radau"], quick=True, rounds=0)
+>>> bool(study.dataset["digits"].min() > 9)
+True
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, differential_evolution
+
+from surfacechem import format as cases
+from surfacechem.errors import InputError
+from surfacechem.format import Case
+from surfacechem.plots.study import MARKS, NO_ANSWER
+from surfacechem.results.accuracy import largest_errors
+from surfacechem.results.achieved import computed
+from surfacechem.solve import names as known_solvers
+from surfacechem.solve.contract import Counters
+from surfacechem.solve.run import OWN, Model, Run, Trajectory
+from surfacechem.studies.condition import condition, least
+from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, filled
+from surfacechem.studies.regimes import Exact, Problem, Refused, Regime, Stops, chosen
+from surfacechem.studies.report import Section, Study, Table, Variable
+
+log = logging.getLogger(__name__)
+
+SOLVED, REFUSED, FAILED, WRONG, SENSITIVE = OUTCOMES = ("solved", "refused", "failed", "wrong", "sensitive")
+"""Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer; an answer to a
+problem whose condition leaves no digits at the tolerance.
+"""
+
+RTOL, STEPS = 1e-10, 1500
+"""Tolerance of every solver, and the steps after which a run has failed."""
+
+LEAST, MOST = 2.0, 16.0
+"""Digits below which a value that is given out as an answer is wrong, and those that a double holds."""
+
+EPSILON = float(np.finfo(float).eps)
+
+SOLVERS = (OWN, "lsoda", "bdf", "scipy-radau", "cvode", "ida")
+
+ROUNDS, MOST_ROUNDS = 12, 10_000
+"""Rounds of a search for a worst corner, and the most that may be asked for."""
+
+SEED = 20210301
+POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
+"""Differential evolution: points kept, length of a difference, share of its coordinates that is taken."""
+
+BADNESS = {FAILED: MOST, WRONG: 2 * MOST}
+"""A failure counts as worse than any error, a wrong answer as worse than a failure."""
+
+TITLE = "Stability of the solvers in dangerous regimes"
+
+MEANING = (
+    f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
+    "the right reason, with the digits of the time of its end. ×: failed, and said so. !: an answer that is wrong, to "
+    f"less than {LEAST:g} digits. ~: so few digits, too, but the problem leaves no more at this tolerance. Its "
+    "condition number is the relative change of the answer over that of the data: what rounding of the data, or a "
+    "tolerance, changes by itself. Possible digits are those that rounding leaves."
+)
+
+
+@dataclass
+class Attempt(Cell):
+    """What one solver made of one problem."""
+
+    digits: float
+    """-log10 of the largest relative error, of values or of the time of the end; none where the input is refused."""
+    condition: float = math.nan
+    """Condition number of the problem: relative change of its answer over that of its data; none where not known."""
+
+    @property
+    def cost(self) -> Counters:
+        """Counts of the solver; none where the input is refused."""
+        return self.counters or Counters()
+
+    @property
+    def text(self) -> str:
+        """The attempt in a table.
+
+        >>> Attempt("solved", "in T", 9.87).text, Attempt("failed", "stiff", 0.0).text
+        ('9.9', '×')
+        """
+        mark = MARKS.get(self.outcome, "")
+        return mark if self.outcome == FAILED else f"{mark} {self.digits:.1f}".strip()
+
+
+class Row(NamedTuple):
+    """Attempts at a regime by solver and value."""
+
+    regime: Regime
+    values: Sequence[float]
+    cells: Mapping[tuple[str, float], Attempt]
+
+    def at(self, k: int, solver: str) -> Attempt | None:
+        """The attempt at the k-th value; None where the regime has fewer."""
+        return self.cells[solver, self.values[k]] if k < len(self.values) else None
+
+
+class Corner(NamedTuple):
+    """The worst point that a search has found, of how many tried, and how many were not solved."""
+
+    regime: Regime
+    point: Mapping[str, float]
+    cell: Attempt
+    tried: int
+    unsolved: int
+
+    @property
+    def texts(self) -> Sequence[str]:
+        """The corner in a table."""
+        where = ", ".join(f"{name} = {value:.3g}" for name, value in self.point.items())
+        return self.regime.name, f"{self.tried}", f"{self.unsolved}", f"{self.cell.text} {self.cell.reason}", where
+
+
+def stability(
+    *regimes: str,
+    solvers: Sequence[str] = SOLVERS,
+    rtol: float = RTOL,
+    quick: bool = False,
+    rounds: int = ROUNDS,
+) -> Study:
+    """Solve the regimes, all if none is named, with the solvers; ``quick`` takes four values of each.
+
+    ``rounds`` of a search for the worst corner of each regime that has one; none where it is zero.
+    """
+    found = chosen(regimes)
+    check_solvers(solvers, "--solvers")
+    check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", "--rtol")
+    check_range(rounds, 0 <= rounds <= MOST_ROUNDS, f">= 0 and <= {MOST_ROUNDS}", "--search")
+    rows = []
+    for number, regime in enumerate(found, 1):
+        values = few(regime.values) if quick else list(regime.values)
+        log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
+        rows.append(Row(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
+    corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
+    options = [f"--solvers {','.join(solvers)}"] if tuple(solvers) != SOLVERS else []
+    options += [f"--rtol {rtol:g}"] if rtol != RTOL else []
+    options += ["--quick"] if quick else []
+    options += [f"--search {rounds}"] if rounds != ROUNDS else []
+    return Study(
+        kind="stability",
+        title=TITLE,
+        command=" ".join(["surfacechem stability", *regimes, *options]),
+        axes={"regime": rows, "decade": range(max(len(row.values) for row in rows)), "solver": solvers},
+        variables=list(_variables(solvers[0])),
+        coordinates=("regime", "decade", "solver"),
+        sections=list(_sections(rows, corners, solvers, rtol)),
+        omissions=list(_omissions(rows, solvers, searched=rounds > 0)),
+        settings={"rtol": rtol},
+    )
+
+
+def few(values: Sequence[float]) -> list[float]:
+    """First, middle and last of the values, and the one before the last."""
+    return [values[i] for i in sorted({0, len(values) // 2, len(values) - 2, len(values) - 1})]
+
+
+# -- one problem -------------------------------------------------------------------------------------------------------
+
+
+def prepared(problem: Problem, rtol: float = RTOL) -> Callable[[str], Attempt]:
+    """Attempts at a problem by solver; it is read and compiled once."""
+    try:
+        model = Model(read(problem).system())
+    except InputError as error:
+        refusal = _judged(problem, rtol, math.nan, error)
+        return lambda name: refusal
+    known = condition(problem, [state.name for state in model.system.states])
+    times = (0.0, *problem.times) if problem.times[0] else tuple(problem.times)
+    run = Run(times=times, rtol=rtol, max_steps=STEPS)
+    judge = partial(_judged, problem, rtol, known)
+    return lambda name: attempt(partial(model.solve, replace(run, solver=name)), judge)
+
+
+def _at_value(regime: Regime, rtol: float, value: float) -> Callable[[str], Attempt]:
+    return prepared(regime.problem(value), rtol)
+
+
+def read(problem: Problem) -> Case:
+    """The case of a problem with its changes."""
+    changes = {**problem.changes, "run": {"times": list(problem.times)}}
+    shipped = "\n" not in problem.case
+    case = cases.load(problem.case, changes) if shipped else cases.load_text(problem.case, "regime", overrides=changes)
+    return replace(case, reference=None)  # the regime has its own expectation
+
+
+def _judged(problem: Problem, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
+    """What came of a run by the ``known`` condition of its problem."""
+    expected = problem.expected
+    if isinstance(done, Exception):
+        reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
+        right = isinstance(expected, Refused) and expected.reason in reason
+        return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
+    outcome, digits, reason = WRONG, 0.0, done.reason
+    if done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
+        outcome = FAILED
+    elif isinstance(expected, Stops) and done.status == "stopped" and expected.reason in reason:
+        outcome, digits = REFUSED, digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0))
+    elif isinstance(expected, Exact) and expected.events not in (None, len(done.jumps)):
+        reason = f"{len(done.jumps)} events, not {expected.events}"
+    elif isinstance(expected, Exact):
+        error, reason = _largest_error(expected, done)
+        outcome, digits = SOLVED, digits_of(error)
+    if outcome in (SOLVED, REFUSED) and digits < LEAST:
+        outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
+    return Attempt(outcome, reason, digits, known)
+
+
+def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
+    """The largest relative error of the expected values, and where it is."""
+    known = {*expected.also, *(state.name for state in done.model.system.states)}
+    exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in known}
+    errors = largest_errors(computed(done), exact, lambda name: least(exact[name]))
+    worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
+    return errors[worst], f"in {worst}"
+
+
+def digits_of(error: float) -> float:
+    """Digits that an error leaves.
+
+    >>> digits_of(1e-8), digits_of(0.0), digits_of(math.nan), digits_of(10.0)
+    (8.0, 16.0, 0.0, 0.0)
+    """
+    if math.isnan(error):
+        return 0.0
+    return min(max(-math.log10(error), 0.0), MOST) if error > 0 else MOST
+
+
+def digits_left(condition: float, change: float) -> float:
+    """Digits of an answer that a relative change of the data leaves.
+
+    >>> round(digits_left(1e6, 1e-10), 9), digits_left(1.0, 1e-20), digits_left(1e20, 1e-10)
+    (4.0, 16.0, 0.0)
+    """
+    return digits_of(condition * change) if math.isfinite(condition) else math.nan
+
+
+# -- the worst corner --------------------------------------------------------------------------------------------------
+
+
+def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed: int = SEED) -> Corner:
+    """Differential evolution over the regime's space, on decimal logarithms; the same seed gives the same corner.
+
+    Source: Storn & Price (1997), Differential evolution, J. Global Optim. 11, 341 (rand/1/bin), as in SciPy.
+    """
+    random = np.random.default_rng(seed)
+    names, low, high = list(regime.space), *np.array(list(regime.space.values())).T
+    log.info("%s: searching its worst corner", regime.name)
+    seen: list[tuple[dict[str, float], Attempt]] = []
+
+    def badness(cell: Attempt) -> float:
+        return MOST - cell.digits + BADNESS.get(cell.outcome, 0.0)
+
+    def kept(logarithms: NDArray[np.float64]) -> float:
+        point = {name: float(10.0**x) for name, x in zip(names, logarithms, strict=True)}
+        try:
+            cell = prepared(regime.corner(point), rtol)(OWN)
+        except InputError as error:  # the corner is outside of what the exact solution holds for
+            cell = Attempt(REFUSED, error.message, MOST)
+        seen.append((point, cell))
+        return -badness(cell)
+
+    differential_evolution(
+        kept,
+        Bounds(low, high),
+        strategy="rand1bin",
+        init=low + (high - low) * random.random((POPULATION, len(names))),
+        maxiter=rounds,
+        mutation=WEIGHT,
+        recombination=CROSSOVER,
+        tol=0,
+        polish=False,
+        rng=random,
+    )
+    point, cell = max(seen, key=lambda point_and_cell: badness(point_and_cell[1]))
+    return Corner(regime, point, cell, len(seen), sum(cell.outcome in BADNESS for _, cell in seen))
+
+
+# -- the dataset and the report ----------------------------------------------------------------------------------------
+
+
+def _variables(first: str) -> Iterator[Variable]:
+    """The variables over regime, decade and solver, the coordinates first; nothing where a regime has fewer values."""
+
+    def at(read: Callable[[Attempt], float | str], nothing: float | str = math.nan) -> Callable[..., float | str]:
+        return lambda row, k, solver=first: read(cell) if (cell := row.at(k, solver)) else nothing
+
+    yield Variable("regime", ("regime",), lambda row: row.regime.name, "1", "regime")
+    yield Variable("decade", ("decade",), float, "1", "number of the value, from mild to extreme")
+    yield Variable("solver", ("solver",), str, "1", "solver")
+    yield Variable("symbol", ("regime",), lambda row: row.regime.symbol, "1", "parameter")
+    given = lambda row, k: row.values[k] if k < len(row.values) else math.nan  # noqa: E731
+    yield Variable("value", ("regime", "decade"), given, "1", "value of the parameter")
+    for name, read, text in (
+        ("condition", lambda cell: cell.condition, "relative change of the answer over its data's"),
+        ("possible", lambda cell: digits_left(cell.condition, EPSILON), "digits that rounding of the data leaves"),
+    ):
+        yield Variable(name, ("regime", "decade"), at(read), "1", text)
+    digits = "-log10 of the largest relative error, of values or of the time of the end"
+    outcomes = f"what came of it: {', '.join(OUTCOMES)}"
+    for name, unit, text, reader in (
+        ("digits", "1", digits, at(lambda cell: cell.digits)),
+        ("steps", "1", "steps", at(lambda cell: cell.cost.steps)),
+        ("residuals", "1", "evaluations of the equations", at(lambda cell: cell.cost.residuals)),
+        ("seconds", "s", "run time", at(lambda cell: sum(cell.seconds))),
+        ("outcome", "1", outcomes, at(lambda cell: cell.outcome, "")),
+        ("reason", "1", "where the error is largest, or why the run ended", at(lambda cell: cell.reason, "")),
+    ):
+        yield Variable(name, ("regime", "decade", "solver"), reader, unit, text)
+
+
+def _sections(rows: Sequence[Row], corners: Sequence[Corner], solvers: Sequence[str], rtol: float) -> Iterator[Section]:
+    """The report; the terminal shows the summary and the corners."""
+    headings = ("condition", "possible", f"at rtol {rtol:g}")
+
+    def condition_texts(number: float) -> tuple[str, ...]:
+        left = (digits_left(number, change) for change in (EPSILON, rtol))
+        return (f"{number:.0e}", *(f"{digits:.1f}" for digits in left)) if math.isfinite(number) else ("", "", "")
+
+    lines, details = [], []
+    for regime, values, cells in rows:
+        known = [cells[solvers[0], value].condition for value in values]
+        worst = max((number for number in known if math.isfinite(number)), default=math.nan)
+        span = f"{regime.symbol}: {regime.label(values[0])} .. {regime.label(values[-1])}"
+        kept = [_kept([cells[solver, value] for value in values]) for solver in solvers]
+        lines.append((regime.name, span, *condition_texts(worst), *kept))
+        table = []
+        for value in values:
+            first, *_ = found = [cells[solver, value] for solver in solvers]
+            texts = (regime.label(value), *condition_texts(first.condition), *(cell.text for cell in found))
+            table.append((*texts, str(first.cost.steps), first.reason))
+        marked = [i for i, v in enumerate(values) if any(cells[solver, v].outcome in NO_ANSWER for solver in solvers)]
+        of_first = (f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
+        details.append(Table((regime.symbol, *headings, *solvers, *of_first), table, regime.title, marked))
+    caption = f"Least digits kept over all values, at rtol {rtol:g}, and the largest condition number"
+    summary = Table(("regime", "from .. to", *headings, *solvers), lines, caption)
+    yield Section("Digits kept", [MEANING], [summary], figure=True)
+    if corners:
+        heading, caption = ("regime", "points", "not solved", "worst", "where"), "Worst corners that a search has found"
+        yield Section("Corners", tables=[Table(heading, [corner.texts for corner in corners], caption)])
+    yield Section("Every cell", tables=details, details=True)
+
+
+def _kept(cells: Sequence[Attempt]) -> str:
+    """The least digits of all answers, and how many cells failed or are wrong."""
+    answers = [cell.digits for cell in cells if cell.outcome not in NO_ANSWER]
+    counts = {word: sum(cell.outcome == word for cell in cells) for word in NO_ANSWER}
+    return ", ".join(
+        [f"{min(answers):.1f}" if answers else "none", *(f"{n} {word}" for word, n in counts.items() if n)]
+    )
+
+
+def _omissions(rows: Sequence[Row], solvers: Sequence[str], searched: bool) -> Iterator[str]:
+    """What the study could have had and has not, each with its reason."""
+    every, taken = sum(len(row.regime.values) for row in rows), sum(len(row.values) for row in rows)
+    if taken < every:
+        yield f"{every - taken} of {every} values of the regimes, for the sake of time"
+    if others := [name for name in known_solvers if name not in solvers]:
+        yield f"the solvers {', '.join(others)}, which were not asked for"
+    if not searched:
+        yield "the search for worst corners, which was not asked for"
+    if full := sum(cell.cost.steps >= STEPS for row in rows for cell in row.cells.values()):
+        yield f"what lies beyond {STEPS} steps of a run: {full} took as many, and count as failed"

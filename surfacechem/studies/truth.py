@@ -1,0 +1,262 @@
+"""What runs are held against: the exact solution, else two different methods that agree; its uncertainty is stated.
+
+A method is run at two tight tolerances a decade apart and extrapolated in the tolerance, to which its error is taken to
+be proportional. Of several methods the two that agree best are believed, and how far they differ is the uncertainty, or
+how far the extrapolation went if that is more. The uncertainty of an exact solution is that of its evaluation: how far
+it moves when the times move by their last bit.
+
+Errors are relative to the true value at the same time, or to a floor if that is more: of a state the size at which its
+absolute tolerance is as much as the relative one, of another variable its largest value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError
+from surfacechem.format import Case
+from surfacechem.results.accuracy import ROUNDING, TIGHTEST, errors_over_time
+from surfacechem.results.achieved import computed, difference, event_error, floor
+from surfacechem.results.event_table import event_times
+from surfacechem.results.matching import exact_values
+from surfacechem.solve import ASKING, solver
+from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.studies.grid import FAULTS
+
+Array = NDArray[np.float64]
+Values = Mapping[str, Array]
+
+METHODS = ("radau", "scipy-radau", "lsoda", "cantera")
+"""Methods that a reference may be made of; the last only where it is needed."""
+
+DECADE = 10.0
+"""Ratio of the two tolerances from which a method is extrapolated."""
+
+MOST_SECONDS, LONGEST = 60.0, 900.0
+"""A solve that takes longer than this counts as failed, unless the case allows less; one for a reference may take so
+long [s]: which methods it is made of must not depend on how busy a machine is.
+"""
+
+AGREE = 1e-6
+"""Methods that differ by more than this do not agree."""
+
+KINDS = ("final", "max", "l2")
+MEANING = {
+    "final": "relative error at the end",
+    "max": "largest relative error",
+    "l2": "root mean square in time of the relative error",
+    "event": "largest relative error of the times of events",
+}
+"""What each error is; the last is not of variables."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors by kind and variable; those of the times of events are of no variable, and there may be none."""
+
+    by_kind: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: {kind: {} for kind in MEANING})
+
+    def worst(self, *kinds: str) -> float:
+        """The largest over the variables; not a number where there is none."""
+        return float(np.max([error for kind in kinds for error in self.by_kind[kind].values()] or [math.nan]))
+
+    def larger(self, other: Errors) -> Errors:
+        """The larger error of two for each kind and variable."""
+        found = {}
+        for kind, errors in self.by_kind.items():
+            names = dict.fromkeys((*errors, *other.by_kind[kind]))
+            found[kind] = {name: max(errors.get(name, 0.0), other.by_kind[kind].get(name, 0.0)) for name in names}
+        return Errors(found)
+
+
+def mean_square(times: Array, error: Array) -> float:
+    """Root mean square in time, by the trapezoidal rule.
+
+    >>> mean_square(np.array([0.0, 1.0, 3.0]), np.array([0.2, 0.2, 0.2]))
+    0.2
+    """
+    if len(times) < 2:
+        return float(np.max(error, initial=0.0))
+    return float(np.sqrt(np.trapezoid(error**2, times) / (times[-1] - times[0])))
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A case that any solver may run at any tolerance."""
+
+    case: Case
+    model: Model
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the states."""
+        system = self.model.system
+        return [state.name for state in system.states if state.name not in system.inside]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all that may be compared."""
+        return [*self.states, *(item.name for item in self.model.system.outputs)]
+
+    def settings(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Run:
+        """The run of the case with another solver and tolerance, its absolute tolerance in proportion."""
+        run = self.case.run
+        atol = None if run.atol is None else run.atol * rtol / run.rtol
+        return replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=run.max_seconds or limit)
+
+    def solve(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Trajectory:
+        """A run with another solver and tolerance."""
+        return self.model.solve(self.settings(name, rtol, limit))
+
+    def unable(self, name: str) -> str:
+        """Why a solver cannot run this case; empty where it can."""
+        if self.model.program.filler is not None and name not in ASKING:
+            return "rates of the mechanism come from Cantera itself, which this solver cannot ask"
+        try:
+            solver(name)
+        except ImportError as error:
+            return f"its library cannot be imported: {error}"
+        return ""
+
+    def methods(self) -> list[str]:
+        """Methods for a reference; that of Cantera only where no other can run the case."""
+        able = [name for name in METHODS if not self.unable(name)]
+        return able if able == ["cantera"] else [name for name in able if name != "cantera"]
+
+    def tight(self, method: str, rtol: float) -> Trajectory:
+        """A run for a reference; InputError where it comes to nothing."""
+        try:
+            found = self.solve(method, rtol, LONGEST)
+            why = found.reason if found.status == "failed" or len(found.result.times) < 2 else ""
+        except FAULTS as error:
+            why = f"{type(error).__name__}: {error}"
+        if why:
+            raise InputError(f"{self.case.name} has no reference: {method} at rtol {rtol:.0e}: {why}")
+        return found
+
+
+@dataclass(frozen=True)
+class Truth:
+    """True values of the variables at the output times, true times of the events, and how uncertain both are."""
+
+    source: str
+    status: str
+    times: Array
+    values: Values
+    floors: Mapping[str, float]
+    events: Values
+    end: float
+    """End of the run as it was asked for [s]."""
+    uncertainty: Errors = field(default_factory=Errors)
+
+    def errors(self, values: Values, events: Values) -> Errors:
+        """Errors of values and of times of events, over the output times that both have reached."""
+        found = errors_over_time(values, self.values, self.floors.__getitem__)
+        return Errors(
+            {
+                "final": {name: float(error[-1]) for name, error in found.items()},
+                "max": {name: float(error.max()) for name, error in found.items()},
+                "l2": {name: mean_square(self.times[: len(error)], error) for name, error in found.items()},
+                "event": {"": event_error(events, self.events, self.end)} if self.events else {},
+            }
+        )
+
+    def objection(self, trajectory: Trajectory) -> str:
+        """Why a run has no errors: it failed, or came to another end; empty where it has."""
+        if trajectory.status == "failed":
+            return trajectory.reason
+        if trajectory.status != self.status:
+            return f"ended otherwise than the reference: {trajectory.reason}"
+        if abs(len(trajectory.result.times) - len(self.times)) > 1:  # an output may lie between the two ends
+            return f"ended elsewhere than the reference: {trajectory.reason}"
+        return difference(event_times(trajectory), self.events)
+
+
+def establish(subject: Subject, variables: Sequence[str]) -> Truth:
+    """The truth of a case; InputError where there is none to be had."""
+    reference = subject.case.reference
+    if reference is None:
+        return numerical(subject, variables)
+    trajectory = subject.tight(subject.methods()[0], TIGHTEST)
+    result = trajectory.result
+    nudged = replace(trajectory, result=replace(result, times=result.times * (1 - ROUNDING)))
+    try:
+        exact, moved = (
+            exact_values(reference.name, reference.options, subject.case.scene, run) for run in (trajectory, nudged)
+        )
+    except InputError as error:
+        found = numerical(subject, variables)
+        unused = f"the exact solution {reference.name} is not of this scene: {error.message}"
+        return replace(found, source=f"{found.source}; {unused}")
+    known = {name: exact[name] for name in variables if name in exact}
+    alone = len(known) == len(variables) and not event_times(trajectory)
+    beside = _of_run("", trajectory, variables, {}, {}) if alone else numerical(subject, variables)
+    noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {}).by_kind
+    uncertain = {
+        kind: {**errors, **{name: error + ROUNDING for name, error in noise[kind].items()}}
+        for kind, errors in beside.uncertainty.by_kind.items()
+    }
+    others = [*(name for name in beside.values if name not in known), *(["events"] if beside.events else [])]
+    source = f"exact solution {reference.name}" + (f"; {', '.join(others)}: {beside.source}" if others else "")
+    values = {**beside.values, **known}
+    return replace(beside, source=source, times=result.times, values=values, uncertainty=Errors(uncertain))
+
+
+def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
+    """The truth from the two methods that agree best; InputError where no two agree."""
+    name = subject.case.name
+    found, failures = [], []
+    for method in subject.methods():
+        try:
+            found.append(_extrapolated(subject, method, variables))
+        except InputError as error:
+            failures.append(error.message)
+    if not found:
+        raise InputError("; ".join(failures))
+    if len(found) == 1:
+        return replace(found[0], source=f"{found[0].source} alone, which no second method confirms")
+    pairs = [(a, b, a.errors(b.values, b.events)) for a, b in combinations(found, 2) if _same_end(a, b)]
+    if not pairs:
+        raise InputError(f"{name} has no reference: its methods come to different ends or events.")
+    first, second, apart = min(pairs, key=lambda pair: np.nan_to_num(pair[2].worst("max", "event"), nan=math.inf))
+    methods, largest = f"{first.source} and {second.source}", apart.worst("max", "event")
+    if not largest <= AGREE:
+        raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
+    source = f"{methods}, extrapolated from rtol {TIGHTEST * DECADE:.0e} and {TIGHTEST:.0e}"
+    return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
+
+
+def _same_end(a: Truth, b: Truth) -> bool:
+    return a.status == b.status and not difference(a.events, b.events) and len(a.times) == len(b.times)
+
+
+def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
+    """Values and times of events of one method; uncertain is how far the extrapolation went."""
+    loose, tight = (subject.tight(method, rtol) for rtol in (TIGHTEST * DECADE, TIGHTEST))
+    n = min(len(loose.result.times), len(tight.result.times))
+    before, after = ({name: computed(run)[name][:n] for name in variables} for run in (loose, tight))
+    events, last = event_times(loose), event_times(tight)
+    if loose.status != tight.status or difference(events, last):
+        raise InputError(
+            f"{subject.case.name} has no reference: {method} comes to other ends or events when it is tighter."
+        )
+    values = {name: _limit(before[name], after[name]) for name in variables}
+    truth = _of_run(method, tight, variables, values, {name: _limit(events[name], last[name]) for name in last})
+    truth = replace(truth, times=truth.times[:n])
+    return replace(truth, uncertainty=truth.errors(after, last))
+
+
+def _of_run(source: str, run: Trajectory, variables: Sequence[str], values: Values, events: Values) -> Truth:
+    floors = {name: floor(run, name) for name in variables}
+    return Truth(source, run.status, run.result.times, values, floors, events, run.run.times[-1])
+
+
+def _limit(loose: Array, tight: Array) -> Array:
+    """Richardson extrapolation of errors in proportion to the tolerance."""
+    return np.asarray(tight + (tight - loose) / (DECADE - 1))
