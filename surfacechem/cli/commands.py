@@ -9,7 +9,7 @@ import threading
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from typer import Argument, Option
@@ -29,29 +29,26 @@ S = TypeVar("S")
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 """Exit code of each way in which a run ends."""
 
-BAD_INPUT, DIFFERENT, UNWRITTEN, SIGNALLED = 2, 1, 5, 128
+DIFFERENT, BAD_INPUT, UNWRITTEN, SIGNALLED = 1, 2, 5, 128
+
+CODES = {
+    0: "finished",
+    DIFFERENT: "rerun: the new values are not bit for bit those of the file",
+    BAD_INPUT: "bad input; nothing was computed",
+    3: "the run was stopped by physics, of a sweep every run; what it reached is written, with the reason",
+    4: "the run failed numerically; what it reached is written",
+    UNWRITTEN: "what was computed could not be written where it should be",
+    SIGNALLED + 2: "interrupted, or 128 and the number of another signal; nothing was written",
+}
 
 
 def exit_codes(own: Mapping[int, str]) -> str:
-    """What the help of a command says of its exit codes: its own, and those of every command."""
-    every = {
-        **own,
-        BAD_INPUT: "bad input; nothing was computed",
-        UNWRITTEN: "what was computed could not be written where it should be",
-        SIGNALLED + 2: f"interrupted, or {SIGNALLED} and the number of another signal; nothing was written",
-    }
-    return "\b\nExit codes:\n" + "".join(f"  {code:<4} {text}\n" for code, text in sorted(every.items()))
+    """The exit codes of a command for its help: its own, and those that every command has."""
+    every = {code: CODES[code] for code in (BAD_INPUT, UNWRITTEN, SIGNALLED + 2)} | dict(own)
+    return "\b\nExit codes:\n" + "".join(f"  {code:<4} {every[code]}\n" for code in sorted(every))
 
 
-EXIT_CODES = exit_codes(
-    {
-        STATUS["finished"]: "finished",
-        DIFFERENT: "rerun: the new values are not bit for bit those of the file",
-        STATUS["stopped"]: "the run was stopped by physics, of a sweep every run; what it reached is written, with the "
-        "reason",
-        STATUS["failed"]: "the run failed numerically; what it reached is written",
-    }
-)
+EXIT_CODES = exit_codes(CODES)
 
 
 class SignalledError(BaseException):
@@ -69,10 +66,9 @@ def _signals_raised() -> Iterator[None]:
     What the process was told to ignore, as by nohup, it ignores; a handler that is not Python's stays, since it could
     not be put back.
     """
-    wanted = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    if threading.current_thread() is not threading.main_thread():
-        wanted = []
-    usual = {number: signal.getsignal(number) for number in wanted}
+    in_main = threading.current_thread() is threading.main_thread()
+    wanted = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP") if in_main]
+    usual = {number: signal.getsignal(number) for number in wanted if number}
     usual = {number: handler for number, handler in usual.items() if handler not in (None, signal.SIG_IGN)}
     try:
         for number in usual:
@@ -81,12 +77,6 @@ def _signals_raised() -> Iterator[None]:
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-
-
-def _leave(code: int, message: str) -> NoReturn:
-    """End at once: compiled code may still be running in another thread, which would be waited for."""
-    _tell(message)
-    os._exit(code)
 
 
 def _tell(message: object) -> None:
@@ -103,16 +93,14 @@ class Commands(TyperGroup):
         try:
             with _signals_raised():
                 return super().invoke(ctx)
-        except OutputError as error:
-            _tell(error)
-            raise typer.Exit(UNWRITTEN) from None
         except SurfacechemError as error:
             _tell(error)
-            raise typer.Exit(BAD_INPUT) from None
+            raise typer.Exit(UNWRITTEN if isinstance(error, OutputError) else BAD_INPUT) from None
         except SignalledError as error:
             (number,) = error.args
             name = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-            _leave(SIGNALLED + number, f"{name}; nothing was written.")
+            _tell(f"{name}; nothing was written.")
+            os._exit(SIGNALLED + number)  # at once: compiled code may run on in another thread, and would be waited for
         except BrokenPipeError:
             raise  # the reader has enough
         except OSError as error:

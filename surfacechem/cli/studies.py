@@ -11,7 +11,6 @@ import typer
 from typer import Argument, Option
 
 from surfacechem.cli.commands import (
-    STATUS,
     Changes,
     Quiet,
     SolverNames,
@@ -31,13 +30,9 @@ if TYPE_CHECKING:
 
 MOST_DECADES = 20
 
-PRECISION_CODES = exit_codes(
-    {
-        STATUS["finished"]: "finished; solves that failed are in the report",
-        STATUS["failed"]: "a case has no reference on which two methods agree; all else is written",
-    }
-)
-STABILITY_CODES = exit_codes({STATUS["finished"]: "finished; what failed or is wrong is in the report"})
+NO_REFERENCE = "a case has no reference on which two methods agree; all else is written"
+PRECISION_CODES = exit_codes({0: "finished; solves that failed are in the report", 4: NO_REFERENCE})
+STABILITY_CODES = exit_codes({0: "finished; what failed or is wrong is in the report"})
 
 
 def precision(
