@@ -17,7 +17,7 @@ from surfacechem.results.extremes import cautioned
 from surfacechem.runs.lumping import lumpings
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Problem
-from surfacechem.solve.pacing import paces
+from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
 
 Array = NDArray[np.float64]

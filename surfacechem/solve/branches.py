@@ -1,14 +1,23 @@
-"""Searches along a gap: the next equilibrium in the direction in which the tractions push, or the fold ahead."""
+r"""Searches for the next equilibrium: along one gap to the next root or the fold ahead, or of several gaps at once.
+
+Gaps without inertia or damper take no time. Where several have lost their equilibrium, or are pushed out of it, there
+may be more than one to end in, and which it is depends on the way. It is that of the limit of small and equal dampers,
+in which each gap moves in proportion to what is out of balance of its tractions, :math:`c\,\dot g_i = r_i(g)`. What is
+found lies where the laws hold: a search ends at the ends of their domains.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
+from surfacechem.compile.program import Function, compile_function
+from surfacechem.model.system import System
 
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
@@ -73,3 +82,145 @@ def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise:
     found = float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))
     # At a pole the sign changes too, but there is no zero.
     return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found
+
+
+Indices = NDArray[np.intp]
+Field = Callable[[Array], Array]
+"""Driving tractions at ways of the gaps from where they begin, both of shape (points, gaps)."""
+
+RTOL, BEGINS = 1e-4, 1e-3
+"""Tolerance of the motion, relative to the way so far; it begins within this part of its first push."""
+
+STEPS = 20_000
+"""Steps after which motion does not come to rest."""
+
+NUDGE = float(np.finfo(float).eps) ** (1 / 3)
+"""Part of a gap by which it is moved either way to see how its balance changes: the error of a central difference,
+NUDGE^2 of its curvature and a rounding over NUDGE, is then the least, two thirds of the digits."""
+
+KICK = 10 * NUDGE
+"""Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
+back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
+
+NEAR, NEWTON = 1e-3, 12
+"""Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""
+
+DIGITS = 8 * float(np.finfo(float).eps)
+
+
+def stiffness(driving: Field, scale: Array, at: Array) -> Array:
+    """Change of each driving traction along each gap, shape (gaps, gaps)."""
+    nudges = np.diag(NUDGE * scale)
+    values = driving(np.vstack([at + nudges, at - nudges]))
+    ahead, behind = np.split(values, 2)
+    return np.asarray(((ahead - behind) / (2 * NUDGE * scale)[:, None]).T)
+
+
+def unstable_way(change: Array) -> Array | None:
+    """The way along which what is out of balance grows the fastest, its largest part 1; None where it falls."""
+    growth, ways = np.linalg.eig(change)
+    fastest = int(np.argmax(growth.real))
+    if not growth[fastest].real > 0:
+        return None
+    way: Array = ways[:, fastest].real
+    return np.asarray(way / way[np.abs(way).argmax()])
+
+
+def come_to_rest(driving: Field, scale: Array, onward: Array, begins: Array) -> Array | None:
+    """The way of each gap at which damped motion from a first displacement ends; None where it does not.
+
+    A gap with a direction other than zero ``onward`` slides: friction resists its motion and pulls nothing back.
+    """
+    with PREPARING:
+        from scipy.integrate import Radau
+
+    def velocity(_: float, ways: Array) -> Array:
+        return _resisted(driving(ways.T), onward).T
+
+    def change(_: float, ways: Array) -> Array:
+        return np.nan_to_num(stiffness(lambda at: _resisted(driving(at), onward), scale, ways))
+
+    start = velocity(0.0, begins[:, None])[:, 0]
+    if not np.all(np.isfinite(start)):
+        return None
+    least = 0.0 if begins.any() else RTOL  # what is close to an unstable balance is not at rest in it
+    rest = _at_rest(driving, scale, onward, begins, least)
+    if rest is not None:
+        return rest
+    finest = BEGINS * (float(np.max(np.abs(begins))) or RTOL * float(scale.min()))
+    options = {"rtol": RTOL, "atol": finest, "first_step": finest / np.max(np.abs(start))}
+    motion = Radau(velocity, 0.0, begins, np.inf, jac=change, vectorized=True, **options)
+    for _ in range(STEPS):
+        with np.errstate(all="ignore"):  # far ahead a trial may see no number
+            motion.step()
+        rest = _at_rest(driving, scale, onward, motion.y, least)
+        if rest is not None or motion.status != "running":
+            return rest
+        if np.any(np.abs(motion.y) > REACH * scale):  # nothing bears it
+            return None
+    return None
+
+
+def _resisted(pushes: Array, onward: Array) -> Array:
+    """Driving tractions of what moves: what slides does so in one direction."""
+    return np.where(onward != 0, onward * np.maximum(onward * pushes, 0.0), pushes)
+
+
+def _at_rest(driving: Field, scale: Array, onward: Array, at: Array, least: float) -> Array | None:
+    """The stable equilibrium that is as good as reached, to rounding; None where none is.
+
+    In it what has slid is in balance, or friction holds it; what nothing pushes, as where it is symmetric, stays.
+    """
+    everything = np.arange(len(at))
+    moved = np.nonzero(_resisted(driving(at[None]), onward)[0])[0]
+    for free in (everything, moved) if len(moved) < len(at) else (everything,):
+        rest = equilibrium(driving, scale, free, at, least)
+        if rest is not None and np.all(onward * rest >= 0):
+            return rest
+    return None
+
+
+def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: float) -> Array | None:
+    """The stable equilibrium of the gaps that are free, where a few short steps of Newton's method lead to it.
+
+    Each is at most half as long as the one before, the first no longer than the gaps' sizes times ``least``.
+    """
+    if len(free) == 0:
+        return at
+    change = stiffness(driving, scale, at)[np.ix_(free, free)]
+    if not np.all(np.isfinite(change)) or unstable_way(change) is not None:
+        return None
+    reach, last = max(least, NEAR * float(np.max(np.abs(at) / scale))), np.inf
+    for _ in range(NEWTON):
+        step = np.linalg.lstsq(change, -driving(at[None])[0, free], rcond=None)[0]
+        size = float(np.max(np.abs(step) / scale[free]))
+        if not size <= min(reach, last / 2):
+            break
+        at, last = at.copy(), size
+        at[free] += step
+        if size <= DIGITS:
+            break
+    if last > NEAR * RTOL:
+        return None
+    # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
+    borne = np.abs(change) @ scale[free] * max(last, DIGITS)
+    return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None
+
+
+class Domain:
+    """The margins of a system at which a law ends and which gaps in equilibrium move, compiled when first needed."""
+
+    def __init__(self, system: System) -> None:
+        gaps = {state.symbol for state in system.states if state.name in {e.state for e in system.equilibria}}
+        ends = [(system.expand(item.expression), item.reason) for item in system.margins if item.domain]
+        self.inputs = system.inputs
+        self.ends = {reason: end for end, reason in ends if end.free_symbols & gaps}
+
+    @cached_property
+    def _margins(self) -> Function:
+        return compile_function(self.inputs, list(self.ends.values()))
+
+    def beyond(self, inputs: Array) -> str:
+        """Why a law does not hold at the inputs, where the gaps have left its domain; empty where all hold."""
+        values = self._margins(inputs) if self.ends else np.empty(0)
+        return next((reason for value, reason in zip(values, self.ends, strict=True) if not value > 0), "")

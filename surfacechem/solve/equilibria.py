@@ -13,8 +13,19 @@ from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import FOLD, SIDE, SLIP, Equilibrium, Fold
 from surfacechem.model.system import System
-from surfacechem.solve.branches import Curve, march, push_ahead, zero_ahead
-from surfacechem.solve.damped import KICK, Field, Indices, come_to_rest, equilibrium, stiffness, unstable_way
+from surfacechem.solve.branches import (
+    KICK,
+    Curve,
+    Field,
+    Indices,
+    come_to_rest,
+    equilibrium,
+    march,
+    push_ahead,
+    stiffness,
+    unstable_way,
+    zero_ahead,
+)
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]

@@ -22,8 +22,7 @@ from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jumps import Jump, Jumper, booked
 from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.solve.stalls import solve
-from surfacechem.solve.watching import sizes, to_pass
+from surfacechem.solve.roundoff import sizes, solve, to_pass
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import INTERFACE, RESTS, Transition
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Account, System
-from surfacechem.solve.domains import Domain
+from surfacechem.solve.branches import Domain
 from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
 from surfacechem.solve.jump_heat import JumpHeat
 from surfacechem.solve.load_path import LoadPath, LoadStep

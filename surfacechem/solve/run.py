@@ -26,10 +26,9 @@ from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Hybrid
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.passing import Passing
-from surfacechem.solve.stalls import solve
+from surfacechem.solve.roundoff import awaited, solve, watched
+from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
-from surfacechem.solve.watching import awaited, watched
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from surfacechem.format import load_text
 from surfacechem.runs.simulation import Simulation
-from surfacechem.solve.damped import come_to_rest
+from surfacechem.solve.branches import come_to_rest
 
 CASE = """
 T_0: 300

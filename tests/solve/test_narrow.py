@@ -18,7 +18,7 @@ from surfacechem.format import load_text
 from surfacechem.laws.loading import Harmonic, Ramp
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve import names, solver
-from surfacechem.solve.passing import Passing
+from surfacechem.solve.segments import Passing
 
 CLOSE = 1e-8
 """Relative error of scenes in which only the time of what is brief is rounded: to 1e-16 of a run, of 1e-8 of it."""

@@ -10,7 +10,7 @@ from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.pacing import paces
+from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model, Run
 
 ZONE = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)
