@@ -283,6 +283,57 @@ def made_variables(name: str) -> str:
     return table(("variable", "unit", "long name", "equation"), rows)
 
 
+LINKS = {
+    "history": "#histories",
+    "surface mechanism": "mechanisms.md",
+    "exact solution": "exact-solutions.md",
+    "what fills the space": "heat-paths.md#media",
+    "temperatures across the body": "heat-paths.md#bodies-that-are-no-lump",
+    "stages": "#programme",
+    "mounted": "#mechanics",
+    "an event": "events.md",
+    "follow from it": "accuracy.md#asking-for-an-accuracy",
+}
+"""Pages that tell more of what keys of a case hold."""
+
+
+def made_keys(section: str, *more: str) -> str:
+    """The keys of a section of a case file, and some of those that its laws add."""
+    from surfacechem.format import declarations, sections
+
+    cls: Any = getattr(sections, section)
+    if issubclass(cls, declarations.Section):
+        extra = cls.more_keys(None)
+        keys = {**declarations.keys(cls), **{name: extra[name] for name in more}}
+    else:
+        keys = declarations.law_keys(cls)
+    rows = [(f"`{name}`", _linked(item.text), *_held(item)) for name, item in keys.items()]
+    return table(("key", "meaning", "holds", "unit", "range", "if not given"), rows)
+
+
+def _held(item: Any) -> tuple[str, ...]:
+    """What a key holds: in words, its unit, its range, its default."""
+    from surfacechem.format import declarations as d
+
+    law = item.content.content if isinstance(item.content, d.ListOf) else item.content
+    words = _linked(item.content.words)
+    if isinstance(law, d.OneLaw):
+        families = FAMILIES[law.contract]
+        words = "list of laws: " + ", ".join(f"[{family.replace('_', ' ')}](laws/{family}.md)" for family in families)
+    spec = item.content.spec if isinstance(item.content, d.Number) else None
+    allowed = spec.range.replace(">=", "≥").replace("<=", "≤").replace("any", "") if spec else ""
+    default = "required" if item.required else f"{item.default:g}" if isinstance(item.default, int | float) else ""
+    default = f"`{item.default}`" if isinstance(item.default, str) and item.default else default
+    return words, _unit(item.unit) if item.unit != "1" else "", allowed, default
+
+
+def _linked(text: str) -> str:
+    """A text with links to the pages that tell more."""
+    for words, page in LINKS.items():
+        text = text.replace(words, f"[{words}]({page})", 1)
+    return text
+
+
 def made_variable_table() -> str:
     """What laws may read and cases may prescribe."""
     from surfacechem.model.assemble import LOADABLE
@@ -343,6 +394,7 @@ MAKERS: dict[str, Callable[..., str]] = {
     "mechanisms": made_mechanisms,
     "rate_types": made_rate_types,
     "variables": made_variables,
+    "keys": made_keys,
     "variable_table": made_variable_table,
     "cli": made_cli,
     "solvers": made_solvers,

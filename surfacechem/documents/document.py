@@ -15,7 +15,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-from surfacechem.errors import InputError, Place
+from surfacechem.errors import InputError, Place, suggestion
 
 DEEPEST = 24
 """Mappings and lists inside each other."""
@@ -62,6 +62,48 @@ class Tree:
     def error(self, message: str) -> InputError:
         """An input error at this place."""
         return InputError(message, self.place)
+
+    @property
+    def shown(self) -> str:
+        """The value as it stands in a message."""
+        kinds = {dict: "a mapping", list: "a list", type(None): "nothing", bool: str(self.value).lower()}
+        return kinds.get(type(self.value)) or f"'{str(self.value)[:40]}'"
+
+    def mapping(self, known: Iterable[str] | None = None, what: str = "keys") -> dict[str, Tree]:
+        """The entries of a mapping, which may be empty; InputError for keys that are not known."""
+        if self.value is None:
+            return {}
+        allowed = None if known is None else list(known)
+        if not isinstance(self.value, dict):
+            wanted = f" with the {what} {', '.join(allowed)}" if allowed else ""
+            raise self.error(f"this must be a mapping{wanted}, not {self.shown}.")
+        for key, child in self.value.items():
+            if allowed is not None and key not in allowed:
+                place = replace(child.place, path=self.place.path)
+                raise InputError(f"unknown key '{key}'.{suggestion(key, allowed)}", place)
+        return dict(self.value)
+
+    def items(self, example: str = "") -> list[Tree]:
+        """The items of a list, which may be empty."""
+        if self.value is None:
+            return []
+        if not isinstance(self.value, list):
+            hint = f", for example `{example}`" if example else ""
+            raise self.error(f"this must be a list{hint}, not {self.shown}.")
+        return list(self.value)
+
+    def text(self, what: str) -> str:
+        """A text that is not empty."""
+        if not isinstance(self.value, str) or not self.value.strip():
+            raise self.error(f"{what} must be a text, not {self.shown}.")
+        return self.value
+
+    def choice(self, what: str, known: Iterable[str]) -> str:
+        """One of some names."""
+        options = list(known)
+        if not isinstance(self.value, str) or self.value not in options:
+            raise self.error(f"no {what} {self.shown}.{suggestion(str(self.value), options)}")
+        return self.value
 
     def places(self) -> Iterator[tuple[str, Place]]:
         """The place of every path below and including this one."""

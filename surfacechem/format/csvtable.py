@@ -12,11 +12,15 @@ from pathlib import Path
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.format.fields import mapping, text
 from surfacechem.laws.loading import Table
 from surfacechem.units import parse
 
-KEYS = ("file", "csv", "column")
+TEXTS = {
+    "file": "a CSV file beside the case; its first line is like t [s], w_n [um]",
+    "csv": "the text of such a file",
+    "column": "the column of the values, if not named after the variable",
+}
+KEYS = tuple(TEXTS)
 HEADING = re.compile(r"(?P<name>[A-Za-z]\w*)\s*\[(?P<unit>[^\]]+)\]")
 EXAMPLE = '"t [s], w_n [um]"'
 
@@ -30,7 +34,7 @@ def embedded(tree: Tree, base: str) -> Tree:
     values = {key: embedded(child, base) for key, child in tree.value.items()}
     table = values.get("table")
     if table is not None and isinstance(table.value, dict) and "file" in table.value:
-        values["table"] = replace(table, value=_with_content(mapping(table, KEYS), base))
+        values["table"] = replace(table, value=_with_content(table.mapping(KEYS), base))
     return replace(tree, value=values)
 
 
@@ -38,7 +42,7 @@ def _with_content(fields: dict[str, Tree], base: str) -> dict[str, Tree]:
     if "csv" in fields:
         raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
     file = fields.pop("file")
-    name = text(file, "the file of a table")
+    name = file.text("the file of a table")
     path = document.beside(Path(base), name, file.place)
     if path is None:
         raise file.error(f"no file {name} beside the case.")
@@ -53,7 +57,7 @@ def is_csv(tree: Tree) -> bool:
 
 def table(tree: Tree, unit: str) -> Table:
     """The history of a column; times are in the column ``t``, values in the one named, or after the variable."""
-    fields = mapping(tree.value["table"], KEYS[1:])
+    fields = tree.value["table"].mapping(KEYS[1:])
     content = fields["csv"]
     rows = _rows(content)
     variable = tree.place.path.rpartition(".")[2]
@@ -94,7 +98,7 @@ class Row:
 
 def _rows(content: Tree) -> list[Row]:
     """Lines that are neither empty nor comments; the first is the heading."""
-    lines = enumerate(text(content, "the table").splitlines(), start=1)
+    lines = enumerate(content.text("the table").splitlines(), start=1)
     kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
     rows = [
         Row([cell.strip() for cell in cells], number, content.place)
@@ -117,7 +121,7 @@ def _column(cell: str, heading: Row) -> tuple[str, str]:
 def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]], heading: Row) -> int:
     """The column that is named, else that of the variable; one of another name is never meant by itself."""
     if named is not None:
-        return _index(text(named, "column"), columns, heading)
+        return _index(named.text("column"), columns, heading)
     others = [name for name, _ in columns if name != "t"]
     if variable not in others and others:
         guess = suggestion(variable, [name for name, _ in columns])

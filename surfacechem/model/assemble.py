@@ -168,7 +168,10 @@ def _refuse_idle_initial_values(build: Build) -> None:
     for name in build.scene.initial:
         if name in states:
             continue
-        if name in build.scene.loading or build.variables.has(name):
+        if name in build.scene.loading:
+            message = f"{name} is prescribed under `loading`, so it has no initial value; remove one of them."
+            raise InputError(message, path=f"initial.{name}")
+        if build.variables.has(name):
             message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
             raise InputError(message, path=f"initial.{name}")
         raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, states)}", path=f"initial.{name}")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.format.sweep import MOST_AXES
+from surfacechem.format.sections import MOST_AXES
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_text, varies

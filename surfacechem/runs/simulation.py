@@ -29,7 +29,7 @@ from surfacechem.solve.run import Model, Run, Trajectory, values_of
 from surfacechem.units import parse
 
 if TYPE_CHECKING:
-    from surfacechem.format.sweep import Plan
+    from surfacechem.format.plans import Plan
     from surfacechem.runs.sweep_dataset import SweepSolution
     from surfacechem.runs.sweeps import Sweep
 
@@ -280,19 +280,18 @@ class Simulation:
             raise self.case.located(error) from None
 
     def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
-        from surfacechem.format.sweep import read_sweep, read_until
+        from surfacechem.format.plans import plan_of, read_sweep, read_until
 
         section = self.case.sweep
-        given = {"over": {path: _listed(values) for path, values in (over or {}).items()}, "until": dict(until or {})}
         if over is not None:
-            section = read_sweep(from_plain({"over": given["over"]}, Place(path="sweep")), section)
-        if until is not None and section is not None:
-            section = replace(section, until=read_until(from_plain(given["until"], Place(path="sweep.until"))))
+            given = {"over": {path: _listed(values) for path, values in over.items()}}
+            section = read_sweep(from_plain(given, Place(path="sweep")), section)
         if section is None:
             raise InputError(
                 "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"
             )
-        return section.plan(self._units)
+        ends = None if until is None else read_until(from_plain(dict(until), Place(path="sweep.until")))
+        return plan_of(section, self._units, ends)
 
     @cached_property
     def _units(self) -> dict[str, str]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.format.sweep import Axis, Plan
+from surfacechem.format.plans import Axis, Plan
 from surfacechem.model.system import System
 from surfacechem.quantities import Quantity
 from surfacechem.results.event_table import event_columns

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
-from surfacechem.format.sweep import Plan
+from surfacechem.format.plans import Plan
 from surfacechem.model.system import System
 from surfacechem.runs import spectrum
 from surfacechem.runs.onebyone import batch

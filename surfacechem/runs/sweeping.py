@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
-from surfacechem.format import Case, Reference
+from surfacechem.format import Case, ExactSolution
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, largest_errors, second_tolerance
 from surfacechem.results.achieved import apart, floor, second_run, stated
@@ -53,7 +53,7 @@ def _accuracy(
         return replace(estimate, source=f"{estimate.source}; {unused}")
 
 
-def _against_exact(case: Case, done: Sweep, named: Reference) -> SweepAccuracy:
+def _against_exact(case: Case, done: Sweep, named: ExactSolution) -> SweepAccuracy:
     """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs.
 
     Runs that end before their first output have no error.

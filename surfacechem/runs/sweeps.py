@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.format.sweep import Plan
+from surfacechem.format.plans import Plan
 from surfacechem.results.audit import SLACK, Audit, audit, lost
 from surfacechem.runs import spectrum
 from surfacechem.runs.spectrum import Statistics

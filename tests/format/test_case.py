@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from surfacechem import format as case
 from surfacechem.contracts.terms import Varying
 from surfacechem.documents import document
-from surfacechem.documents.shipped import mechanisms
+from surfacechem.documents.shipped import cases, mechanisms
 from surfacechem.errors import InputError
 from surfacechem.format import load, load_text, names
 from surfacechem.laws.bonding import BondEnergy
@@ -116,7 +115,7 @@ def test_initial_values_and_reference_temperature(everything):
 def test_run(everything):
     run = everything.run
     assert run.times == tuple(np.linspace(0, 5, 11))
-    assert (run.t_end, run.accuracy, run.rtol, run.atol) == (5.0, 1e-8, 1e-10, None)
+    assert (run.times[-1], run.accuracy, run.rtol, run.atol) == (5.0, 1e-8, 1e-10, None)
     assert (run.solver, run.max_steps, run.max_seconds) == ("radau", 1000, 60.0)
 
 
@@ -190,7 +189,7 @@ def test_a_case_can_be_read_again_from_its_text(overrides):
 
 
 def test_without_overrides_the_text_is_the_file():
-    assert load("sliding-dry").text == (case.data.cases() / "sliding-dry.yaml").read_text(encoding="utf-8")
+    assert load("sliding-dry").text == (cases() / "sliding-dry.yaml").read_text(encoding="utf-8")
 
 
 def test_a_mechanism_is_read_again_from_its_text(tmp_path):

@@ -131,7 +131,7 @@ def test_the_end_of_a_scene_is_found_and_said(capfd):
     solution = surfacechem.run("cooling-to-zero")
     interface, net = network("cooling-to-zero")
     with pytest.raises(InterfaceStopped, match="the temperature T reached zero near t = "):
-        net.advance(surfacechem.load("cooling-to-zero").case.run.t_end)
+        net.advance(surfacechem.load("cooling-to-zero").case.run.times[-1])
     assert interface.dataset.attrs["status"] == "stopped"
     assert interface.dataset.time.values[-1] == pytest.approx(solution.trajectory.result.t, rel=1e-5)
     assert interface.evaluations < 50_000

@@ -272,7 +272,7 @@ REFUSED = [
     ({"initial.phi": [1.0, 2.0]}, None, r"phi rose above its bound 1"),
     (None, {"T_c": "310 K"}, r"T_c is no ramp"),
     (None, {"v": "1 m/s"}, r"no law reads a prescribed v"),
-    (None, {"x": "1 m/s"}, r"no variable 'x'"),
+    (None, {"x": "1 m/s"}, r"sweep.until: unknown key 'x'"),
     (None, {"f": "1 pN", "t_n": "1 Pa"}, r"`until` is one prescribed variable"),
 ]
 

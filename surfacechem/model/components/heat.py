@@ -26,6 +26,9 @@ from surfacechem.quantities import Quantity
 
 def heat_paths(build: Build) -> None:
     """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
+    for law in build.scene.heat:
+        if law.between[0] == law.between[1]:
+            raise InputError(f"a heat path needs two different ends, not {law.between[0]} twice.", _ends(law))
     for paths in _by_ends(build):
         _between(build, paths)
     for law in (law for law in build.scene.heat if _made_across(law)):
@@ -92,7 +95,7 @@ def receive(build: Build, end: str, heat: Expression, channel: str) -> None:
 
 def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
     """Conductances of a law [W/(m^2 K)], by what carries the heat."""
-    from_node, to_node = (end_node(build, end, law.place) for end in law.between)
+    from_node, to_node = (end_node(build, end, law) for end in law.between)
     bound = build.variables.bind(law, f"heat.{law.name()}")
     own = {"T_from": from_node.T, "T_to": to_node.T}
     channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
@@ -128,7 +131,7 @@ def _by_ends(build: Build) -> list[list[_Path]]:
 
 def _two_temperatures(build: Build, law: HeatTransfer) -> None:
     """A path between two bodies that share one temperature carries nothing."""
-    first, second = (end_node(build, end, law.place) for end in law.between)
+    first, second = (end_node(build, end, law) for end in law.between)
     if first is second:
         a, b = law.between
         raise InputError(f"the heat path between {a} and {b} has one temperature, {first.name}; remove it.", law.place)
@@ -152,7 +155,7 @@ def _through_film(build: Build, law: HeatTransfer) -> None:
     """
     check_closure(build, law)
     _two_temperatures(build, law)
-    centre, ends = end_node(build, "interface", law.place), [end_node(build, end, law.place) for end in law.between]
+    centre, ends = end_node(build, "interface", law), [end_node(build, end, law) for end in law.between]
     bound = build.variables.bind(law, f"heat.{law.name()}")
     r_1, r, r_2 = build.variables.call(bound, bound.resistances)
     build.law_ranges(law)
@@ -186,7 +189,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
     check_closure(build, law)
     double = {name: 2 * h for name, h in channels.items()}
     for ends in ((a, "interface"), ("interface", b)):
-        if end_node(build, ends[0], law.place) is not end_node(build, ends[1], law.place):
+        if end_node(build, ends[0], law) is not end_node(build, ends[1], law):
             yield _Path(ends, double)
 
 
@@ -239,17 +242,22 @@ def _path_name(build: Build, a: str, b: str) -> str:
     return build.unique(f"q_{short[a]}{short[b]}")
 
 
-def end_node(build: Build, end: str, place: Place | None = None) -> Node:
+def _ends(law: HeatTransfer | None) -> Place:
+    """Where a case names the ends of a heat path."""
+    return Place(path=f"{law.path}.between" if law else "heat")
+
+
+def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     """The temperature node of an end of a heat path; InputError where it has none."""
     if end in build.node_of:
         return build.node_of[end]
     if end == "interface":
-        message = "a heat path ends at the interface, which has no temperature. Give `interface.temperature`."
-        raise InputError(message, place)
+        raise InputError("the interface has no temperature. Add `interface.temperature`.", _ends(law))
     if end == "surroundings":
-        raise InputError("a heat path ends at the surroundings. Give `surroundings: {temperature: ...}`.", place)
+        message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
+        raise InputError(message, _ends(law))
     known = [*build.node_of, "interface", "surroundings"]
-    raise InputError(f"heat path: no end '{end}'.{suggestion(end, known)}", place)
+    raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
 def _external_heat(build: Build, member: str, name: str) -> None:

@@ -1,0 +1,147 @@
+"""Case files: a YAML document becomes a scene, a run and, optionally, an exact solution to compare with.
+
+>>> case = load("endothermic", ["run.until=2 s"])
+>>> case.run.times[-1], [body.name for body in case.scene.bodies]
+(2.0, ['lower', 'upper'])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from surfacechem.documents import document, shipped
+from surfacechem.documents import overrides as changes
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place, nearest
+from surfacechem.format import csvtable
+from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
+from surfacechem.format.sections import SweepSection
+from surfacechem.model.assemble import assemble
+from surfacechem.model.system import System
+from surfacechem.scene import Scene
+from surfacechem.solve.run import Run
+
+Overrides = Sequence[str] | Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case as read; ``text`` (with ``mechanism_text``) is all that is needed to read it again."""
+
+    name: str
+    title: str
+    source: str
+    description: str
+    scene: Scene
+    run: Run
+    reference: ExactSolution | None
+    sweep: SweepSection | None
+    text: str
+    mechanism_text: str | None
+    places: Mapping[str, Place]
+    file: str
+    unused: str = ""
+    """Why the exact solution that the case names does not count after a change; empty where it does."""
+
+    def system(self) -> System:
+        """The assembled scene; errors have their place in the case file."""
+        try:
+            return assemble(self.scene)
+        except InputError as error:
+            raise self.located(error) from None
+
+    def located(self, error: InputError) -> InputError:
+        """The error with file and line of the path that it carries, or of the innermost section around it."""
+        if error.place is not None and error.place.file:
+            return error
+        path = error.place.path if error.place is not None else ""
+        while path not in self.places:
+            path = path.rpartition(".")[0]
+        return InputError(error.message, self.places[path])
+
+
+def load(name: str | Path, overrides: Overrides = ()) -> Case:
+    """Read a case from a file, or one of the shipped ones by its name.
+
+    ``overrides`` are texts "path=value" or a mapping from path to value, put into the document before it is read.
+    """
+    path, shown = _find(str(name))
+    return load_text(document.read(path, shown), path.stem, path.parent, overrides=overrides, file=shown)
+
+
+def load_text(
+    text: str,
+    name: str = "case",
+    base: str | Path = ".",
+    mechanism_text: str | None = None,
+    overrides: Overrides = (),
+    file: str = "",
+) -> Case:
+    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given."""
+    tree = document.parse(text, file or f"{name}.yaml")
+    unused = ""
+    if overrides:
+        before, tree = tree, changes.apply(tree, overrides)
+        tree, unused = _without_stale_reference(before, tree)
+        text = document.dump(tree)
+    whole = csvtable.embedded(tree, str(base))
+    if whole != tree:
+        tree, text = whole, document.dump(whole)
+    return replace(_read(tree, text, name, str(base), mechanism_text), unused=unused)
+
+
+def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
+    """The document without an exact solution whose parameters were given for another scene, and why."""
+    old, new = ({key: child.plain() for key, child in (tree.value or {}).items()} for tree in (before, after))
+    scene = {*old, *new} - {"title", "source", "description", "run", "sweep", "reference"}
+    if all(old.get(key) == new.get(key) for key in scene) or old.get("reference") != new.get("reference"):
+        return after, ""
+    found = exact_solution_of(after.value["reference"]) if "reference" in new else None
+    if found is None or not found.fixed:
+        return after, ""
+    return replace(after, value={key: child for key, child in after.value.items() if key != "reference"}), found.fixed
+
+
+def names() -> list[str]:
+    """Names of the cases that come with surfacechem."""
+    return sorted(path.stem for path in shipped.cases().glob("*.yaml"))
+
+
+def _find(name: str) -> tuple[Path, str]:
+    """The file of a case, and how messages call it."""
+    path = Path(name)
+    if document.is_file(path):
+        return path, name
+    if name in names():
+        return shipped.cases() / f"{name}.yaml", f"cases/{name}.yaml"
+    beside: list[str] = []
+    with suppress(OSError, ValueError):  # no name is too odd to be looked for
+        if path.exists():
+            return path, name
+        if path.is_symlink():
+            raise InputError(f"is a link to {path.readlink()}, where no file is.", Place(name))
+        beside = [file.name for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")]
+    guess = nearest(path.name, [*names(), *beside])
+    raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
+
+
+def _read(tree: Tree, content: str, name: str, base: str, mechanism_text: str | None) -> Case:
+    places = dict(tree.places())
+    case, mechanism = read_document(tree, base, mechanism_text)
+    return Case(
+        name=name,
+        title=case.title or name,
+        source=case.source,
+        description=case.description,
+        scene=scene_of(case, mechanism),
+        run=run_of(case.run),
+        reference=exact_solution_of(case.reference) if case.reference else None,
+        sweep=case.sweep,
+        text=content,
+        mechanism_text=mechanism.text if mechanism else None,
+        places=places,
+        file=tree.place.file,
+    )

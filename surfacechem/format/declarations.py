@@ -1,0 +1,621 @@
+"""How a section of the case format is declared: its keys, what each holds, and what a key that is left out means.
+
+A section is a class whose fields are its keys; a law is one too, by its parameters and options. From what the keys
+hold follow the reader, the strict checks of keys and values, the JSON Schema and the tables of the documentation.
+
+>>> from surfacechem.documents.document import parse
+>>> class Oven(Section):
+...     T: float = quantity("K", "temperature", REQUIRED, above=0)
+...     steps: int = key(Whole(1), "number of steps", 3)
+>>> oven = read(Oven, parse("{T: 25 degC}"), Context())
+>>> oven.T, oven.steps
+(298.15, 3)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import typing
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import MISSING, dataclass, field, replace
+from functools import cache
+from types import MappingProxyType
+from typing import Any, ClassVar, TypeVar
+
+from surfacechem import laws
+from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place
+from surfacechem.format import csvtable
+from surfacechem.quantities import INTERNAL, VARIABLES
+from surfacechem.units import parse as si
+from surfacechem.units import quotient
+
+Schema = dict[str, Any]
+
+QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
+"""A number, with or without a unit."""
+
+REQUIRED = MISSING
+"""Default of a key that must be given."""
+
+NODE = re.compile(r"T[A-Za-z0-9_]*")
+"""Names of temperatures start with T, so that they never clash with another quantity."""
+
+MOST = 500
+"""Entries of a list. Of laws each may be the same again, and names are numbered up to a thousand."""
+
+DIFFERENCES = ("amplitude",)
+"""Parameters that are a change of their variable, so that degrees Celsius have no meaning for them."""
+
+UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not in INTERNAL}
+
+
+@dataclass(frozen=True)
+class Context:
+    """Names that a case has given, of which its other sections may speak."""
+
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    """Unit of each variable."""
+    temperatures: Sequence[str] = ()
+    bodies: Sequence[str] = ()
+    x: str = "1"
+    """The unit that "[x]" stands for."""
+
+
+# -- what a key holds -------------------------------------------------------------------------------------------------
+
+
+class Content(ABC):
+    """What a key holds: how it is read and how it is described."""
+
+    words: str = ""
+    """What stands there, for the documentation."""
+
+    @abstractmethod
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The value; InputError with its place where it is none."""
+
+    @abstractmethod
+    def schema(self) -> Schema:
+        """JSON Schema of what may stand there."""
+
+
+@dataclass(frozen=True)
+class Number(Content):
+    """A number with a unit, in a range; one that varies is its value times factors."""
+
+    spec: Spec
+    difference: bool = False
+    words: str = "quantity"
+
+    def read(self, tree: Tree, name: str, context: Context) -> float | Varying:
+        """The value in SI."""
+        spec = self.spec.resolved(context.x)
+        if not (isinstance(tree.value, dict) and "value" in tree.value):
+            return number(tree, spec, name, difference=self.difference)
+        if not spec.varies:
+            raise tree.error(f"{name} cannot vary; give it a value.")
+        parts = tree.mapping(["value", "times"])
+        value = number(parts["value"], spec, name)
+        factors = ListOf(OneLaw(Factor)).read(parts["times"], "times", context) if "times" in parts else None
+        return value if factors is None else Varying(value, factors)
+
+    def schema(self) -> Schema:
+        """A number in its range, or a text with a unit; else the value and its factors."""
+        limits = {"exclusiveMinimum": self.spec.above, "minimum": self.spec.at_least, "maximum": self.spec.at_most}
+        limits = {name: bound for name, bound in limits.items() if math.isfinite(bound)}
+        kinds: list[Schema] = [{"type": "number", **limits}, {"type": "string", "pattern": QUANTITY}]
+        if self.spec.varies:
+            factors = {"type": "array", "items": reference(Factor.contract)}
+            kinds.append(closed({"value": reference("quantity"), "times": factors}, required=("value",)))
+        return {"anyOf": kinds} if limits or self.spec.varies else reference("quantity")
+
+
+def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
+    """A number in SI, in the range of its specification."""
+    value = si(tree.plain(), spec.unit, tree.place, name, difference=difference)
+    try:
+        spec.check(name, value)
+    except InputError as error:
+        raise error.at(tree.place) from None
+    return value
+
+
+@dataclass(frozen=True)
+class Whole(Content):
+    """A whole number in a range, or the one word that may stand in its place."""
+
+    at_least: int
+    at_most: float = math.inf
+    step: int = 1
+    word: str = ""
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """The word beside a number."""
+        return f"number or `{self.word}`" if self.word else "number"
+
+    def read(self, tree: Tree, name: str, context: Context) -> int | str:
+        """The number, which may be written with an exponent."""
+        if self.word and isinstance(tree.value, str) and not tree.value.isdigit():
+            return tree.choice(f"choice of {name}", [self.word])
+        value = number(tree, Spec("1", name, at_least=self.at_least, at_most=self.at_most), name)
+        if not value.is_integer():
+            raise tree.error(f"{name} must be a whole number, got {value:g}.")
+        return int(value)
+
+    def schema(self) -> Schema:
+        """An integer, or its digits as text."""
+        limits = {"minimum": self.at_least, "maximum": self.at_most} | (
+            {"multipleOf": self.step} if self.step > 1 else {}
+        )
+        whole = {"type": "integer", **{name: bound for name, bound in limits.items() if math.isfinite(bound)}}
+        word = [{"const": self.word}] if self.word else []
+        return {"anyOf": [whole, {"type": "string", "pattern": "^[0-9]+$"}, *word]}
+
+
+@dataclass(frozen=True)
+class Text(Content):
+    """A text."""
+
+    words: str = "text"
+
+    def read(self, tree: Tree, name: str, context: Context) -> str:
+        """The text without white space around it."""
+        return tree.text(name).strip()
+
+    def schema(self) -> Schema:
+        """A string."""
+        return {"type": "string"}
+
+
+@dataclass(frozen=True)
+class OneOf(Content):
+    """One of some names, which are asked for when they are needed."""
+
+    what: str
+    names: Callable[[], Iterable[str]]
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """The names."""
+        return ", ".join(f"`{name}`" for name in self.names())
+
+    def read(self, tree: Tree, name: str, context: Context) -> str:
+        """The name."""
+        return tree.choice(self.what, self.names())
+
+    def schema(self) -> Schema:
+        """An enumeration."""
+        return {"enum": list(self.names())}
+
+
+@dataclass(frozen=True)
+class ListOf(Content):
+    """A list of ``count`` entries, or of any number."""
+
+    content: Content
+    example: str = ""
+    count: int | None = None
+    at_least: int = 0
+    """Entries that the schema asks for; the reader says what they are needed for."""
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """Of what it is a list."""
+        return f"list of {self.content.words}" if self.content.words else "list"
+
+    def read(self, tree: Tree, name: str, context: Context) -> tuple[Any, ...]:
+        """Its entries."""
+        example = self.content.example if isinstance(self.content, OneLaw) and not isinstance(tree.value, list) else ""
+        entries = tree.items(example or self.example)
+        if self.count is not None and len(entries) != self.count:
+            raise tree.error(f"{name} needs {self.count} entries, got {len(entries)}.")
+        if isinstance(self.content, OneLaw) and len(entries) > MOST:
+            raise entries[MOST].error(f"more than {MOST} laws in a list.")
+        return tuple(self.content.read(entry, name, context) for entry in entries)
+
+    def schema(self) -> Schema:
+        """An array; one that may be empty may be left out."""
+        least = self.count or self.at_least
+        limits = {"minItems": least} if least else {}
+        limits |= {"maxItems": self.count} if self.count else {}
+        return {"type": "array" if least else ["array", "null"], "items": self.content.schema(), **limits}
+
+
+@dataclass(frozen=True)
+class OneLaw(Content):
+    """A law of a contract, ``name: {parameters}``, or its name alone where it needs none."""
+
+    contract: type[Law]
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """The contract."""
+        return f"{self.contract.contract} laws"
+
+    @property
+    def example(self) -> str:
+        """A law of this contract as it stands in a list."""
+        first = next(iter(laws.laws(self.contract).values()))
+        return f"- {first.name()}: {{{', '.join(f'{name}: ...' for name in law_keys(first))}}}"
+
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The law, which knows its place."""
+        if isinstance(tree.value, dict) and len(tree.value) == 1:
+            ((law, parameters),) = tree.value.items()
+        elif isinstance(tree.value, str) and tree.value:
+            law, parameters = tree.value, Tree(None, tree.place)
+        else:
+            raise tree.error(f"a law is `name: {{parameters}}`, not {tree.shown}.")
+        try:
+            found = laws.find(self.contract, law)
+        except InputError as error:
+            raise error.at(tree.place) from None
+        return read_law(found, parameters, context)
+
+    def schema(self) -> Schema:
+        """The definition of the contract."""
+        return reference(self.contract.contract)
+
+
+@dataclass(frozen=True)
+class Prescribed(Content):
+    """A prescribed history of a variable; a bare value is a constant."""
+
+    unit: str = "[x]"
+    above_zero: bool = False
+    words: str = "history"
+
+    def read(self, tree: Tree, name: str, context: Context) -> Load:
+        """The load."""
+        unit = resolved_unit(self.unit, context.x)
+        load = self._read(tree, name, unit, context)
+        start = float(load.bind(load.piece(0.0)).value(0.0)) if self.above_zero else 1.0
+        if not start > 0:
+            raise tree.error(f"{start:g} K is not an absolute temperature above zero.")
+        return load
+
+    def _read(self, tree: Tree, name: str, unit: str, context: Context) -> Load:
+        if csvtable.is_csv(tree):
+            return csvtable.table(tree, unit)
+        if isinstance(tree.value, dict):
+            load: Load = OneLaw(Load).read(tree, name, replace(context, x=unit))
+            return load
+        try:
+            level = number(tree, Spec(unit, name), name)
+        except InputError as error:
+            with suppress(InputError):  # who gives a rate means a ramp
+                si(tree.plain(), quotient(unit, "s"))
+                hint = f"To change it in time, write `{{ramp: {{rate: {tree.value}}}}}`."
+                error = InputError(f"{error.message} {hint}", tree.place)
+            raise error from None
+        return laws.find(Load, "hold")(level=level, place=tree.place)  # type: ignore[call-arg, return-value]
+
+    def schema(self) -> Schema:
+        """The definition of a history."""
+        return reference("history")
+
+
+@dataclass(frozen=True)
+class Temperature(Content):
+    """The name of a temperature that is solved for, or its history."""
+
+    words: str = "name or history"
+
+    def read(self, tree: Tree, name: str, context: Context) -> str | Load:
+        """The name or the load."""
+        value = tree.value
+        if not is_name(tree):
+            return Prescribed("K", above_zero=True).read(tree, name, context)
+        if not NODE.fullmatch(value) or value == "T_0":
+            hint = "T_0 is the reference temperature" if value == "T_0" else f"start it with T, for example T_{value}"
+            raise tree.error(f"'{value}' cannot name a temperature: {hint}.")
+        return str(value)
+
+    def schema(self) -> Schema:
+        """The definition of a temperature."""
+        return reference("temperature")
+
+
+def is_name(tree: Tree | None) -> bool:
+    """Whether a temperature is given by name."""
+    return tree is not None and isinstance(tree.value, str) and tree.value.isidentifier()
+
+
+@dataclass(frozen=True)
+class Nested(Content):
+    """A section inside another, or the parameters of a law of a known class."""
+
+    cls: type[Section] | type[Law]
+    words: str = "mapping"
+
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The section or the law."""
+        return read(self.cls, tree, context) if issubclass(self.cls, Section) else read_law(self.cls, tree, context)
+
+    def schema(self) -> Schema:
+        """Its keys."""
+        return schema_of(self.cls)
+
+
+@dataclass(frozen=True)
+class Entries(Content):
+    """A mapping whose keys are names: of bodies, variables, species, stages.
+
+    ``each`` holds the keys that are known beforehand, ``others`` what stands under a name of the case, which ``names``
+    lists. A quantity in "[x]" is in the unit of the variable that is its key.
+    """
+
+    each: Mapping[str, Key] = field(default_factory=dict)
+    others: Content | None = None
+    names: Callable[[Context], Iterable[str]] | None = None
+    pattern: str | Callable[[], str] = ""
+    """Regular expression of those other names."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Units of names that are no variables of the case."""
+    what: str = "keys"
+    at_most: int | None = None
+    """How many there may be; then there is at least one."""
+    wanted: str = ""
+    """What has to stand there, for the message where there are none or too many."""
+    words: str = "mapping"
+
+    def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
+        """The values by name."""
+        got = f"{len(tree.value)} entries" if isinstance(tree.value, dict) else tree.shown
+        if self.wanted and not (isinstance(tree.value, dict) and 1 <= len(tree.value) <= (self.at_most or math.inf)):
+            raise tree.error(f"{self.wanted}, not {got}.")
+        known = [*self.each, *self.names(context)] if self.names else None if self.others else [*self.each]
+        units = {**self.units, **context.units}
+        return {
+            key: self._content(key).read(child, key, replace(context, x=units.get(key, "1")))
+            for key, child in tree.mapping(known, self.what).items()
+        }
+
+    def _content(self, name: str) -> Content:
+        content = self.each[name].content if name in self.each else self.others
+        assert content is not None
+        return content
+
+    def schema(self) -> Schema:
+        """An object with these names."""
+        found = closed({name: key.schema() for name, key in self.each.items()})
+        if self.others is not None and self.pattern:
+            pattern = self.pattern if isinstance(self.pattern, str) else self.pattern()
+            found["patternProperties"] = {f"^{pattern}$": self.others.schema()}
+        elif self.others is not None:
+            found["additionalProperties"] = self.others.schema()
+        return found if self.at_most is None else {**found, "minProperties": 1, "maxProperties": self.at_most}
+
+
+@dataclass(frozen=True)
+class Shapes(Content):
+    """What is read by its shape: a mapping, a list, or a value."""
+
+    value: Content | None = None
+    mapping: Content | None = None
+    items: Content | None = None
+    wanted: str = ""
+    """What has to stand there, for the message where it is none of them."""
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """Each shape."""
+        return " or ".join(content.words for content in self._contents if content.words)
+
+    @property
+    def _contents(self) -> list[Content]:
+        return [content for content in (self.value, self.items, self.mapping) if content is not None]
+
+    def read(self, tree: Tree, name: str, context: Context) -> Any:
+        """The value of its shape."""
+        shape = self.mapping if isinstance(tree.value, dict) else self.items if isinstance(tree.value, list) else None
+        content = shape or self.value or self.items
+        assert content is not None
+        if self.wanted and isinstance(content, OneOf) and tree.value not in content.names():
+            raise tree.error(self.wanted)
+        return content.read(tree, name, context)
+
+    def schema(self) -> Schema:
+        """Any of the shapes."""
+        return {"anyOf": [content.schema() for content in self._contents]}
+
+
+@dataclass(frozen=True)
+class Later(Content):
+    """Something whose units are known only when the scene is assembled."""
+
+    content: Content
+
+    def read(self, tree: Tree, name: str, context: Context) -> Tree:
+        """It as it stands."""
+        return tree
+
+    def schema(self) -> Schema:
+        """That of what it will be."""
+        return self.content.schema()
+
+
+# -- keys and sections ------------------------------------------------------------------------------------------------
+
+
+class Key:
+    """A key of a section: what it holds, what it means, and what is meant where it is left out."""
+
+    def __init__(self, content: Content, text: str = "", default: Any = None, name: str = "") -> None:
+        self.content = content
+        self.text = text or _about(content)
+        self.default = default
+        self.name = name
+        self.attribute = ""
+        """Field of its class; empty for a key that a section has beside them."""
+
+    def __set_name__(self, owner: type, attribute: str) -> None:
+        """A key goes by the name of its field unless it has another."""
+        self.name, self.attribute = self.name or attribute, attribute
+
+    @property
+    def required(self) -> bool:
+        """Whether it must be given."""
+        return self.default is REQUIRED
+
+    @property
+    def unit(self) -> str:
+        """Unit of a number; empty where it is none."""
+        return self.content.spec.unit if isinstance(self.content, Number) else ""
+
+    @property
+    def meaning(self) -> str:
+        """The meaning, with the unit of a number."""
+        return f"{self.text} [{self.unit}]" if self.unit else self.text
+
+    def schema(self) -> Schema:
+        """JSON Schema of the value, with meaning and default."""
+        found = {**self.content.schema(), "description": self.meaning}
+        return {**found, "default": self.default} if isinstance(self.default, str | float | int) else found
+
+
+def _about(content: Content) -> str:
+    """What stands there, by the parameter or the section that it is."""
+    if isinstance(content, Number):
+        return content.spec.text
+    return (content.cls.__doc__ or "").strip().splitlines()[0] if isinstance(content, Nested) else ""
+
+
+def key(content: Content, text: str = "", default: Any = None, *, name: str = "") -> Any:
+    """A key of a section, under the name of its field unless it has another; it may be left out unless REQUIRED."""
+    return Key(content, text, default, name)
+
+
+def amount(unit: str, text: str = "", **limits: float) -> Number:
+    """A number with a unit, in a range; ``limits`` are those of :class:`Spec`."""
+    return Number(Spec(unit, text, varies=False, **limits))  # type: ignore[arg-type]
+
+
+def quantity(unit: str, text: str, default: Any = None, *, name: str = "", **limits: float) -> Any:
+    """A key that holds a number with a unit, in a range."""
+    return Key(amount(unit, text, **limits), text, default, name)
+
+
+class Section:
+    """A section of a case, whose fields are its keys."""
+
+    called: ClassVar[str] = ""
+    """Subject of messages; else the key under which the section stands."""
+
+    tree = Tree(None, Place())
+    """The section as it stands."""
+    more: Mapping[str, Any] = MappingProxyType({})
+    """Values of the keys beside those that the class declares."""
+
+    def __init__(self, **values: Any) -> None:
+        for declared in keys(type(self)).values():
+            setattr(self, declared.attribute, values.get(declared.attribute, declared.default))
+
+    @classmethod
+    def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
+        """Keys beside those of the class, of a section as it stands, or all there may be."""
+        return {}
+
+    def has(self, *names: str) -> bool:
+        """Whether any of these keys is given."""
+        return isinstance(self.tree.value, dict) and any(name in self.tree.value for name in names)
+
+    def error(self, message: str, name: str = "") -> InputError:
+        """An input error at a key, or at the section where that is not given."""
+        return (self.tree.value[name] if name and self.has(name) else self.tree).error(message)
+
+
+S = TypeVar("S", bound=Section)
+L = TypeVar("L", bound=Law)
+
+
+def keys(cls: type[Section]) -> Mapping[str, Key]:
+    """The keys that a section declares, by name."""
+    return {declared.name: declared for declared in vars(cls).values() if isinstance(declared, Key)}
+
+
+@cache
+def law_keys(law: type[Law]) -> Mapping[str, Key]:
+    """The keys of a law by name: its options, then its parameters."""
+    hints, defaults = typing.get_type_hints(law), {item.name: item.default for item in dataclasses.fields(law)}
+    found = {}
+    for name, meaning in law.options():
+        found[name] = Key(_content_of(hints[name], name, meaning), meaning, defaults[name])
+    for name, spec in law.specs():
+        found[name] = Key(Number(spec, name in DIFFERENCES), spec.text, defaults[name])
+    return found
+
+
+def _content_of(declared: Any, name: str, meaning: str) -> Content:
+    """The content of an option of a law, by the type of its field; the unit of numbers stands behind their meaning."""
+    origin, arguments = typing.get_origin(declared), typing.get_args(declared)
+    if declared is str:
+        return Text()
+    if origin is typing.Literal:
+        return OneOf(name, lambda: arguments)
+    if origin is tuple and Ellipsis not in arguments:
+        return ListOf(Text(), count=len(arguments))
+    if origin is not None and float in arguments:
+        unit = re.search(r"\[([^\]]*)\]$", meaning)
+        unit_text = "1" if unit is None else "[x]" if unit[1] == "x" else unit[1]
+        return ListOf(Number(Spec(unit_text, name, varies=False)))
+    raise TypeError(f"{name}: nothing reads {declared} off a case")
+
+
+def read(cls: type[S], tree: Tree, context: Context) -> S:
+    """A section from the mapping of its keys."""
+    own, more = keys(cls), cls.more_keys(tree)
+    found = _values({**own, **more}, tree, context, cls.called)
+    section = cls(**{own[name].attribute: value for name, value in found.items() if name in own})
+    section.tree = tree
+    section.more = {name: value for name, value in found.items() if name in more}
+    return section
+
+
+def read_law(law: type[L], tree: Tree, context: Context) -> L:
+    """A law from the mapping of its parameters."""
+    if issubclass(law, Factor):
+        of = tree.mapping().get("of", Tree(law_keys(law)["of"].default, tree.place))
+        context = replace(context, x=context.units[of.choice("variable", context.units)])
+    try:
+        return law(**_values(law_keys(law), tree, context, law.name()), place=tree.place)
+    except InputError as error:
+        raise error.at(tree.place) from None
+
+
+def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: str) -> dict[str, Any]:
+    """The values of the keys that are given, each known and none missing."""
+    given = tree.mapping(declared)
+    for name, item in declared.items():
+        if item.required and name not in given:
+            raise tree.error(f"{called or tree.place.path.rpartition('.')[2]} needs `{name}`: {item.meaning}.")
+    return {name: item.content.read(given[name], name, context) for name, item in declared.items() if name in given}
+
+
+# -- JSON Schema ------------------------------------------------------------------------------------------------------
+
+
+def schema_of(cls: type[Section] | type[Law]) -> Schema:
+    """JSON Schema of a section or of the parameters of a law."""
+    declared = {**keys(cls), **cls.more_keys(None)} if issubclass(cls, Section) else law_keys(cls)
+    properties = {name: item.schema() for name, item in declared.items()}
+    found = closed(properties, [name for name, item in declared.items() if item.required])
+    return {**found, "description": (cls.__doc__ or "").strip().splitlines()[0]}
+
+
+def closed(properties: Mapping[str, Schema], required: Sequence[str] = ()) -> Schema:
+    """An object with these keys and no others."""
+    found: Schema = {"type": "object", "properties": dict(properties), "additionalProperties": False}
+    return {**found, "required": list(required)} if required else found
+
+
+def reference(name: str) -> Schema:
+    """A definition by its name."""
+    return {"$ref": f"#/$defs/{name}"}

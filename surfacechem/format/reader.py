@@ -1,0 +1,438 @@
+"""From the sections of a case to its scene and its run; what keys say together is checked here."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from surfacechem import solve as solvers
+from surfacechem.contracts.substances import Fluid, Property
+from surfacechem.documents import document, shipped
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.format.declarations import UNITS, Context, is_name, keys, read
+from surfacechem.format.sections import (
+    BODY_NAME,
+    LINEAR,
+    LUMP,
+    REFERENCE,
+    BodySection,
+    CellAccuracy,
+    ConductionSection,
+    Document,
+    FarSide,
+    InterfaceSection,
+    MechanismSection,
+    MediumSection,
+    ReferenceSection,
+    RunSection,
+    StageSection,
+    Threshold,
+)
+from surfacechem.quantities import VARIABLES
+from surfacechem.results.accuracy import first_tolerance
+from surfacechem.scene import Body, Conduction, Interface, Medium, Mounting, Scene, Sites, Stage
+from surfacechem.solve.run import DEFAULT_RTOL, OWN, Run
+
+if TYPE_CHECKING:
+    from surfacechem.mechanism import Mechanism
+
+OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
+"""Names that stand for the temperature of body 1, of body 2 and of the interface."""
+
+RESERVED = ("T_a", "T_from", "T_to")
+TAKEN = ("interface", "surroundings", "reference")
+
+FIRST_CELLS = 16
+"""Cells of a body before a run has chosen them."""
+
+SUM = 1e-9
+"""How far fractions that are written in decimals may miss one in their sum."""
+
+
+@dataclass(frozen=True)
+class ExactSolution:
+    """An exact solution by name, with those of its parameters that the case gives itself."""
+
+    name: str
+    options: Mapping[str, float] = field(default_factory=dict)
+    place: Place | None = None
+
+    @property
+    def fixed(self) -> str:
+        """Why it belongs to no other scene than that of the case, in words; empty where it follows changes."""
+        if not self.options:
+            return ""
+        own = f"it is given with {', '.join(self.options)}, and the scene was changed"
+        return f"the exact solution {self.name} is not of this scene: {own}"
+
+
+def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None) -> tuple[Document, Mechanism | None]:
+    """The sections of a case and the mechanism that it names.
+
+    What the sections may speak of, temperatures and species, comes from the bodies and the interface, so that their
+    names are gathered first.
+    """
+    top = tree.mapping(keys(Document))
+    bodies, interface = (top[name].mapping() if name in top else {} for name in ("bodies", "interface"))
+    if "bodies" in top:
+        _check_bodies(top["bodies"], bodies)
+    owners = [body.mapping().get("temperature") for body in bodies.values()] + [interface.get("temperature")]
+    temperatures = _temperature_names(owners)
+    context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies))
+    mechanism = None
+    if "mechanism" in interface:
+        run = run_of(read(RunSection, top["run"], context)) if "run" in top else Run(times=(0.0, 1.0))
+        named = keys(InterfaceSection)["mechanism"].content.read(interface["mechanism"], "the mechanism", context)
+        evaluate = run.solver in (solvers.AUTO, *solvers.ASKING)
+        mechanism = _mechanism(named, interface["mechanism"], Path(base), mechanism_text, evaluate)
+        coverages = (variable.name for variable in mechanism.variables)
+        context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})
+    return read(Document, tree, context), mechanism
+
+
+def _check_bodies(tree: Tree, bodies: Mapping[str, Tree]) -> None:
+    if len(bodies) != 2:
+        raise tree.error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
+    for name, body in bodies.items():
+        if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
+            raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
+
+
+def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
+    """Names of the temperatures of body 1, body 2 and the interface; some may only name that of their owner."""
+    names = [str(tree.value) if tree is not None and is_name(tree) else None for tree in owners]
+    for name, tree in zip(names, owners, strict=True):
+        owner = OWNERS.get(str(name))
+        if tree is not None and (name in RESERVED or (owner is not None and names[owner] != name)):
+            raise tree.error(f"'{name}' is {VARIABLES[str(name)].long_name}, which has its own; use another name.")
+    return tuple(dict.fromkeys(name for name in names if name is not None))
+
+
+# -- scene ------------------------------------------------------------------------------------------------------------
+
+
+def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
+    """The scene that the sections state."""
+    first, second = (_body(name, section) for name, section in case.bodies.items())
+    return Scene(
+        bodies=(first, second),
+        interface=_interface(case, mechanism),
+        heat=case.heat,
+        loading=case.loading or {},
+        surroundings=case.surroundings.temperature if case.surroundings else None,
+        T_0=case.T_0,
+        initial=_initial(case, mechanism),
+        normal=_normal(case),
+        tangential=case.mechanics.tangential,
+        transverse=case.mechanics.transverse,
+        programme=_stages(case),
+    )
+
+
+def _body(name: str, section: BodySection) -> Body:
+    stores = section.more or section.has("capacity")
+    energy = BodySection.energy(section.tree)(**section.more, place=section.tree.place) if stores else None
+    conduction = _conduction(section.conduction) if section.conduction else None
+    return Body(name, section.temperature, energy, conduction)
+
+
+def _conduction(section: ConductionSection) -> Conduction:
+    accuracy = section.cells.accuracy if isinstance(section.cells, CellAccuracy) else None
+    cells = 0 if section.cells == LUMP else section.cells if isinstance(section.cells, int) else FIRST_CELLS
+    if cells % 2:
+        raise section.error(f"cells must be even, so that half of them show the error; got {cells}.", "cells")
+    far = section.far if isinstance(section.far, FarSide) else None
+    return Conduction(
+        thickness=section.thickness,
+        conductivity=section.conductivity,
+        cells=cells,
+        accuracy=accuracy,
+        grading=section.grading,
+        far=far.temperature if far else None,
+        h_far=far.h if far else None,
+        place=section.tree.place,
+    )
+
+
+def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
+    section = case.interface
+    partition, loss = _partition(case)
+    own = Interface(
+        section.temperature,
+        section.potential,
+        section.friction,
+        section.bonding,
+        _sites(section, list(case.bodies)),
+        partition,
+        limits=section.limits,
+        loss=loss,
+        medium=_medium(section.medium) if section.medium else None,
+    )
+    if mechanism is None:
+        return own
+    if section.has("sites"):
+        raise section.error("the mechanism gives the sites; remove `sites` or `mechanism`.", "sites")
+    return replace(
+        own,
+        potentials=(*own.potentials, *mechanism.potentials),
+        reactions=(*own.reactions, *mechanism.reactions),
+        sites=mechanism.sites,
+        variables=mechanism.variables,
+        bonds=mechanism.bonds,
+        engine=mechanism.engine,
+        remarks=mechanism.remarks,
+    )
+
+
+def _partition(case: Document) -> tuple[float, float]:
+    """Fractions of the heat into body 1 and into the surroundings."""
+    section, shares = case.interface, case.interface.partition
+    if shares is None:
+        return 0.5, 0.0
+    if section.has("temperature"):
+        raise section.error("an interface with a temperature divides its heat by itself; remove it.", "partition")
+    if not isinstance(shares, Mapping):
+        return shares, 0.0
+    if abs(sum(shares.values()) - 1) > SUM:
+        raise section.error(f"the fractions of the heat must add up to 1, not {sum(shares.values()):g}.", "partition")
+    if shares.get("surroundings") and case.surroundings is None:
+        message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
+        raise section.error(message, "partition")
+    return shares.get(next(iter(case.bodies)), 0.0), shares.get("surroundings", 0.0)
+
+
+def _sites(section: InterfaceSection, bodies: Sequence[str]) -> Sites | None:
+    sites = section.sites
+    if not isinstance(sites, Mapping):
+        return None if sites is None else Sites(sites, sites)
+    for name in bodies:
+        if name not in sites:
+            raise section.error(f"the sites of {name} are missing: give both bodies a density.", "sites")
+    reference = sites.get("reference", bodies[0])
+    if reference not in bodies:
+        place = section.tree.value["sites"].value["reference"].place
+        raise InputError(f"no body '{reference}'.{suggestion(reference, bodies)}", place)
+    return Sites(sites[bodies[0]], sites[bodies[1]], bodies.index(reference) + 1)
+
+
+def _medium(section: MediumSection) -> Medium:
+    properties = {}
+    for key, declared in keys(MediumSection).items():
+        name, value = declared.attribute, getattr(section, declared.attribute)
+        if name not in VARIABLES or value is None:
+            continue
+        if isinstance(value, Property) and value.quantity != name:
+            about = VARIABLES[value.quantity].long_name
+            raise section.error(f"{value.name()} is a law of the {about}, not of the {key}.", key)
+        properties[name] = value
+    return Medium(_fluid(section), properties, section.thickness, tuple(section.temperatures))
+
+
+def _fluid(section: MediumSection) -> Fluid | None:
+    if section.fluid is None:
+        for name in ("pressure", "temperatures"):
+            if section.has(name):
+                raise section.error(f"`{name}` belongs to a fluid. Add `fluid:`, or remove it.", name)
+        return None
+    if section.pressure is None:
+        raise section.error("the fluid needs a `pressure`, for example `pressure: 1 atm`.")
+    from surfacechem.media.coolprop import CoolPropFluid
+
+    fluid = CoolPropFluid(section.fluid, section.pressure)
+    try:
+        fluid.check()
+    except InputError as error:
+        raise section.error(error.message, "fluid") from None
+    return fluid
+
+
+def _normal(case: Document) -> Mounting | None:
+    """The mounting along the normal, with the stiffness of the bodies in series: 1/k = H_1/E_1 + H_2/E_2."""
+    normal = case.mechanics.normal
+    given = [k for k in map(_stiffness, case.bodies.values()) if k is not None]
+    if not given:
+        return normal
+    if normal is not None and normal.k:
+        message = "the stiffness has two roles: give `k` here or a stiffness to the bodies."
+        raise case.mechanics.error(message, "normal")
+    return replace(normal or Mounting(), k=1 / sum(1 / k for k in given))
+
+
+def _stiffness(body: BodySection) -> float | None:
+    """Stiffness of a body [Pa/m]; one that gives none is rigid."""
+    if body.stiffness is not None:
+        for name in ("E", "H"):
+            if body.has(name):
+                raise body.error("the stiffness has two roles: give `stiffness`, or `E` and `H`.", name)
+        return body.stiffness
+    for name, other in (("E", "H"), ("H", "E")):
+        if body.has(other) and not body.has(name):
+            raise body.error(f"a body's stiffness is E / H; `{name}` is missing.", other)
+    return None if body.E is None or body.H is None else body.E / body.H
+
+
+def _stages(case: Document) -> tuple[Stage, ...]:
+    stages = tuple(_stage(name, section) for entry in case.programme for name, section in entry.items())
+    for stage in stages[:-1]:
+        if stage.duration is None and not stage.variable and not stage.event:
+            raise case.error(
+                f"only the last stage may be without end: give {stage.name} `for` or `until`.", "programme"
+            )
+    return stages
+
+
+def _stage(name: str, section: StageSection) -> Stage:
+    stage = Stage(name, section.more, place=section.tree.place)
+    if section.has("for") and section.has("until"):
+        raise section.error("the stage has two ends: give `for` or `until`.", "until")
+    if not isinstance(section.until, Mapping):
+        return replace(stage, duration=section.duration, event=section.until or "")
+    ((variable, value),) = section.until.items()
+    if not isinstance(value, Threshold):
+        return replace(stage, variable=variable, value=value)
+    ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
+    if len(ends) != 1:
+        raise value.error("give `rises-to` or `falls-to`.")
+    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
+
+
+def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
+    """Initial values by variable; whether each evolves, the assembly decides."""
+    values = dict(case.initial or {})
+    given = values.pop("coverages", None)
+    if mechanism is None:
+        if given is not None:
+            place = case.tree.value["initial"].value["coverages"].place
+            raise InputError("coverages are those of a mechanism. Add `interface.mechanism`, or remove them.", place)
+        return values
+    if given is None:
+        remedy = "add `initial: {coverages: {species: value}}`."
+        raise InputError(f"the coverages of the mechanism: {remedy}", _place(case, "initial", "interface"))
+    return values | mechanism.coverages(given, case.tree.value["initial"].value["coverages"].place)
+
+
+def _place(case: Document, first: str, other: str) -> Place:
+    """Where a section stands, or the mechanism of the interface."""
+    tree: Tree = case.tree.value[first] if case.has(first) else case.tree.value[other].value["mechanism"]
+    return tree.place
+
+
+# -- mechanism --------------------------------------------------------------------------------------------------------
+
+
+def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: str | None, evaluate: bool) -> Mechanism:
+    """The mechanism of a case; ``content`` is its text where that is already at hand.
+
+    With ``evaluate`` what is not lowered is left to Cantera.
+    """
+    from surfacechem.mechanism import load_mechanism
+    from surfacechem.mechanism.neighbours import Neighbour
+
+    section = named if isinstance(named, MechanismSection) else MechanismSection(file=named)
+    file = section.file if Path(section.file).suffix in (".yaml", ".yml") else f"{section.file}.yaml"
+    neighbours = {
+        name: Neighbour(phase.pressure, phase.composition or {}, phase.electric_potential, phase.tree.place)
+        for name, phase in (section.neighbours or {}).items()
+    }
+
+    def load(path: Path, shown: str) -> Mechanism:
+        return load_mechanism(path, section.phase, section.bonds, tree.place, evaluate, neighbours, shown)
+
+    if content is None:
+        path = _find(file, base, tree.value["file"] if isinstance(named, MechanismSection) else tree)
+        return load(path, str(path))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / Path(file).name
+        path.write_text(content, encoding="utf-8")
+        return load(path, file)
+
+
+def _find(name: str, base: Path, tree: Tree) -> Path:
+    """Beside the case, in the package, or where Cantera itself looks."""
+    for folders in ((base, shipped.mechanisms()), _of_cantera()):
+        for folder in folders:
+            path = document.beside(folder, name, tree.place)
+            if path is not None:
+                return path
+    known = [path.stem for path in shipped.mechanisms().glob("*.yaml")]
+    raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
+
+
+def _of_cantera() -> Iterator[Path]:
+    """The folders in which Cantera itself looks for mechanisms."""
+    import cantera
+
+    yield from (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
+
+
+# -- run and exact solution -------------------------------------------------------------------------------------------
+
+
+def run_of(section: RunSection) -> Run:
+    """The run that the section states."""
+    if section.has("accuracy") and section.has("rtol"):
+        raise section.error("the tolerance has two roles: give `accuracy` or `rtol`.", "accuracy")
+    solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
+    if section.solver == solvers.AUTO and section.has("rtol"):
+        raise section.error("the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol")
+    usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
+    return Run(
+        times=_times(section),
+        rtol=section.rtol if section.rtol is not None else usual,
+        atol=section.atol,
+        solver=solver,
+        max_steps=section.max_steps,
+        max_seconds=section.max_seconds,
+        accuracy=section.accuracy,
+    )
+
+
+def _times(section: RunSection) -> tuple[float, ...]:
+    if section.times is None and section.until is None:
+        raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
+    times = _spaced(section, section.until) if section.times is None else _listed(section, section.times)  # type: ignore[arg-type]
+    if any(b <= a for a, b in pairwise(times)):
+        message = "output times must increase from each to the next."
+        raise section.error(message, "until" if section.times is None else "times")
+    return times
+
+
+def _listed(section: RunSection, times: Sequence[float]) -> tuple[float, ...]:
+    for name in ("until", "outputs", "spacing", "first"):
+        if section.has(name):
+            raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
+    if times[-1:] in ((), (0.0,)):
+        raise section.error("at least one time after 0 is needed.", "times")
+    return tuple(times) if times[0] == 0.0 else (0.0, *times)
+
+
+def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
+    count, first = section.outputs, section.first
+    if section.spacing == LINEAR:
+        if first is not None:
+            raise section.error("`first` belongs to `spacing: logarithmic`.", "first")
+        return (*(end * (i / (count - 1)) for i in range(count - 1)), end)
+    if first is None:
+        raise section.error("logarithmic spacing needs `first`: the first output time after 0.", "spacing")
+    if first > end:
+        raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first")
+    steps = max(count - 2, 1)
+    ratio = math.log(end) - math.log(first)
+    return (0.0, *(first * math.exp(ratio * i / steps) for i in range(count - 2)), end)
+
+
+def exact_solution_of(tree: Tree) -> ExactSolution | None:
+    """The exact solution that a case names; none where the key is left empty."""
+    if tree.value is None or tree.value == "":
+        return None
+    named = REFERENCE.read(tree, "reference", Context())
+    if isinstance(named, ReferenceSection):
+        return ExactSolution(named.name, named.more, tree.place)
+    return ExactSolution(named, place=tree.place)

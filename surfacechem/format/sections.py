@@ -1,0 +1,423 @@
+"""The sections of a case file: every key, what it holds, its range and what is meant where it is left out.
+
+Reader, JSON Schema, defaults and the tables of the documentation follow from these declarations. What sections make
+of each other, and what contradicts itself across keys, is in :mod:`surfacechem.format.reader`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+from surfacechem import laws, references
+from surfacechem import solve as solvers
+from surfacechem.contracts.substances import Property
+from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
+from surfacechem.documents.document import Tree
+from surfacechem.format.declarations import (
+    NODE,
+    REQUIRED,
+    UNITS,
+    Content,
+    Entries,
+    Key,
+    Later,
+    ListOf,
+    Nested,
+    Number,
+    OneLaw,
+    OneOf,
+    Prescribed,
+    Section,
+    Shapes,
+    Temperature,
+    Text,
+    Whole,
+    amount,
+    key,
+    keys,
+    law_keys,
+    quantity,
+)
+from surfacechem.model.assemble import LOADABLE, TRACTIONS
+from surfacechem.quantities import VARIABLES
+from surfacechem.scene import MOST_CELLS, Conduction, Mounting
+from surfacechem.solve.run import DEFAULT_RTOL, OWN
+from surfacechem.units import quotient
+
+BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
+
+EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "p")
+"""Variables beside temperatures and bonds that some scenes evolve; whether this one does, its assembly decides."""
+
+LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
+LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
+
+MOST_OUTPUTS = MOST_RUNS = 1_000_000
+MOST_AXES = 2
+
+
+def _variables(names: Sequence[str], content: Content) -> dict[str, Key]:
+    """Keys that are variables, in their units."""
+    return {name: Key(content, f"{VARIABLES[name].long_name} [{UNITS[name]}]") for name in names}
+
+
+# -- bodies -----------------------------------------------------------------------------------------------------------
+
+
+class CellAccuracy(Section):
+    """accuracy by which a run chooses the number of cells"""
+
+    accuracy: float = quantity("1", "relative accuracy of temperatures", REQUIRED, above=0, at_most=0.1)
+
+
+class FarSide(Section):
+    """far side of a body"""
+
+    called = "the far side"
+
+    temperature: Load = key(Prescribed("K", above_zero=True), "temperature at the far side, or beyond it", REQUIRED)
+    h: float | None = quantity("W/(m^2 K)", "conductance to what is beyond", at_least=0)
+
+
+class ConductionSection(Section):
+    """temperatures across the body instead of one"""
+
+    thickness: float = key(Number(dict(Conduction.specs())["thickness"]), default=REQUIRED)
+    conductivity: Any = key(Number(dict(Conduction.specs())["conductivity"]), default=REQUIRED)
+    cells: int | str | CellAccuracy = key(
+        Shapes(Whole(2, MOST_CELLS, step=2, word=LUMP), Nested(CellAccuracy)),
+        "number of cells, an even one so that half of them show the error, {accuracy: 1e-4}, or lump",
+        REQUIRED,
+    )
+    grading: float = quantity(
+        "1", "width of the cells at the far side over that at the contact", 1.0, at_least=1e-6, at_most=1e6
+    )
+    far: str | FarSide = key(
+        Shapes(
+            OneOf("far side", lambda: (INSULATED,)),
+            Nested(FarSide),
+            wanted="the far side is `insulated`, {temperature: 25 degC}, or {temperature: 25 degC, h: 10 W/m^2/K}.",
+        ),
+        "far side",
+        INSULATED,
+    )
+
+
+class BodySection(Section):
+    """one of the two bodies; the first is body 1"""
+
+    temperature: str | Load = key(Temperature(), "a name such as T, or a value or a history", REQUIRED)
+    capacity: str = key(
+        OneOf("capacity", lambda: sorted(laws.laws(BodyEnergy))), "energy as a function of temperature", QUADRATIC
+    )
+    conduction: ConductionSection | None = key(Nested(ConductionSection))
+    stiffness: float | None = quantity("Pa/m", "normal stiffness of the body; both are in series", above=0)
+    E: float | None = quantity("Pa", "Young's modulus, with `H` instead of `stiffness`", above=0)
+    H: float | None = quantity("m", "height, with `E` instead of `stiffness`", above=0)
+
+    @staticmethod
+    def energy(tree: Tree) -> type[BodyEnergy]:
+        """The law of the energy, whose parameters stand beside the other keys."""
+        known = laws.laws(BodyEnergy)
+        capacity = tree.mapping().get("capacity")
+        return cast("type[BodyEnergy]", known[capacity.choice("capacity", known) if capacity else QUADRATIC])
+
+    @classmethod
+    def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
+        """The parameters of the energy, which a body without one leaves out."""
+        kinds = list(laws.laws(BodyEnergy).values()) if tree is None else [cls.energy(tree)]
+        found = {name: declared for kind in kinds for name, declared in law_keys(kind).items()}
+        if tree is not None and any(name in tree.mapping() for name in ("capacity", *found)):
+            return {name: Key(item.content, item.text, item.default) for name, item in found.items()}
+        return {name: Key(item.content, item.text) for name, item in found.items()}
+
+
+# -- interface --------------------------------------------------------------------------------------------------------
+
+
+def _property(name: str, key_name: str) -> Any:
+    content = Shapes(amount(UNITS[name], above=0), OneLaw(Property))
+    return key(content, f"{VARIABLES[name].long_name} [{UNITS[name]}]", name=key_name)
+
+
+class MediumSection(Section):
+    """what fills the space between the bodies"""
+
+    fluid: str | None = key(Text(), "name of a fluid that CoolProp knows")
+    pressure: float | None = quantity("Pa", "pressure of the fluid", above=0)
+    temperatures: Sequence[float] = key(ListOf(amount("K", above=0), "[300 K]"), "covered from the start [K]", ())
+    thickness: float | None = quantity("m", "thickness, else the normal gap", above=0)
+    k_m: Any = _property("k_m", "conductivity")
+    eta_m: Any = _property("eta_m", "viscosity")
+    rho_m: Any = _property("rho_m", "density")
+    cp_m: Any = _property("cp_m", "heat-capacity")
+
+
+class NeighbourSection(Section):
+    """state in which a phase beside the surface is held"""
+
+    pressure: float | None = quantity("Pa", "pressure", above=0)
+    composition: Mapping[str, float] | None = key(
+        Entries(others=amount("1", at_least=0, at_most=1)), "mole fractions by species"
+    )
+    electric_potential: float = quantity("V", "electric potential against the surface", 0.0, name="electric-potential")
+
+
+class MechanismSection(Section):
+    """Cantera surface mechanism"""
+
+    called = "the mechanism"
+
+    file: str = key(Text(), "the name of a Cantera surface mechanism", REQUIRED)
+    phase: str | None = key(Text(), "the phase, where there are several")
+    bonds: Sequence[str] | None = key(ListOf(Text()), "species that count as bonds")
+    neighbours: Mapping[str, NeighbourSection] | None = key(
+        Entries(others=Nested(NeighbourSection)), "states in which the phases beside the surface are held, by name"
+    )
+
+
+DENSITY = amount("1/m^2", "density of bonding sites", above=0)
+SHARE = amount("1", "fraction of heat", at_least=0, at_most=1)
+SIDES = Entries({"reference": Key(Text(), "the body whose sites define phi")}, DENSITY, lambda case: case.bodies)
+SHARES = Entries(others=SHARE, names=lambda case: [*case.bodies, "surroundings"])
+
+
+class InterfaceSection(Section):
+    """what is between the bodies"""
+
+    temperature: str | Load | None = key(
+        Temperature(), "a name, a value or a history; left out where there is no medium"
+    )
+    sites: float | Mapping[str, Any] | None = key(
+        Shapes(DENSITY, SIDES), "density of bonding sites [1/m^2], one value or one for each body"
+    )
+    partition: float | Mapping[str, float] | None = key(
+        Shapes(SHARE, SHARES),
+        "fraction of interface heat into body 1 where there is no medium, 0.5 if not given; or fractions by body and "
+        "`surroundings`",
+    )
+    medium: MediumSection | None = key(Nested(MediumSection))
+    potential: Sequence[Potential] = key(ListOf(OneLaw(Potential)), "terms of the free energy", ())
+    friction: Sequence[Friction] = key(ListOf(OneLaw(Friction)), "friction laws, whose tractions add up", ())
+    bonding: Sequence[RateLaw] = key(ListOf(OneLaw(RateLaw)), "reactions, whose rates add up", ())
+    limits: Sequence[Limit] = key(ListOf(OneLaw(Limit)), "tractions at which the interface gives way at once", ())
+    mechanism: str | MechanismSection | None = key(
+        Shapes(Text(), Nested(MechanismSection)), "Cantera surface mechanism, instead of `sites`"
+    )
+
+
+# -- heat, mechanics, loading -----------------------------------------------------------------------------------------
+
+
+class SurroundingsSection(Section):
+    """a third heat bath, `{temperature: ...}`"""
+
+    temperature: Load = key(Prescribed("K", above_zero=True), "temperature of the surroundings", REQUIRED)
+
+
+class MechanicsSection(Section):
+    """how the bodies are mounted, for a gap that moves"""
+
+    normal: Mounting | None = key(Nested(Mounting), "how the normal gap is held")
+    tangential: Mounting | None = key(Nested(Mounting), "how the tangential displacement is held")
+    transverse: Mounting | None = key(
+        Nested(Mounting), "how the displacement across it is held, where not alike; its mass is that of `tangential`"
+    )
+
+
+class Threshold(Section):
+    """a value that a variable reaches from one side"""
+
+    rises_to: float | None = quantity("[x]", "value reached from below", name="rises-to")
+    falls_to: float | None = quantity("[x]", "value reached from above", name="falls-to")
+
+
+AWAITED = Entries(
+    others=Shapes(amount("[x]"), Nested(Threshold)),
+    names=lambda case: [*case.units, *TRACTIONS],
+    units=dict.fromkeys(TRACTIONS, "Pa"),
+    what="variables",
+    at_most=1,
+    wanted="`until` waits for one variable, for example `until: {p: 10 kPa}`",
+)
+
+
+class StageSection(Section):
+    """a stage of the loading: rates of what it moves, and one end"""
+
+    duration: float | None = quantity("s", "length of the stage", above=0, name="for")
+    until: str | Mapping[str, float | Threshold] | None = key(
+        Shapes(Text(), AWAITED),
+        "what ends it: `{variable: value}`, `{variable: {falls-to: value}}`, or the name of an event",
+    )
+
+    @classmethod
+    def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
+        """Rates of the variables that may be moved."""
+        units = {name: quotient(UNITS[name], "s") for name in LOADABLE}
+        return {name: Key(amount(unit, f"rate of the {VARIABLES[name].long_name}")) for name, unit in units.items()}
+
+
+STAGE = Entries(
+    others=Nested(StageSection), at_most=1, wanted="a stage is `name: {rates, for or until}`", words="stages"
+)
+
+LOADING = Entries(
+    _variables(LOADABLE, Prescribed()),
+    Prescribed(above_zero=True),
+    lambda case: case.temperatures,
+    NODE.pattern,
+    what="variables",
+    words="histories by variable",
+)
+
+INITIAL = Entries(
+    {
+        "phi": Key(amount("1", "bonding state", at_least=0, at_most=1)),
+        "ln_phi": Key(amount("1", "logarithm of the bonding state, instead of phi: for survival far below 1e-16")),
+        **_variables((*EVOLVING, "theta"), amount("[x]")),
+        "profile_1": Key(amount("K", "temperature inside body 1, which conducts", above=0)),
+        "profile_2": Key(amount("K", "temperature inside body 2, which conducts", above=0)),
+        "coverages": Key(Entries(others=amount("1")), "coverages of a mechanism by species"),
+    },
+    amount("K", above=0),
+    lambda case: case.temperatures,
+    NODE.pattern,
+    what="variables",
+    words="values by variable",
+)
+
+
+# -- run, reference, sweep --------------------------------------------------------------------------------------------
+
+
+class RunSection(Section):
+    """times, accuracy, solver, for example `run: {until: 5 s}`"""
+
+    until: float | None = quantity("s", "end of the run", above=0)
+    outputs: int = key(Whole(2, MOST_OUTPUTS), "number of output times, both ends included", 201)
+    spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the output times", LINEAR)
+    first: float | None = quantity("s", "first output time after 0, for logarithmic spacing", above=0)
+    times: Sequence[float] | None = key(
+        ListOf(amount("s", at_least=0), at_least=1), "output times [s], instead of the four keys above"
+    )
+    accuracy: float | None = quantity(
+        "1", "relative accuracy wanted: solver and tolerance follow from it", above=0, at_most=1
+    )
+    rtol: float | None = quantity(
+        "1",
+        f"relative tolerance of each step, instead of `accuracy`; {DEFAULT_RTOL:g} if neither is given",
+        above=0,
+        at_most=0.1,
+    )
+    atol: float | None = quantity(
+        "1", "absolute tolerance in parts of the scale of each state; 1e-6 `rtol` if not given", above=0, at_most=1
+    )
+    solver: str | None = key(
+        OneOf("solver", lambda: (solvers.AUTO, *sorted(solvers.names))),
+        f"integrator; {OWN} if not given, {solvers.AUTO} with `accuracy`",
+    )
+    max_steps: int = key(Whole(1), "most steps", 100_000, name="max-steps")
+    max_seconds: float | None = quantity("s", "longest run time", above=0, name="max-seconds")
+
+
+class ReferenceSection(Section):
+    """an exact solution to compare with, with those of its parameters that the scene does not give"""
+
+    name: str = key(OneOf("exact solution", references.names), "its name", REQUIRED)
+
+    @classmethod
+    def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
+        """The parameters of the solution that is named; their ranges differ from one to another."""
+        if tree is None:
+            return {name: Key(amount(spec.unit, spec.text)) for name, spec in _parameters(*references.names())}
+        name = tree.mapping().get("name")
+        if name is None:
+            raise tree.error("the exact solution needs a `name`.")
+        named = name.choice("exact solution", references.names())
+        return {item: Key(Number(replace(spec, varies=False))) for item, spec in _parameters(named)}
+
+
+def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
+    for name in solutions:
+        yield from ((item.name, item.metadata["spec"]) for item in dataclasses.fields(references.get(name)))  # type: ignore[arg-type]
+
+
+REFERENCE = Shapes(OneOf("exact solution", references.names), Nested(ReferenceSection))
+"""An exact solution, by name or with its parameters."""
+
+
+class RangeSection(Section):
+    """values of a swept parameter"""
+
+    called = "a range"
+
+    first: float = quantity("[x]", "first value", REQUIRED, name="from")
+    last: float = quantity("[x]", "last value", REQUIRED, name="to")
+    points: int = key(Whole(1, MOST_RUNS), "number of values, both ends included", REQUIRED)
+    spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the values", LINEAR)
+
+
+SWEPT = Shapes(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
+"""Values of a swept parameter, in its unit."""
+
+SWEPT_BY_PATH = Entries(
+    others=Later(SWEPT),
+    pattern=lambda: rf"({'|'.join(keys(Document))})(\.[^.]+)*",
+    at_most=MOST_AXES,
+    wanted="a sweep needs `over`: one or two parameters, for example "
+    "`over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`",
+)
+
+UNTIL = Entries(
+    others=amount("[x]"),
+    names=lambda _: UNITS,
+    what="variables",
+    at_most=1,
+    wanted="`until` is one prescribed variable and its value, for example `until: {f: 200 pN}`",
+)
+"""A prescribed variable and the value at which each run of a sweep ends."""
+
+
+class SweepSection(Section):
+    """parameters of many runs"""
+
+    called = "a sweep"
+
+    over: Mapping[str, Tree] = key(
+        SWEPT_BY_PATH, "values of one or two parameters by path: a list, or `{from, to, points, spacing}`", REQUIRED
+    )
+    until: Mapping[str, float] | None = key(
+        UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"
+    )
+
+
+class Document(Section):
+    """a case"""
+
+    called = "the case"
+
+    title: str = key(Text(), "one line", "")
+    source: str = key(Text(), "where the case comes from", "")
+    description: str = key(Text(), "what the case shows", "")
+    T_0: float | None = quantity("K", "reference temperature of energies and factors", above=0)
+    bodies: Mapping[str, BodySection] = key(
+        Entries(others=Nested(BodySection), pattern=BODY_NAME, words="two bodies by name"),
+        "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`",
+        REQUIRED,
+    )
+    interface: InterfaceSection = key(Nested(InterfaceSection), default=InterfaceSection())
+    heat: Sequence[HeatTransfer] = key(ListOf(OneLaw(HeatTransfer)), "heat paths", ())
+    surroundings: SurroundingsSection | None = key(Nested(SurroundingsSection))
+    mechanics: MechanicsSection = key(Nested(MechanicsSection), default=MechanicsSection())
+    loading: Mapping[str, Load] | None = key(LOADING, "prescribed variables")
+    programme: Sequence[Mapping[str, StageSection]] = key(
+        ListOf(STAGE, "- approach: {w_n: -1 um/s, until: {p: 10 kPa}}"), "stages of the loading", ()
+    )
+    initial: Mapping[str, Any] | None = key(INITIAL, "initial values of what evolves")
+    run: RunSection = key(Nested(RunSection), default=REQUIRED)
+    reference: Tree | None = key(Later(REFERENCE), "an exact solution to compare with")
+    sweep: SweepSection | None = key(Nested(SweepSection))
