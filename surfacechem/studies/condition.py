@@ -8,15 +8,19 @@ problem with changed data. Source: Higham (2002), Accuracy and Stability of Nume
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.results.accuracy import FLOOR, relative_errors
-from surfacechem.studies.regimes import Exact, Problem, Stops
+from surfacechem.studies.regimes import Exact, Problem, Refused, Stops
 
 Array = NDArray[np.float64]
+Answer = Mapping[str, Array]
+Data = Mapping[str, float]
 
 TIME = "t"
 """The output times among the data."""
@@ -39,20 +43,26 @@ def condition(problem: Problem, names: Collection[str]) -> float:
     >>> [f"{condition(regimes()['cold'].problem(part), ['T']):.0e}" for part in (1e-3, 1e-6)]
     ['3e+06', '3e+12']
     """
-    expected = problem.expected
-    if isinstance(expected, Exact) and expected.again is not None:
-        again, times = expected.again, np.array(problem.times)
-        every = {*names, *expected.also}
+    expected, times = problem.expected, np.array(problem.times)
+    if isinstance(expected, Refused) or expected.again is None:
+        return float("nan")
+    again: Callable[..., Any] = expected.again
+    data = dict(expected.data)
+    if isinstance(expected, Exact):
+        data[TIME] = 1.0
 
-        def answer(data: Mapping[str, float]) -> dict[str, Array]:
-            others = {name: value for name, value in data.items() if name != TIME}
-            return _known(again(others, data[TIME] * times), every)
+    def answer(changed: Mapping[str, float]) -> Answer:
+        if isinstance(expected, Stops):
+            return {TIME: np.array([again(changed)])}
+        values: Answer = again({name: changed[name] for name in expected.data}, changed[TIME] * times)
+        return {name: np.atleast_1d(values[name]) for name in values if name in {*names, *expected.also}}
 
-        return _condition(answer, {**expected.data, TIME: 1.0})
-    if isinstance(expected, Stops) and expected.again is not None:
-        end = expected.again
-        return _condition(lambda data: {TIME: np.array([end(data)])}, expected.data)
-    return float("nan")
+    base = answer(data)
+    total = {name: np.zeros_like(values) for name, values in base.items()}
+    for name in data:
+        for key, slope in (_slopes(answer, base, data, name) if data[name] else {}).items():
+            total[key] = total[key] + slope
+    return float(max((slopes.max(initial=0.0) for slopes in total.values()), default=0.0))
 
 
 def least(values: Array | float) -> float:
@@ -60,59 +70,25 @@ def least(values: Array | float) -> float:
     return FLOOR * float(np.max(np.abs(values), initial=0.0))
 
 
-def _known(values: Mapping[str, Array | float], names: Collection[str]) -> dict[str, Array]:
-    return {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in values.items() if name in names}
+def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: str) -> Answer:
+    """Relative changes of the answer over that of one of the data, with the largest step that the next one confirms.
 
-
-def _condition(answer: Callable[[Mapping[str, float]], Mapping[str, Array]], data: Mapping[str, float]) -> float:
-    base = answer(data)
-    total = {name: np.zeros_like(values) for name, values in base.items()}
-    for name, value in data.items():
-        if value:
-            for key, slope in _slopes(answer, base, data, name).items():
-                total[key] = total[key] + slope
-    return float(max((slopes.max(initial=0.0) for slopes in total.values()), default=0.0))
-
-
-def _slopes(
-    answer: Callable[[Mapping[str, float]], Mapping[str, Array]],
-    base: Mapping[str, Array],
-    data: Mapping[str, float],
-    name: str,
-) -> dict[str, Array]:
-    """Relative changes of the answer over that of one of the data, with the largest step that the next one confirms."""
-    before = None
+    A step goes the other way where there is no answer.
+    """
+    before: Answer = {}
     for step in STEPS:
-        now = _changes(answer, base, data, name, step)
-        if before is not None and now is not None and _confirmed(before, now):
+        now: Answer = {}
+        for sign in (1.0, -1.0):
+            moved = data[name] * (1.0 + sign * step)
+            with suppress(InputError):
+                found, done = answer({**data, name: moved}), abs(moved - data[name]) / abs(data[name])
+                now = {key: relative_errors(found[key], base[key], least(base[key])) / done for key in base}
+                break
+        if before and now and all(_is_straight(before[key], now[key]) for key in now):
             return now
         before = now
-    return before or {}
+    return before
 
 
-def _confirmed(first: Mapping[str, Array], second: Mapping[str, Array]) -> bool:
-    return all(
-        np.max(np.abs(first[key] - second[key]), initial=0.0) <= STRAIGHT * np.max(second[key], initial=0.0)
-        for key in second
-    )
-
-
-def _changes(
-    answer: Callable[[Mapping[str, float]], Mapping[str, Array]],
-    base: Mapping[str, Array],
-    data: Mapping[str, float],
-    name: str,
-    step: float,
-) -> dict[str, Array] | None:
-    """Relative changes over the step, which goes the other way where there is no answer; None where there is on neither
-    side.
-    """
-    for sign in (1.0, -1.0):
-        moved = data[name] * (1.0 + sign * step)
-        try:
-            found = answer({**data, name: moved})
-        except InputError:
-            continue
-        done = abs(moved - data[name]) / abs(data[name])
-        return {key: relative_errors(found[key], values, least(values)) / done for key, values in base.items()}
-    return None
+def _is_straight(first: Array, second: Array) -> bool:
+    return bool(np.max(np.abs(first - second), initial=0.0) <= STRAIGHT * np.max(second, initial=0.0))

@@ -43,11 +43,14 @@ class Cell:
     """Parts of the run times inside a library's own steps; NaN for a method that does everything itself."""
     again: Callable[[], Trajectory] | None = field(default=None, kw_only=True, repr=False)
     """Runs it once more."""
+    solver: str = field(default="", kw_only=True)
+    value: float = field(default=math.nan, kw_only=True)
+    """Where in the grid it is."""
 
-    def count(self, name: str, by: str) -> float:
-        """A count by a solver; not a number where its library does not tell."""
+    def count(self, name: str) -> float:
+        """A count of the solver; not a number where its library does not tell."""
         counters = self.counters
-        if counters is None or (name == "rejected" and not solver(by).counts_rejected):
+        if counters is None or (name == "rejected" and not solver(self.solver).counts_rejected):
             return math.nan
         if name == "factorizations" and counters.jacobians > 0 and counters.factorizations == 0:
             return math.nan
@@ -83,7 +86,8 @@ def filled(
         for cell in cells.values():
             if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < BUDGET:
                 _time_again(cell)
-    for cell in cells.values():
+    for (name, value), cell in cells.items():
+        cell.solver, cell.value = name, value
         if len(cell.seconds) > 1:  # the first run warmed up, unless it was the only one
             del cell.seconds[0], cell.stepping[0]
     return cells
@@ -111,6 +115,11 @@ def check_solvers(wanted: Sequence[str], path: str) -> None:
     for name in wanted:
         if name not in names:
             raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=path))
+    check_some(wanted, path)
+
+
+def check_some(wanted: Sequence[object], path: str) -> None:
+    """InputError where nothing is wanted."""
     if len(wanted) == 0:
         raise InputError("at least one is needed.", Place(path=path))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +19,7 @@ from surfacechem.runs.simulation import Simulation, load
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.radau.solver import LOOSEST
 from surfacechem.solve.run import Trajectory
-from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, filled
+from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_some, filled
 from surfacechem.studies.report import Section, Study, Table, Variable
 from surfacechem.studies.truth import KINDS, MEANING, Errors, Subject, Truth, establish
 
@@ -66,6 +65,16 @@ class Point(Cell):
     errors: Errors | None = None
     energy: float = math.nan
 
+    def error(self, kind: str, variable: str = "") -> float:
+        """The error of a variable, else the largest; not a number where there is none."""
+        if self.errors is None:
+            return math.nan
+        return self.errors.by_kind[kind].get(variable, math.nan) if variable else self.errors.worst(kind)
+
+    def least_stepping(self) -> float:
+        """Least time inside a library's own steps; not a number for a method that does outputs and events itself."""
+        return min(self.stepping, default=math.nan)
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -76,6 +85,15 @@ class Compared:
     truth: Truth | None
     reference: str
     points: Mapping[tuple[str, float], Point]
+
+    @property
+    def name(self) -> str:
+        """The name of the case."""
+        return self.subject.case.name
+
+    def uncertainty(self, kind: str) -> float:
+        """The uncertainty of the reference; not a number where there is none."""
+        return self.truth.uncertainty.worst(kind) if self.truth else math.nan
 
 
 def precision(
@@ -95,30 +113,21 @@ def precision(
     check_solvers(solvers, "solvers")
     for rtol in tolerances:
         check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", "tolerances")
-    if len(tolerances) == 0:
-        raise InputError("at least one is needed.", Place(path="tolerances"))
+    check_some(tolerances, "tolerances")
     check_range(repeat, 1 <= repeat <= MOST_REPEAT, f">= 1 and <= {MOST_REPEAT}", "repeat")
-    subjects = [subject(load(name, overrides)) for name in ([cases] if isinstance(cases, str | Path) else cases)]
-    names = [one.case.name for one in subjects]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"the case {name} is given twice.")
-    known = {name for one in subjects for name in one.names}
-    for name in variables:
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
+    subjects = _subjects([cases] if isinstance(cases, str | Path) else cases, overrides, variables)
     tolerances = sorted(set(map(float, tolerances)), reverse=True)
     solvers, variables = tuple(dict.fromkeys(solvers)), tuple(dict.fromkeys(variables))
     compared = [_compared(one, variables, solvers, tolerances, repeat) for one in subjects]
-    words = ["surfacechem", "precision", *names, "--solvers", ",".join(solvers)]
-    words += ["--tolerances", ",".join(f"{rtol:g}" for rtol in tolerances), "--repeat", str(repeat)]
-    words += ["--variables", ",".join(variables)] if variables else []
+    names = [case.name for case in compared]
+    options = ["--solvers", ",".join(solvers), "--tolerances", ",".join(f"{rtol:g}" for rtol in tolerances)]
+    options += ["--repeat", str(repeat), *(["--variables", ",".join(variables)] if variables else [])]
     changes = [f"{path}={value}" for path, value in overrides.items()] if isinstance(overrides, Mapping) else overrides
     status = "finished" if all(case.truth for case in compared) else "failed"
     return Study(
         kind="precision",
         title=f"Error against run time: {', '.join(names)}",
-        command=shlex.join([*words, *(word for text in changes for word in ("--set", text))]),
+        arguments=[*names, *options, *(word for text in changes for word in ("--set", text))],
         axes={
             "tolerance": tolerances,
             "case": compared,
@@ -132,6 +141,21 @@ def precision(
         settings={"repeat": repeat, "status": status},
         status=status,
     )
+
+
+def _subjects(
+    cases: Sequence[str | Path], overrides: Sequence[str] | Mapping[str, object], variables: Sequence[str]
+) -> list[Subject]:
+    """The cases; InputError for one that is given twice, and for a variable that none has."""
+    subjects = [subject(load(name, overrides)) for name in cases]
+    names = [one.case.name for one in subjects]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"the case {twice} is given twice.")
+    known = {name for one in subjects for name in one.names}
+    for name in variables:
+        if name not in known:
+            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
+    return subjects
 
 
 def subject(simulation: Simulation) -> Subject:
@@ -186,56 +210,38 @@ def _judged(truth: Truth | None, done: Trajectory | Exception) -> Point:
 
 def _variables() -> Iterator[Variable]:
     """The variables over case, solver and tolerance, the coordinates first."""
+    every = ("case", "solver", "tolerance")
+
+    def of_point(name: str, unit: str, text: str, read: Callable[[Point], float | str]) -> Variable:
+        return Variable(name, every, lambda case, solver, rtol: read(case.points[solver, rtol]), unit, text)
+
     yield Variable("tolerance", ("tolerance",), float, "1", "relative tolerance asked for")
-    yield Variable("case_name", ("case",), lambda case: case.subject.case.name, "1", "name of the case")
+    yield Variable("case_name", ("case",), lambda case: case.name, "1", "name of the case")
     yield Variable("solver_name", ("solver",), str, "1", "name of the solver")
     yield Variable("variable_name", ("variable",), str, "1", "name of the compared variable")
     yield Variable("title", ("case",), lambda case: case.subject.case.title, "1", "title of the case")
     yield Variable("case_text", ("case",), lambda case: case.subject.case.text, "1", "the case itself")
     yield Variable("reference", ("case",), lambda case: case.reference, "1", "what the runs are held against")
-    compile_seconds, text = (
-        (lambda case: case.subject.model.compile_seconds),
-        "time to compile the equations of the case",
-    )
-    yield Variable("compile_seconds", ("case",), compile_seconds, "s", text)
+    text = "time to compile the equations of the case"
+    yield Variable("compile_seconds", ("case",), lambda case: case.subject.model.compile_seconds, "s", text)
     for kind, text in MEANING.items():
-        known, text = partial(_uncertainty, kind=kind), f"uncertainty of the reference: {text}"
+        known, text = partial(Compared.uncertainty, kind=kind), f"uncertainty of the reference: {text}"
         yield Variable(f"uncertainty_{kind}", ("case",), known, "1", text)
-    cells: list[tuple[str, Callable[[Point], float | str], str, str]] = [
-        ("status", lambda point: point.outcome, "1", "finished, stopped, failed or omitted"),
-        ("reason", lambda point: point.reason, "1", "why the run ended, failed or was left out"),
-        *((f"error_{kind}", partial(_error, kind=kind), "1", text) for kind, text in MEANING.items()),
-        ("energy_error", lambda p: p.energy, "1", "largest energy residual relative to the energy exchanged"),
-        ("run_seconds", lambda p: min(p.seconds, default=math.nan), "s", "least run time"),
-        ("run_seconds_median", lambda p: median(p.seconds or [math.nan]), "s", "median run time"),
-        ("run_seconds_max", lambda p: max(p.seconds, default=math.nan), "s", "longest run time"),
-        ("stepping_seconds", _stepping, "s", "least time inside the library's own steps"),
-        ("repetitions", lambda p: float(len(p.seconds)), "1", "number of timed runs"),
-    ]
-    every = ("case", "solver", "tolerance")
-    for name, read, unit, text in cells:
-        yield Variable(name, every, lambda case, s, rtol, read=read: read(case.points[s, rtol]), unit, text)
+    yield of_point("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome)
+    yield of_point("reason", "1", "why the run ended, failed or was left out", lambda p: p.reason)
+    for kind, text in MEANING.items():
+        yield of_point(f"error_{kind}", "1", text, partial(Point.error, kind=kind))
+    yield of_point("energy_error", "1", "largest energy residual relative to the energy exchanged", lambda p: p.energy)
+    yield of_point("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan))
+    yield of_point("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan]))
+    yield of_point("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan))
+    yield of_point("stepping_seconds", "s", "least time inside the library's own steps", Point.least_stepping)
+    yield of_point("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds)))
     for name, text in COUNTS.items():
-        count = partial(lambda case, s, rtol, name: case.points[s, rtol].count(name, s), name=name)
-        yield Variable(f"count_{name}", every, count, "1", text)
+        yield of_point(f"count_{name}", "1", text, partial(Point.count, name=name))
     for kind in KINDS:
-        each = partial(lambda case, s, rtol, name, kind: _error(case.points[s, rtol], kind, name), kind=kind)
+        each = partial(lambda case, s, rtol, name, kind: case.points[s, rtol].error(kind, name), kind=kind)
         yield Variable(f"variable_error_{kind}", (*every, "variable"), each, "1", f"{MEANING[kind]} of each variable")
-
-
-def _uncertainty(case: Compared, kind: str) -> float:
-    return case.truth.uncertainty.worst(kind) if case.truth else math.nan
-
-
-def _error(point: Point, kind: str, variable: str = "") -> float:
-    if point.errors is None:
-        return math.nan
-    return point.errors.by_kind[kind].get(variable, math.nan) if variable else point.errors.worst(kind)
-
-
-def _stepping(point: Point) -> float:
-    """Least time inside a library's own steps; not a number for a method that does outputs and events itself."""
-    return min(point.stepping, default=math.nan)
 
 
 # -- the report --------------------------------------------------------------------------------------------------------
@@ -246,59 +252,50 @@ def _sections(compared: Sequence[Compared]) -> Iterator[Section]:
     for case in compared:
         yield _of_case(case)
         rows = [
-            (solver, f"{rtol:.0e}", name, *(f"{point.errors.by_kind[kind][name]:.1e}" for kind in KINDS))
-            for (solver, rtol), point in case.points.items()
-            if point.errors
+            (p.solver, f"{p.value:.0e}", name, *(f"{p.error(kind, name):.1e}" for kind in KINDS))
+            for p in case.points.values()
+            if p.errors
             for name in case.variables
         ]
         heading = ("solver", "rtol", "variable", "final", "max", "L2")
         table = Table(heading, rows, "; ".join(MEANING[kind] for kind in KINDS))
-        yield Section(f"{case.subject.case.name}, variable by variable", tables=[table], details=True)
+        yield Section(f"{case.name}, variable by variable", tables=[table], details=True)
     yield Section("How it was measured", METHOD.split("\n\n"), details=True)
     for case in compared:
-        yield Section(f"Case {case.subject.case.name}", [case.subject.case.text], details=True)
+        yield Section(f"Case {case.name}", [case.subject.case.text], details=True)
 
 
 def _of_case(case: Compared) -> Section:
     lines = [f"reference  {case.reference}"]
     if case.truth:
-        uncertain = {kind: case.truth.uncertainty.worst(kind) for kind in KINDS}
-        uncertain |= {"events": case.truth.uncertainty.worst("event")} if case.truth.events else {}
+        uncertain = {kind: case.uncertainty(kind) for kind in KINDS}
+        uncertain |= {"events": case.uncertainty("event")} if case.truth.events else {}
         lines.append(f"uncertain  {', '.join(f'{kind} {error:.1e}' for kind, error in uncertain.items())}")
     lines.append(f"variables  {', '.join(case.variables)}")
     lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
-    points = {key: point for key, point in case.points.items() if point.outcome != "omitted"}
-    failures = [(s, f"{rtol:.0e}", p.reason) for (s, rtol), p in points.items() if p.outcome == "failed"]
-    rows = [_row(solver, rtol, point, case.truth) for (solver, rtol), point in points.items()]
-    marked = [i for i, point in enumerate(points.values()) if point.outcome == "failed"]
-    tables = [Table(HEADING, rows, marked=marked), *([Table(("failed", "rtol", "why"), failures)] if failures else [])]
-    return Section(f"{case.subject.case.name}: {case.subject.case.title}", lines, tables)
+    points = [point for point in case.points.values() if point.outcome != "omitted"]
+    marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
+    tables = [Table(HEADING, [_row(point, case) for point in points], marked=marked)]
+    failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
+    tables += [Table(("failed", "rtol", "why"), failures)] if failures else []
+    return Section(f"{case.name}: {case.subject.case.title}", lines, tables)
 
 
-def _row(solver: str, rtol: float, point: Point, truth: Truth | None) -> list[str]:
+def _row(point: Point, case: Compared) -> list[str]:
     """A line of the table: errors, of which those below the uncertainty of the reference say no more than that."""
     seconds = [f(point.seconds or [math.nan]) for f in (min, median, max)]
-    times = ["" if math.isnan(t) else duration(t) for t in (*seconds, _stepping(point))]
-    counts = ["" if math.isnan(n) else f"{n:.0f}" for n in (point.count(name, solver) for name in COUNTS)]
+    times = ["" if math.isnan(t) else duration(t) for t in (*seconds, point.least_stepping())]
+    counts = ["" if math.isnan(n) else f"{n:.0f}" for n in map(point.count, COUNTS)]
     errors = ["failed", "", "", "", ""]
     if point.outcome != "failed":
-        errors = []
-        for kind in MEANING:
-            error, limit = _error(point, kind), truth.uncertainty.worst(kind) if truth else math.nan
-            errors.append("" if math.isnan(error) else f"<{limit:.1e}" if error < limit else f"{error:.1e}")
+        pairs = [(point.error(kind), case.uncertainty(kind)) for kind in MEANING]
+        errors = ["" if math.isnan(e) else f"<{limit:.1e}" if e < limit else f"{e:.1e}" for e, limit in pairs]
         errors.append(f"{point.energy:.1e}")
-    return [solver, f"{rtol:.0e}", *errors, *times, *counts]
+    return [point.solver, f"{point.value:.0e}", *errors, *times, *counts]
 
 
 def _omissions(compared: Sequence[Compared]) -> Iterator[str]:
     """Solvers that cannot run a case, and cases without a reference."""
-    left_out = [
-        f"{case.subject.case.name}: {solver}: {point.reason}"
-        for case in compared
-        for (solver, _), point in case.points.items()
-        if point.outcome == "omitted"
-    ]
-    yield from dict.fromkeys(left_out)
-    for case in compared:
-        if case.truth is None:
-            yield f"{case.subject.case.name}: no errors: {case.reference}"
+    points = [(case, point) for case in compared for point in case.points.values() if point.outcome == "omitted"]
+    yield from dict.fromkeys(f"{case.name}: {point.solver}: {point.reason}" for case, point in points)
+    yield from (f"{case.name}: no errors: {case.reference}" for case in compared if case.truth is None)

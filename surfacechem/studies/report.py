@@ -22,6 +22,7 @@ from __future__ import annotations
 import os
 import platform
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -142,8 +143,8 @@ class Study:
 
     kind: str
     title: str
-    command: str
-    """The command line that makes the study again."""
+    arguments: Sequence[str]
+    """Those of the command line."""
     axes: Mapping[str, Sequence[Any]]
     """What lies along each dimension."""
     variables: Sequence[Variable]
@@ -159,6 +160,11 @@ class Study:
     def __repr__(self) -> str:
         """Size in a line."""
         return f"<Study of {self.kind}: {', '.join(f'{name} {len(items)}' for name, items in self.axes.items())}>"
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the study again."""
+        return shlex.join(["surfacechem", self.kind, *self.arguments])
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:

@@ -29,7 +29,7 @@ from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.condition import condition, least
 from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, filled
-from surfacechem.studies.regimes import Exact, Problem, Refused, Regime, Stops, chosen
+from surfacechem.studies.regimes import Exact, Expectation, Problem, Refused, Regime, Stops, chosen
 from surfacechem.studies.report import Section, Study, Table, Variable
 
 log = logging.getLogger(__name__)
@@ -58,8 +58,6 @@ POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
 
 BADNESS = {FAILED: MOST, WRONG: 2 * MOST}
 """A failure counts as worse than any error, a wrong answer as worse than a failure."""
-
-TITLE = "Stability of the solvers in dangerous regimes"
 
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "
@@ -144,14 +142,14 @@ def stability(
         log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
         rows.append(Row(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
-    options = [f"--solvers {','.join(solvers)}"] if tuple(solvers) != SOLVERS else []
-    options += [f"--rtol {rtol:g}"] if rtol != RTOL else []
+    options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
+    options += ["--rtol", f"{rtol:g}"] if rtol != RTOL else []
     options += ["--quick"] if quick else []
-    options += [f"--search {rounds}"] if rounds != ROUNDS else []
+    options += ["--search", str(rounds)] if rounds != ROUNDS else []
     return Study(
         kind="stability",
-        title=TITLE,
-        command=" ".join(["surfacechem stability", *regimes, *options]),
+        title="Stability of the solvers in dangerous regimes",
+        arguments=[*regimes, *options],
         axes={"regime": rows, "decade": range(max(len(row.values) for row in rows)), "solver": solvers},
         variables=list(_variables(solvers[0])),
         coordinates=("regime", "decade", "solver"),
@@ -174,8 +172,8 @@ def prepared(problem: Problem, rtol: float = RTOL) -> Callable[[str], Attempt]:
     try:
         model = Model(read(problem).system())
     except InputError as error:
-        refusal = _judged(problem, rtol, math.nan, error)
-        return lambda name: refusal
+        refused = error
+        return lambda name: _judged(problem, rtol, math.nan, refused)
     known = condition(problem, [state.name for state in model.system.states])
     times = (0.0, *problem.times) if problem.times[0] else tuple(problem.times)
     run = Run(times=times, rtol=rtol, max_steps=STEPS)
@@ -202,28 +200,27 @@ def _judged(problem: Problem, rtol: float, known: float, done: Trajectory | Exce
         reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
         right = isinstance(expected, Refused) and expected.reason in reason
         return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
-    outcome, digits, reason = WRONG, 0.0, done.reason
-    if done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
-        outcome = FAILED
-    elif isinstance(expected, Stops) and done.status == "stopped" and expected.reason in reason:
-        outcome, digits = REFUSED, digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0))
-    elif isinstance(expected, Exact) and expected.events not in (None, len(done.jumps)):
-        reason = f"{len(done.jumps)} events, not {expected.events}"
-    elif isinstance(expected, Exact):
-        error, reason = _largest_error(expected, done)
-        outcome, digits = SOLVED, digits_of(error)
+    outcome, digits, reason = _outcome(expected, done)
     if outcome in (SOLVED, REFUSED) and digits < LEAST:
         outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
     return Attempt(outcome, reason, digits, known)
 
 
-def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
-    """The largest relative error of the expected values, and where it is."""
+def _outcome(expected: Expectation, done: Trajectory) -> tuple[str, float, str]:
+    """Outcome, digits and reason of a run that was begun."""
+    if done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
+        return FAILED, 0.0, done.reason
+    if isinstance(expected, Stops) and done.status == "stopped" and expected.reason in done.reason:
+        return REFUSED, digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0)), done.reason
+    if not isinstance(expected, Exact):
+        return WRONG, 0.0, done.reason
+    if expected.events not in (None, len(done.jumps)):
+        return WRONG, 0.0, f"{len(done.jumps)} events, not {expected.events}"
     known = {*expected.also, *(state.name for state in done.model.system.states)}
     exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in known}
     errors = largest_errors(computed(done), exact, lambda name: least(exact[name]))
     worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
-    return errors[worst], f"in {worst}"
+    return SOLVED, digits_of(errors[worst]), f"in {worst}"
 
 
 def digits_of(error: float) -> float:
@@ -323,33 +320,38 @@ def _variables(first: str) -> Iterator[Variable]:
 def _sections(rows: Sequence[Row], corners: Sequence[Corner], solvers: Sequence[str], rtol: float) -> Iterator[Section]:
     """The report; the terminal shows the summary and the corners."""
     headings = ("condition", "possible", f"at rtol {rtol:g}")
-
-    def condition_texts(number: float) -> tuple[str, ...]:
-        left = (digits_left(number, change) for change in (EPSILON, rtol))
-        return (f"{number:.0e}", *(f"{digits:.1f}" for digits in left)) if math.isfinite(number) else ("", "", "")
-
-    lines, details = [], []
+    lines = []
     for regime, values, cells in rows:
         known = [cells[solvers[0], value].condition for value in values]
         worst = max((number for number in known if math.isfinite(number)), default=math.nan)
         span = f"{regime.symbol}: {regime.label(values[0])} .. {regime.label(values[-1])}"
         kept = [_kept([cells[solver, value] for value in values]) for solver in solvers]
-        lines.append((regime.name, span, *condition_texts(worst), *kept))
-        table = []
-        for value in values:
-            first, *_ = found = [cells[solver, value] for solver in solvers]
-            texts = (regime.label(value), *condition_texts(first.condition), *(cell.text for cell in found))
-            table.append((*texts, str(first.cost.steps), first.reason))
-        marked = [i for i, v in enumerate(values) if any(cells[solver, v].outcome in NO_ANSWER for solver in solvers)]
-        of_first = (f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
-        details.append(Table((regime.symbol, *headings, *solvers, *of_first), table, regime.title, marked))
+        lines.append((regime.name, span, *_condition_texts(worst, rtol), *kept))
     caption = f"Least digits kept over all values, at rtol {rtol:g}, and the largest condition number"
     summary = Table(("regime", "from .. to", *headings, *solvers), lines, caption)
     yield Section("Digits kept", [MEANING], [summary], figure=True)
     if corners:
         heading, caption = ("regime", "points", "not solved", "worst", "where"), "Worst corners that a search has found"
         yield Section("Corners", tables=[Table(heading, [corner.texts for corner in corners], caption)])
-    yield Section("Every cell", tables=details, details=True)
+    yield Section("Every cell", tables=[_details(row, [*headings, *solvers], rtol) for row in rows], details=True)
+
+
+def _details(row: Row, headings: Sequence[str], rtol: float) -> Table:
+    """Every cell of a regime, with what was said of the first solver's."""
+    lines, marked = [], []
+    for i, value in enumerate(row.values):
+        first, *_ = cells = [cell for cell in row.cells.values() if cell.value == value]
+        texts = (row.regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in cells))
+        lines.append((*texts, str(first.cost.steps), first.reason))
+        marked += [i] if any(cell.outcome in NO_ANSWER for cell in cells) else []
+    of_first = (f"steps of {first.solver}", f"{first.solver}: where, or why")
+    return Table((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
+
+
+def _condition_texts(number: float, rtol: float) -> Sequence[str]:
+    """A condition number, the digits that are possible, and those that it leaves at the tolerance."""
+    left = (f"{digits_left(number, change):.1f}" for change in (EPSILON, rtol))
+    return (f"{number:.0e}", *left) if math.isfinite(number) else ("", "", "")
 
 
 def _kept(cells: Sequence[Attempt]) -> str:

@@ -8,7 +8,6 @@ import xarray
 from typer.testing import CliRunner
 
 from surfacechem.cli.main import app
-from surfacechem.errors import InputError
 from surfacechem.runs.report import run_summary
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve import names
@@ -22,7 +21,6 @@ from surfacechem.studies.stability import (
     SOLVED,
     WRONG,
     digits_left,
-    digits_of,
     few,
     prepared,
     read,
@@ -168,11 +166,6 @@ def test_an_answer_without_digits_to_a_problem_that_leaves_some_is_wrong():
     assert prepared(replace(problem, expected=away))("radau").outcome == WRONG
 
 
-def test_digits():
-    assert digits_of(float("nan")) == 0.0
-    assert digits_of(1e-20) == 16.0
-
-
 @pytest.fixture(scope="module")
 def study():
     return stability("seconds", "ignition", solvers=("radau", "ida"), quick=True, rounds=0)
@@ -276,8 +269,3 @@ def test_the_command_writes_its_report(tmp_path, monkeypatch):
 def test_a_regime_without_a_space_cannot_be_searched():
     with pytest.raises(NotImplementedError, match="film has no space to search"):
         regimes()["film"].corner({})
-
-
-def test_no_regime_of_that_name():
-    with pytest.raises(InputError, match="no regime 'x'"):
-        stability("x")
