@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from surfacechem.references.base import Array, Parameters, Reference, SceneView
 
 
 class EnergyModel(ABC):
-    """How energy and entropy of a capacity `C` depend on temperature; both are zero at `T_0`."""
+    """Energy and entropy of a capacity `C` as functions of temperature; both are zero at `T_0`."""
 
     @abstractmethod
     def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
@@ -66,6 +67,10 @@ class PerfectContact(Reference):
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface at T_0", default=0.0, at_least=0)
     T_0: float = parameter("K", "reference temperature", above=0)
 
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {name: scene.constant(name) for name in ("C_1", "C_2", "C_c", "T_0")}
+
     @property
     def C(self) -> float:
         """Total heat capacity at T_0."""
@@ -76,14 +81,29 @@ class PerfectContact(Reference):
         return Fraction(self.C_1) + Fraction(self.C_2) + Fraction(self.C_c)
 
 
-class FrictionallyHeated(Reference):
-    """A total capacity and the dissipation it would see at the reference temperature."""
+class UniformBody(Reference):
+    """Bodies and interface at one temperature; quadratic energies, if a subclass has no other model."""
+
+    model: ClassVar[EnergyModel] = QuadraticEnergy()
 
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {"C": scene.capacity, "T_0": scene.constant("T_0"), "T_i": scene.temperature}
+
+    def heated(self, heat: Array) -> Array:
+        """Temperature [K] after a supply of heat [J/m^2]."""
+        return self.T_i + self.model.rise(heat, self.C, self.T_0, self.T_i)
+
+
+class FrictionallyHeated(UniformBody):
+    """A body and the dissipation it would see at the reference temperature."""
+
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**scene.uniform_body, "D_0": scene.heating_at_T_0}
+        return {**super().from_scene(scene), "D_0": scene.heating_at_T_0}

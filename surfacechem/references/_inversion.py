@@ -17,7 +17,11 @@ ITERATIONS = 400
 """At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
 
 POINTS = 18
+"""Gauss points of a panel: a singularity a panel's length away leaves an error of 5.8^-36 = 3e-28."""
+
 HALVINGS = 800
+"""Panels towards each end: the smallest is 2^-801 of the path."""
+
 SOON = 1e-300
 """Times [s] below this count as zero."""
 
@@ -35,7 +39,7 @@ def increasing_root(
     high: Array,
     start: Array | None = None,
 ) -> Array:
-    """Where `function`, which gives value and slope and increases on [low, high], reaches `target`.
+    """Arguments at which `function`, which gives value and slope and increases on [low, high], reaches `target`.
 
     Newton's method, kept inside a shrinking bracket.
 

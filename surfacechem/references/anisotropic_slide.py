@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._bodies import UniformBody
+from surfacechem.references.base import Array, Parameters, SceneView
 
 NEWTON = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""
@@ -19,7 +19,7 @@ NEWTON = 100
 DIGITS = 4e-16
 
 
-class AnisotropicSlide(Reference):
+class AnisotropicSlide(UniformBody):
     r"""A free mass slides on dry friction with a coefficient along each axis, and turns towards the smoother one.
 
     .. math:: \frac{v_2}{v_{2i}} = \Big(\frac v{v_i}\Big)^r, \quad r = \frac{\mu_2}{\mu_1} \ge 1, \quad
@@ -46,9 +46,6 @@ class AnisotropicSlide(Reference):
     p: float = parameter("Pa", "contact pressure", above=0)
     v_i: float = parameter("m/s", "initial velocity", above=0)
     v_2_i: float = parameter("m/s", "initial velocity across it")
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -57,7 +54,7 @@ class AnisotropicSlide(Reference):
             **{name: scene.friction(name) for name in ("mu_1", "mu_2")},
             **{f"{name}_i": scene.initial(name) for name in ("v", "v_2")},
             "p": scene.initial("p"),
-            **scene.uniform_body,
+            **super().from_scene(scene),
         }
 
     @cached_property
@@ -112,5 +109,5 @@ class AnisotropicSlide(Reference):
             "u_t": path * self.v_i**2 / self.deceleration,
             "u_t2": across * self.v_i * self.v_2_i / self.deceleration,
             "heat": heat,
-            "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
+            "T": self.heated(heat),
         }

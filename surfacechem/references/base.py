@@ -1,4 +1,4 @@
-r"""What every exact solution is: parameters in SI, and exact values of named quantities at any time.
+r"""Exact solutions: parameters in SI, and exact values of named quantities at any time.
 
 A reference is one frozen dataclass, or a family of them that share a formula, in a file of its own. The file carries
 the name that the family has in common, so that asking for one reference imports one file; to add one, add its file.
@@ -32,7 +32,7 @@ class Reference(ABC):
 
     name: ClassVar[str]
     continuous: ClassVar[bool] = False
-    """Whether it solves for bodies without cells: a scene then meets it but for the error of its cells, and
+    """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:

@@ -36,7 +36,7 @@ class RelaxingBonds(PerfectContact):
     def from_scene(cls, scene: SceneView) -> Parameters:
         bonds = {name: scene.potential(name) for name in ("K_0", "K_1", "K_2")}
         start = {"T_i": scene.temperature, "phi_i": scene.initial("phi"), "tau": scene.relaxation_time}
-        return {**scene.perfect_contact, **bonds, **start, "D": scene.friction_power()}
+        return {**super().from_scene(scene), **bonds, **start, "D": scene.friction_power()}
 
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""
@@ -165,7 +165,7 @@ class ExothermicBonding(PerfectContact):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**scene.perfect_contact, "K_0": scene.potential("K_0"), "tau": scene.relaxation_time}
+        return {**super().from_scene(scene), "K_0": scene.potential("K_0"), "tau": scene.relaxation_time}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         kappa = self.K_0 / (self.T_0 * self.C)
@@ -202,7 +202,7 @@ class EndothermicBonding(PerfectContact):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**scene.perfect_contact, "K_2": scene.potential("K_2"), "tau": scene.relaxation_time}
+        return {**super().from_scene(scene), "K_2": scene.potential("K_2"), "tau": scene.relaxation_time}
 
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""

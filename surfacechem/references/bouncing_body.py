@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._bodies import UniformBody
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class BouncingBody(Reference):
+class BouncingBody(UniformBody):
     r"""A mass falls under a constant load and rebounds with a part e of its velocity; what it loses is heat.
 
     .. math:: a=-F/m,\quad V=\sqrt{v_i^2+2ag_i},\quad t_1=\frac{v_i+V}a,\quad t_{n+1}-t_n=\frac{2Ve^n}a,\quad
@@ -35,15 +35,12 @@ class BouncingBody(Reference):
     F_n: float = parameter("Pa", "load, negative where it presses", at_most=0)
     g_n_i: float = parameter("m", "initial gap", at_least=0)
     v_n_i: float = parameter("m/s", "initial opening velocity")
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         own = {name: scene.support("normal", name) for name in ("m", "e")}
         start = {"F_n": scene.initial("F_n"), "g_n_i": scene.initial("g_n"), "v_n_i": scene.initial("v_n")}
-        return {**own, **start, **scene.uniform_body}
+        return {**own, **start, **super().from_scene(scene)}
 
     @property
     def _fall(self) -> float:
@@ -68,7 +65,7 @@ class BouncingBody(Reference):
         return self.first + 2 * self._speed / self._fall * self.e / (1 - self.e)
 
     def _rebounds(self, t: Array) -> Array:
-        """How often it has hit by the times, before it rests."""
+        """Number of impacts by the times, before it rests."""
         if not self._fall or self.e == 0:
             return np.where(t < self.first, 0.0, 1.0)
         flights = np.maximum((t - self.first) * self._fall / (2 * self._speed), 0.0)
@@ -96,5 +93,5 @@ class BouncingBody(Reference):
             "g_n": np.where(rests, 0.0, g),
             "v_n": np.where(rests, 0.0, v - self._fall * tau),
             "released": heat,
-            "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
+            "T": self.heated(heat),
         }

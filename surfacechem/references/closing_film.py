@@ -8,10 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._bodies import UniformBody
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class ClosingFilm(Reference):
+class ClosingFilm(UniformBody):
     r"""Heating by a viscous film whose gap closes linearly: it grows like a logarithm.
 
     .. math:: g_n=g_i-at,\qquad T^2=T_i^2+\frac{2T_0\eta v^2}{Ca}\ln\frac{g_i}{g_n}
@@ -32,15 +33,12 @@ class ClosingFilm(Reference):
     v: float = parameter("m/s", "sliding velocity")
     g_i: float = parameter("m", "initial gap", above=0)
     a: float = parameter("m/s", "closing speed", above=0)
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         opening = scene.ramp("g_n")
         film = {"eta": scene.friction("eta"), "v": scene.initial("v"), "g_i": scene.initial("g_n")}
-        return {**film, "a": None if opening is None else -opening, **scene.uniform_body}
+        return {**film, "a": None if opening is None else -opening, **super().from_scene(scene)}
 
     @property
     def end_time(self) -> float:

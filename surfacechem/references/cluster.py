@@ -175,7 +175,7 @@ class RebindingCluster(Cluster):
 
     @property
     def breaks(self) -> bool:
-        """Whether the cluster goes to rupture, not to its steady state."""
+        """True if the cluster goes to rupture, not to its steady state."""
         below = self.phi_i < self.critical_state and bool(
             self._critical.rate(self.phi_i - self.critical_state, self.phi_i) > 0.0
         )

@@ -181,7 +181,7 @@ def _of_body(scene: SceneView, k: int) -> dict[str, float | None]:
 
 
 def _strange(scene: Scene) -> Iterator[str]:
-    """What the scene has beside conduction, in words."""
+    """The contents of a scene beside conduction, in words."""
     interface = scene.interface
     if interface.potentials or interface.frictions or interface.reactions or interface.limits or interface.variables:
         yield "the interface has laws of its own"

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._bodies import UniformBody
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class CoulombStop(Reference):
+class CoulombStop(UniformBody):
     r"""A free mass slides against constant dry friction until it rests; all kinetic energy becomes heat.
 
     .. math:: v=v_i-\mu p\,t/m\ge0,\quad t_{stop}=\frac{mv_i}{\mu p},\quad s_{stop}=\frac{mv_i^2}{2\mu p},\quad
@@ -33,14 +33,11 @@ class CoulombStop(Reference):
     mu: float = parameter("1", "sliding friction coefficient", above=0)
     p: float = parameter("Pa", "contact pressure", above=0)
     v_i: float = parameter("m/s", "initial velocity", at_least=0)
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         own = {"m": scene.support("tangential", "m"), "mu": scene.friction("mu")}
-        return {**own, "p": scene.initial("p"), "v_i": scene.initial("v"), **scene.uniform_body}
+        return {**own, "p": scene.initial("p"), "v_i": scene.initial("v"), **super().from_scene(scene)}
 
     @property
     def stop_time(self) -> float:
@@ -61,5 +58,5 @@ class CoulombStop(Reference):
             "v": v,
             "u_t": slip,
             "heat": heat,
-            "T": self.T_i + QuadraticEnergy().rise(heat, self.C, self.T_0, self.T_i),
+            "T": self.heated(heat),
         }

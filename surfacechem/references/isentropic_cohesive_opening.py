@@ -8,11 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
+from surfacechem.references._bodies import UniformBody
 from surfacechem.references._inversion import increasing_root
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class IsentropicCohesiveOpening(Reference):
+class IsentropicCohesiveOpening(UniformBody):
     r"""Opening of a cohesive zone that weakens with temperature, in perfect contact and without heat supply: it cools.
 
     .. math:: T^3-BT^2-a(g_n)=0,\quad a=\frac{t_{max}T_0^2}C(g_n+g_0)e^{1-g_n/g_0},\quad B=T_i-\frac{a(g_i)}{T_i^2}
@@ -32,16 +33,13 @@ class IsentropicCohesiveOpening(Reference):
 
     t_max: float = parameter("Pa", "strength at T_0", above=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
     g_dot: float = parameter("m/s", "opening speed", at_least=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
-        return {**zone, **scene.uniform_body, "g_i": scene.initial("g_n"), "g_dot": scene.ramp("g_n")}
+        return {**zone, **super().from_scene(scene), "g_i": scene.initial("g_n"), "g_dot": scene.ramp("g_n")}
 
     @property
     def open_temperature(self) -> float:

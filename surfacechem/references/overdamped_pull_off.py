@@ -17,7 +17,11 @@ GRID = 200
 """Gaps whose times give the first guess of the gap at a time."""
 
 PANEL = 0.25
+"""Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
+16 Gauss points leave 25^-32."""
+
 SERIES_LIMIT = 0.5
+"""Up to here a series of 18 terms is exact: the next is 0.5^20 19 / 20! = 7e-24."""
 
 
 class OverdampedPullOff(Reference):

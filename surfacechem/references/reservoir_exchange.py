@@ -8,12 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
+from surfacechem.references._bodies import UniformBody
 from surfacechem.references._inversion import increasing_root
 from surfacechem.references._special_functions import second_difference
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class ReservoirExchange(Reference):
+class ReservoirExchange(UniformBody):
     r"""A body with quadratic energy that relaxes to the temperature of a reservoir.
 
     .. math:: \frac C{T_0}T\dot T=q=h(T_a-T),\qquad
@@ -32,15 +33,12 @@ class ReservoirExchange(Reference):
 
     name: ClassVar[str] = "reservoir-exchange"
 
-    C: float = parameter("J/(m^2 K)", "heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "initial temperature", above=0)
     h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**scene.uniform_body, "h": scene.conductance(), "T_a": scene.surroundings_temperature}
+        return {**super().from_scene(scene), "h": scene.conductance(), "T_a": scene.surroundings_temperature}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         scaled = self.h * self.T_0 / (self.C * self.T_a) * t

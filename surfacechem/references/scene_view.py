@@ -1,4 +1,4 @@
-"""What a scene and the start of its run tell to exact solutions, which read their parameters from it."""
+"""A view of a scene and of the start of its run, from which exact solutions read their parameters."""
 
 from __future__ import annotations
 
@@ -96,16 +96,6 @@ class SceneView:
         return self._outputs[names[0]] if names else None
 
     @property
-    def uniform_body(self) -> dict[str, float | None]:
-        """Capacity, reference and initial temperature of bodies that share one temperature."""
-        return {"C": self.capacity, "T_0": self.constant("T_0"), "T_i": self.temperature}
-
-    @property
-    def perfect_contact(self) -> dict[str, float | None]:
-        """The capacities that share one temperature, and the reference temperature."""
-        return {name: self.constant(name) for name in ("C_1", "C_2", "C_c", "T_0")}
-
-    @property
     def adiabatic_rise(self) -> float | None:
         """Temperature rise [K] by the heat of all bonds; none in reservoirs."""
         heat = self.potential("H_r")
@@ -137,14 +127,13 @@ class SceneView:
         """Power of all friction [W/m^2], at the start or with every temperature set to one value."""
         names = [account.quantity.name for account in self.run.model.system.ledger]
         laws = [name[2:] for name in names if name.startswith("W_") and f"heat_{name[2:]}" in names]
-        values = self._outputs if temperature is None else self._at(temperature)
+        values = self._outputs
+        if temperature is not None:
+            result = self.run.result
+            y = np.array([[value if name == "phi" else temperature for name, value in self._states.items()]])
+            at = self.run.model.evaluate(result, result.times[:1], y, np.zeros_like(y))[0]
+            values = dict(zip(values, at, strict=True))
         return float(sum(values[f"D_{law}"] for law in laws))
-
-    def _at(self, temperature: float) -> dict[str, float]:
-        model, result = self.run.model, self.run.result
-        y = np.array([[value if name == "phi" else temperature for name, value in self._states.items()]])
-        values = model.evaluate(result, result.times[:1], y, np.zeros_like(y))[0]
-        return dict(zip((item.name for item in model.system.outputs), values, strict=True))
 
     @property
     def heat_supply(self) -> float:

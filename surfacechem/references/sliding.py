@@ -33,7 +33,7 @@ class Sliding(PerfectContact):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**scene.perfect_contact, "T_i": scene.temperature, "D": scene.friction_power()}
+        return {**super().from_scene(scene), "T_i": scene.temperature, "D": scene.friction_power()}
 
     def quantities(self, t: Array) -> Mapping[str, Array | float]:
         rise = self.model.rise(self.D * t, self.C, self.T_0, self.T_i)

@@ -18,6 +18,7 @@ from surfacechem.references.stick_slip import Slip
 from surfacechem.references.stick_slip_debonding import BondedSlider
 
 CYCLES = 1_000_000
+"""Cycles at most, so that a time far beyond them is refused and not waited for."""
 
 
 @dataclass(frozen=True)

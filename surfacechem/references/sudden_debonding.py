@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import ConstantCapacity, EnergyModel, QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._bodies import ConstantCapacity, EnergyModel, UniformBody
+from surfacechem.references.base import Array, Parameters, SceneView
 
 
-class SuddenDebonding(Reference):
+class SuddenDebonding(UniformBody):
     r"""Temperature after sudden debonding under a traction, quadratic energies, uniform temperature, and its verdict.
 
     .. math:: \frac C{2T_0}(T_f^2-T_i^2)=E:=\frac{t_n^2}2\Big(\frac1k+\frac1{E_n}\Big)-\frac{K_0}2\phi_i(2-\phi_i)
@@ -32,11 +32,7 @@ class SuddenDebonding(Reference):
     """
 
     name: ClassVar[str] = "sudden-debonding"
-    model: ClassVar[EnergyModel] = QuadraticEnergy()
 
-    C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
-    T_0: float = parameter("K", "reference temperature", above=0)
-    T_i: float = parameter("K", "temperature before", above=0)
     K_0: float = parameter("J/m^2", "bond energy density")
     phi_i: float = parameter("1", "bonding state before", default=1.0, at_least=0, at_most=1)
     t_n: float = parameter("Pa", "traction before")
@@ -47,7 +43,7 @@ class SuddenDebonding(Reference):
     def from_scene(cls, scene: SceneView) -> Parameters:
         loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.limit("t_max")
         bonds = {"K_0": scene.potential("K_0"), "phi_i": scene.initial("phi")}
-        return {**scene.uniform_body, **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
+        return {**super().from_scene(scene), **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
 
     @property
     def released_energy(self) -> float:
@@ -59,7 +55,7 @@ class SuddenDebonding(Reference):
         """Temperature [K] after; nan if there is none."""
         if self.verdict == "impossible":
             return math.nan
-        return self.T_i + float(self.model.rise(np.array(self.released_energy), self.C, self.T_0, self.T_i))
+        return float(self.heated(np.array(self.released_energy)))
 
     @property
     def entropy_change(self) -> float:

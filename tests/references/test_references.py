@@ -1,6 +1,5 @@
 """Every exact solution against every row of its table (30 digits, from an independent calculation)."""
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tables
+from tables_mechanics import columns, expected, parameters
 
 from surfacechem.errors import InputError
 from surfacechem.quantities import BOLTZMANN
@@ -27,15 +27,7 @@ class Table:
 
 
 def table(name: str) -> Table:
-    content = json.loads((FOLDER / f"{name}.json").read_text())
-    columns = {}
-    for column, entries in zip(content["columns"], zip(*content["rows"], strict=True), strict=True):
-        try:
-            columns[column] = np.array(entries, dtype=float)
-        except ValueError:
-            columns[column] = np.array(entries)
-    numbers = {key: float(value) for key, value in content["parameters"].items()}
-    return Table(numbers, columns, {key: float(value) for key, value in content["expect"].items()})
+    return Table(parameters(name), columns(name), expected(name))
 
 
 def assert_exact(actual, exact, *, relative=RELATIVE, absolute=0.0):

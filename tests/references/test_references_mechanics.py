@@ -1,19 +1,18 @@
 """The exact solutions of mechanics against every row of their tables, their own equations, and extreme parameters."""
 
-import json
 import math
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
+import tables_mechanics as tables
+from tables_mechanics import rows
 from test_references import assert_exact, effect_of_rounding
 
 from surfacechem.errors import InputError
 from surfacechem.references import get
 from surfacechem.references._bodies import ConstantCapacity, QuadraticEnergy
 
-FOLDER = Path(__file__).parent
 EPS = np.finfo(float).eps
 FRICTION = {"m": 10.0, "k": 1e8, "t_s": 6e4, "t_k": 4e4}
 REBONDING = {"m": 10.0, "k": 1e8, "p": 1e5, "mu_b": 0.7, "mu_ub": 0.4, "mu_k": 0.4, "tau": 2.0}
@@ -21,20 +20,8 @@ ZONE = {"t_max": 1e6, "g_0": 1e-8}
 
 
 def read(name: str) -> tuple[dict[str, np.ndarray], dict[str, float]]:
-    """Columns of a table, those of words as words, and its scalars."""
-    content = json.loads((FOLDER / f"{name}.json").read_text())
-    columns = {}
-    for column, entries in zip(content["columns"], zip(*content["rows"], strict=True), strict=True):
-        try:
-            columns[column] = np.array(entries, dtype=float)
-        except ValueError:
-            columns[column] = np.array(entries)
-    return columns, {key: float(value) for key, value in content["expect"].items()}
-
-
-def rows(name: str) -> list[dict[str, float | str]]:
-    columns, _ = read(name)
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    """Columns of a table and its scalars."""
+    return tables.columns(name), tables.expected(name)
 
 
 class TestFriction:

@@ -183,13 +183,13 @@ def assert_no_false_error(name):
     model, reference = simulation.model, simulation.case.reference
     if reference is None:
         return
-    run, values = replace(simulation.case.run, solver="radau", rtol=1e-9), model.values()
+    run, values = replace(simulation.case.run, solver="radau", rtol=1e-11), model.values()
     for path in model.system.changeable:
         for value in [1.1 * values[path], 1.001 * values[path]] if values[path] else [1e-2, 1e-4, 1e-6, 1e-8, 1e-10]:
             with suppress(InputError):
                 trajectory = model.solve(run, {path: value})
                 found = against_exact(trajectory, simulation.case.scene, reference.name, reference.options)
-                assert found.error < 1e-5, (path, value, found.variables)
+                assert found.error < 1e-6, (path, value, found.variables)
 
 
 @pytest.mark.parametrize("name", TOLD)

@@ -1,0 +1,43 @@
+"""What exact solutions read from scenes: none takes the scene of another for its own."""
+
+from contextlib import suppress
+
+import pytest
+from case_runs import load, solved
+
+from surfacechem import format as cases
+from surfacechem import references
+from surfacechem.errors import InputError
+from surfacechem.references.base import SceneView
+from surfacechem.results.achieved import against_exact
+
+CELLS = ("sudden-contact", "epoxy-cure-thick")
+"""Cases whose cells have an error of their own."""
+
+
+@pytest.mark.parametrize("name", [name for name in cases.names() if name not in CELLS])
+def test_no_exact_solution_claims_a_case_that_it_does_not_solve(name):
+    """Every one is named for every case: it is refused, or meets the run."""
+    case, run = load(name).case, solved(name).trajectory
+    for other in references.names():
+        with suppress(InputError):
+            assert against_exact(run, case.scene, other, {}).error < 1e-6, other
+
+
+@pytest.mark.parametrize(
+    ("name", "read", "value"),
+    [
+        ("compliant-debonding", lambda scene: scene.reaction("t_max"), 80e6),
+        ("compliant-debonding", lambda scene: scene.potential("t_max"), None),
+        ("viscous-heating", lambda scene: scene.friction("beta"), 0.04),  # of a factor
+        ("three-temperatures", lambda scene: scene.conductance(), 3200.0),
+        ("three-temperatures", lambda scene: scene.conductance(into=2), 700.0),
+        ("pair-exchange", lambda scene: scene.conductance(into=1), None),
+        ("stick-slip", lambda scene: scene.support("normal", "m"), None),
+        ("stick-slip", lambda scene: scene.ramp("w_t"), 1e-3),
+        ("stick-slip-rebonding", lambda scene: scene.relaxation_time, pytest.approx(2.0)),
+        ("cooling-to-zero", lambda scene: scene.heat_supply, -50.0),
+    ],
+)
+def test_what_a_scene_tells(name, read, value):
+    assert read(SceneView(load(name).case.scene, solved(name).trajectory)) == value
