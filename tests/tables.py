@@ -1,14 +1,12 @@
 """The exact tables: each file of tests/references with the scene it solves."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import scenes
 from scenes import bodies, path, perfect_contact, varying
+from tables_mechanics import FOLDER, columns, parameters
 
 from surfacechem.laws.bonding import BondEnergy, LinearEnthalpy
 from surfacechem.laws.bulk import Constant, Quadratic
@@ -21,8 +19,6 @@ from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.solve.run import Trajectory
-
-FOLDER = Path(__file__).parent / "references"
 
 
 @dataclass(frozen=True)
@@ -38,13 +34,9 @@ class Table:
     """Errors are relative to the exact value, or to this part of its largest; for variables that pass through zero."""
 
 
-@cache
 def read(name: str) -> tuple[dict[str, float], dict[str, np.ndarray]]:
     """Parameters and columns of a table."""
-    data = json.loads((FOLDER / f"{name}.json").read_text())
-    rows = np.array([[float(entry) for entry in row] for row in data["rows"]])
-    parameters = {key: float(value) for key, value in data["parameters"].items()}
-    return parameters, dict(zip(data["columns"], rows.T, strict=True))
+    return parameters(name), columns(name)
 
 
 def nonzero(**values: float) -> dict[str, float]:
