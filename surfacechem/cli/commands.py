@@ -172,13 +172,12 @@ def refuse_unwritable(*targets: Path) -> None:
             raise _TriedError
 
 
-def picture_kind(target: Path) -> str:
-    """The kind of picture that a file name asks for; InputError where it is none or could not be written."""
+def check_picture(target: Path) -> None:
+    """InputError where a file name asks for no kind of picture, or the file could not be written."""
     kind = target.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf"):
         raise InputError(f"no format '{kind}'.{suggestion(kind, ('png', 'svg', 'pdf'))}", Place(path=str(target)))
     refuse_unwritable(target)
-    return kind
 
 
 def listed(text: str) -> list[str]:

@@ -20,10 +20,10 @@ from surfacechem.cli.commands import (
     SolverName,
     Tolerance,
     Wanted,
+    check_picture,
     chosen,
     leave_with,
     listed,
-    picture_kind,
     refuse_unwritable,
     solved,
 )
@@ -215,22 +215,20 @@ def mechanism(
     output: Annotated[Path | None, Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
 ) -> None:
     """Print species, reactions, rates over temperature and force, and what is consistent."""
+    from surfacechem.mechanism import load_mechanism
     from surfacechem.studies import mechanism_report as report
+    from surfacechem.studies.mechanism_rates import Curves
 
     temperatures = report.span(temperature, "K", "--temperature", above=0.0)
     forces = report.span(force, "N", "--force")
-    kind = picture_kind(output) if output else ""
-    from surfacechem.mechanism import load_mechanism
-    from surfacechem.studies.mechanism_rates import Curves
-
+    if output:
+        check_picture(output)
     curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase))
     typer.echo(report.sheet(curves, temperatures, forces))
     if output:
         from surfacechem import plots
-        from surfacechem.results.netcdf import replacing
 
-        with replacing(output) as temporary:
-            plots.save(report.figure(curves, temperatures, forces), temporary, kind)
+        plots.write(report.figure(curves, temperatures, forces), output)
         typer.echo(f"\nwritten to {output}")
 
 
@@ -248,19 +246,17 @@ def plot(
 ) -> None:
     """Plot a dataset or a case over time or one of its variables, or a sweep over its parameters."""
     from surfacechem import plots
-    from surfacechem.results.netcdf import SUFFIXES, replacing
+    from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
 
     is_file = source.endswith(SUFFIXES)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
     target = output or Path(f"{Path(source).stem}.png")
-    kind = picture_kind(target)
+    check_picture(target)
     solution = None if is_file else solved(load(source, changes or ()).run, quiet=False, brief=True)
     names = listed(variables) if variables else None
-    figure = plots.figure(solution.dataset if solution else source, names, against)
-    with replacing(target) as temporary:
-        plots.save(figure, temporary, kind)
+    plots.write(plots.figure(solution.dataset if solution else source, names, against), target)
     typer.echo(str(target))
     if solution:
         leave_with(solution.status, solution.reason)

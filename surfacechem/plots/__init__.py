@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surfacechem.errors import InputError, Place
-from surfacechem.plots.style import COLOURS, STYLE, opened, save
+from surfacechem.plots.style import COLOURS, STYLE, opened, save, write
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "STYLE", "figure", "opened", "save"]
+__all__ = ["COLOURS", "STYLE", "figure", "opened", "save", "write"]
 
 
 def figure(

@@ -45,6 +45,7 @@ NUMBERS = {
 TEXTS = {"status": POINT, **{name: (dimension,) for dimension, name in LABELS.items()}}
 """Variables that are read, with their dimensions."""
 
+# Below the last digit of a double, relative to one: an error that is exactly zero has a place on a logarithmic axis.
 SMALLEST = 1e-17
 """Errors below this are drawn as this."""
 

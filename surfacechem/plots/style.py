@@ -19,7 +19,7 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
-from surfacechem.results.netcdf import reading
+from surfacechem.results.netcdf import reading, replacing
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,12 @@ def save(plot: Figure, target: Any, kind: str) -> None:
     metadata: Mapping[str, None] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
     with matplotlib.rc_context(STYLE):
         plot.savefig(target, format=kind, dpi=160, metadata=metadata)
+
+
+def write(plot: Figure, target: Path) -> None:
+    """Save a figure in the format that the suffix of its file names; the file appears whole or not at all."""
+    with replacing(target) as temporary:
+        save(plot, temporary, target.suffix.lower().removeprefix("."))
 
 
 def opened(data: xarray.Dataset | str | Path) -> xarray.Dataset:

@@ -19,6 +19,8 @@ from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import Trajectory
 
+# Choices: a busy scheduler takes turns of milliseconds; of brief runs over 50 ms some are undisturbed, and the least
+# time counts.
 BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 """Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
 

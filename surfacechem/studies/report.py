@@ -223,8 +223,7 @@ class Study:
         files, figure = targets(path), self.figure()
         save(files[".nc"], self.columns, self.attributes)
         for suffix in (".svg", ".png"):
-            with replacing(files[suffix]) as temporary:
-                plots.save(figure, temporary, suffix.removeprefix("."))
+            plots.write(figure, files[suffix])
         with replacing(files[".html"]) as temporary:
             temporary.write_text(self.page.html(), encoding="utf-8")
         return list(files.values())

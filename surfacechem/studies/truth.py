@@ -32,9 +32,11 @@ from surfacechem.studies.grid import FAULTS
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
 
+# Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.
 METHODS = ("radau", "scipy-radau", "lsoda", "cantera")
 """Methods that a reference may be made of; the last only where it is needed."""
 
+# Closer tolerances would differ by little more than rounding, others would leave the range where errors follow them.
 DECADE = 10.0
 """Ratio of the two tolerances from which a method is extrapolated."""
 
@@ -43,6 +45,7 @@ MOST_SECONDS, LONGEST = 60.0, 900.0
 long [s]: which methods it is made of must not depend on how busy a machine is.
 """
 
+# A choice: two decades below the loosest tolerance that is usual, whose errors a reference must still tell.
 AGREE = 1e-6
 """Methods that differ by more than this do not agree."""
 

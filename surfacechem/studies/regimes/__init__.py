@@ -9,6 +9,7 @@ A class in any file of this folder is a regime; finding it needs nothing else.
 from __future__ import annotations
 
 import pkgutil
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -100,7 +101,7 @@ class Problem:
 
 
 class Regime(ABC):
-    """One row of the stability matrix. Subclasses state what they are; finding them needs nothing else."""
+    """One row of the stability matrix. Subclasses state what they are; the class gives its name."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -109,6 +110,9 @@ class Regime(ABC):
     values: ClassVar[tuple[float, ...]]
     space: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
+
+    def __init_subclass__(cls) -> None:
+        cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     @abstractmethod
     def problem(self, value: float) -> Problem:

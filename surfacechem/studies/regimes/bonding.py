@@ -32,7 +32,6 @@ class Endothermic(Regime):
     :math:`\tau(1-\kappa)/2`. With kappa = 1 nothing is left and the input is refused.
     """
 
-    name = "endothermic"
     title = "Endothermic bonding, kappa to 1"
     symbol = "1 - kappa"
     values = (*(2.0**-n for n in (1, 10, 20, 30, 40, 46, 50, 52)), 0.0)
@@ -58,7 +57,6 @@ class Endothermic(Regime):
 class ScaleRatio(Regime):
     """Bonds form within a part of the second while friction heats the bodies for a million seconds."""
 
-    name = "scale-ratio"
     title = "Bonding within a part of the sliding time"
     symbol = "sliding time / bonding time"
     values = (1e0, 1e3, 1e6, 1e9, 1e12, 1e15, 1e18)
@@ -86,7 +84,6 @@ class ScaleRatio(Regime):
 class Seconds(Regime):
     """The same reaction from attoseconds to the age of the Earth."""
 
-    name = "seconds"
     title = "Exothermic bonding in 1e-15 to 1e15 s"
     symbol = "tau [s]"
     values = tuple(10.0**k for k in (-15, -10, -5, 0, 5, 10, 15))
@@ -100,7 +97,6 @@ class Seconds(Regime):
 class Affinity(Regime):
     r"""The exponential law from equilibrium to an affinity of a million :math:`k_BT`, where its rate overflows."""
 
-    name = "affinity"
     title = "Exponential law far from equilibrium"
     symbol = "|mu| / (k_B T)"
     values = (1e-6, 1e-3, 1.0, 30.0, 700.0, 1e3, 1e4, 1e6)
@@ -127,7 +123,6 @@ class Affinity(Regime):
 class Runaway(Regime):
     """Self-heating that explodes: the higher the activation, the later and the steeper, and the less is it known."""
 
-    name = "runaway"
     title = "Thermal runaway of an activated reaction"
     symbol = "E_a / (R_g T)"
     values = (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0)
@@ -150,10 +145,9 @@ class Runaway(Regime):
         return Problem("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
 
 
-class ColdBodies(Regime):
+class Cold(Regime):
     """Heat is drawn at a constant rate until the temperature is this part of its start; at zero the run stops."""
 
-    name = "cold"
     title = "Cooling towards T = 0"
     symbol = "T / T_0"
     values = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
@@ -181,7 +175,6 @@ class Bell(Regime):
     Times are that of rupture, or 1e-100 s where it is shorter: rates beyond exp(300) are taken as immediate.
     """
 
-    name = "bell"
     title = "Bell exponents to 1e4"
     symbol = "F x / (k_B T)"
     values = (1e-3, 1.0, 10.0, 100.0, 500.0, 700.0, 1e3, 1e4)
@@ -203,7 +196,6 @@ class Bell(Regime):
 class Rupture(Regime):
     """Bonds that share a load until the last one breaks, at a time known to rounding."""
 
-    name = "rupture"
     title = "Rupture under a shared load"
     symbol = "load per site x / (k_B T)"
     values = (1e-6, 1e-3, 0.1, 0.5, 1.0, 10.0, 100.0, 500.0)
@@ -220,7 +212,6 @@ class Rupture(Regime):
 class Debonding(Regime):
     """All bonds break at once, and heat pays for what springs do not: less and less is left, then nothing."""
 
-    name = "debonding"
     title = "Sudden debonding, verdicts of the second law"
     symbol = "K_0 / (T_0 C)"
     values = (1e-12, 1e-6, 1e-3, 0.1, 0.9, 1.2, 1.2499999, 1.26, 1e6)

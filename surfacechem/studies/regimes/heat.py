@@ -37,7 +37,6 @@ def three_temperatures(parameters: Mapping[str, float]) -> Problem:
 class Capacity(Regime):
     """A medium whose capacity vanishes: it follows the bodies after a layer as short as its capacity is small."""
 
-    name = "capacity"
     title = "Capacity of the interface to nothing"
     symbol = "C_c [J/(m^2 K)]"
     values = (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18)
@@ -49,7 +48,6 @@ class Capacity(Regime):
 class Conductance(Regime):
     """Conductances until the two bodies are in perfect contact."""
 
-    name = "conductance"
     title = "Conductances to perfect contact"
     symbol = "h [W/(m^2 K)]"
     values = (1e0, 1e4, 1e8, 1e12, 1e16, 1e20)
@@ -61,7 +59,6 @@ class Conductance(Regime):
 class Stiffness(Regime):
     """One body light and well connected, the other heavy and insulated: a range of rates in a linear system."""
 
-    name = "stiffness"
     title = "Range of the rates of heat exchange"
     symbol = "fastest rate / slowest rate"
     values = (1e2, 1e5, 1e10, 1e15, 1e20, 1e25)
@@ -110,7 +107,6 @@ run: {until: 1 s}
 class LostCapacity(Regime):
     """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
 
-    name = "lost-capacity"
     title = "Capacity that bonds leave to the interface"
     symbol = "C_eff [J/(m^2 K)]"
     values = (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1)
@@ -146,7 +142,6 @@ class Ignition(Regime):
     :math:`H/(e\beta)`, where the temperature is known to the root of rounding, and none beyond.
     """
 
-    name = "ignition"
     title = "Ignition of an algebraic temperature"
     symbol = "1 - D_0 / D_crit"
     values = (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1)

@@ -21,7 +21,6 @@ SHORTEST = 1e-5
 class Film(Regime):
     """A sheared film closes: heat grows like the logarithm of the gap, until time cannot tell the gap from zero."""
 
-    name = "film"
     title = "Film that closes"
     symbol = "gap / initial gap"
     values = (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0)
@@ -52,7 +51,6 @@ run: {until: 1 s}
 class Penalty(Regime):
     """A contact that becomes rigid: the gap k w / (k + E_n) vanishes and its traction stays."""
 
-    name = "penalty"
     title = "Contact stiffness to rigid"
     symbol = "E_n [Pa/m]"
     values = (1e0, 1e8, 1e12, 1e16, 1e20, 1e28, 1e38)
@@ -66,7 +64,6 @@ class Penalty(Regime):
 class Chatter(Regime):
     """Stick-slip over nineteen decades of speed: one slip a cycle and none that is not there."""
 
-    name = "chatter"
     title = "Stick-slip, speed to nothing"
     symbol = "V [m/s]"
     values = (1e3, 1.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
@@ -98,7 +95,6 @@ class Chatter(Regime):
 class Stop(Regime):
     """A sliding mass that friction stops: its velocity is zero from there on, exactly."""
 
-    name = "stop"
     title = "Coulomb friction stops a mass"
     symbol = "v_0 [m/s]"
     values = (1e-15, 1e-10, 1e-5, 1.0, 1e3, 1e6)
@@ -115,7 +111,6 @@ class Fold(Regime):
     within which it is compared.
     """
 
-    name = "fold"
     title = "Slow passage of a fold"
     symbol = "distance / fold"
     values = (1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
