@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import pkgutil
+from functools import cache
 from importlib import import_module
 
 from surfacechem.errors import InputError, suggestion
@@ -22,6 +23,7 @@ def names() -> list[str]:
     return sorted(all())
 
 
+@cache
 def get(name: str) -> type[Reference]:
     """The exact solution called `name`: it is in the file whose name is the longest that is part of this one.
 

@@ -54,6 +54,8 @@ def accuracy(
     ``cells`` finds the errors of the cells across bodies, which a second run at another tolerance does not see;
     ``estimate`` is that of a second run, where there was one.
     """
+    if not len(trajectory.result.times):
+        return unknown("the run ended at its start")
     if way == "balances":
         return from_balances(trajectory, "balances only: what they miss is not seen")
     unused = ""
@@ -68,35 +70,46 @@ def accuracy(
     return replace(estimate, source=f"{estimate.source}{unused}")
 
 
-def against_exact(trajectory: Trajectory, scene: Scene, name: str, options: Mapping[str, float]) -> Accuracy:
-    """Largest errors at the output times, and those of the times of events, which a second run tells.
+def against_exact(
+    trajectory: Trajectory,
+    scene: Scene,
+    name: str,
+    options: Mapping[str, float],
+    *,
+    tested: bool = True,
+    second: Trajectory | None = None,
+) -> Accuracy:
+    """Largest errors at the output times, and those of the times of events, which a second run tells; it is made where
+    it is needed and none is given.
 
-    InputError where the exact solution is another scene's.
+    InputError where the exact solution is another scene's; whether it is one is ``tested``.
     """
     from surfacechem.results.matching import exact_values
 
-    exact = exact_values(name, options, scene, trajectory)
+    exact = exact_values(name, options, scene, trajectory, tested=tested)
     errors = largest_errors(computed(trajectory), exact, partial(floor, trajectory))
-    if event_times(trajectory):
-        errors |= _event_errors(trajectory)
+    if found := event_times(trajectory):
+        expected = event_times(second or _second(trajectory))
+        if not difference(found, expected):
+            errors[EVENTS] = event_error(found, expected, trajectory.run.times[-1])
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
 
-def _event_errors(trajectory: Trajectory) -> dict[str, float]:
-    """Error of the times of events from a second run; nothing where that has others."""
-    second = trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))
-    found, expected = event_times(trajectory), event_times(second)
-    if difference(found, expected):
-        return {}
-    return {EVENTS: event_error(found, expected, trajectory.run.times[-1])}
+def _second(trajectory: Trajectory) -> Trajectory:
+    """The run at another tolerance."""
+    return trajectory.model.resolve(trajectory, second_tolerance(trajectory.run.rtol))
 
 
 def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> Accuracy:
-    """Errors of states and of the times of events, estimated from a second run. Those of the cells across bodies are
-    added.
-    """
-    other = second_tolerance(trajectory.run.rtol)
-    second = trajectory.model.resolve(trajectory, other)
+    """Errors estimated from a second run, those of the cells across bodies added."""
+    return with_cells(estimated(trajectory, _second(trajectory)), cells or CellErrors())
+
+
+def estimated(trajectory: Trajectory, second: Trajectory) -> Accuracy:
+    """Errors of states and of the times of events as a second run at another tolerance tells them."""
+    other = second.run.rtol
+    if not len(trajectory.result.times):
+        return unknown("the run ended at its start")
     if trajectory.status == "failed" and len(trajectory.result.times) < 2:
         return unknown(f"the run failed: {trajectory.reason}")
     if second.status == "failed" or len(second.result.times) < len(trajectory.result.times):
@@ -107,8 +120,7 @@ def against_tighter(trajectory: Trajectory, cells: CellErrors | None = None) -> 
         return unknown("the run ended before its second output")
     if note:  # one of the two went another way
         return unknown(f"a second run at rtol {other:.0e}, which had {note}")
-    found = Accuracy(stated(errors), second_run(second.run), errors)
-    return with_cells(found, cells) if cells else found
+    return Accuracy(stated(errors), second_run(second.run), errors)
 
 
 def unknown(why: str) -> Accuracy:

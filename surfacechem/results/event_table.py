@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.jumps import ADMISSIBLE, Jump
+from surfacechem.results.netcdf import Column
+from surfacechem.solve.jumps import ADMISSIBLE, VIOLATES, Jump
 from surfacechem.solve.run import Trajectory
 
 Array = NDArray[np.float64]
@@ -30,16 +31,6 @@ KINK = "kink of "
 
 
 @dataclass(frozen=True)
-class EventColumn:
-    """A column of the table: name, values, unit, long name."""
-
-    name: str
-    values: Any
-    unit: str
-    long_name: str
-
-
-@dataclass(frozen=True)
 class Row:
     """An event with the states at its two sides, and its jump where it is one."""
 
@@ -51,17 +42,38 @@ class Row:
     jump: Jump | None = None
 
 
-def event_columns(trajectory: Trajectory) -> list[EventColumn]:
-    """The table, without the columns of jumps where nothing jumped; empty where nothing happened."""
+def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = None) -> list[Column]:
+    """The table of one run, or of many along the ``axes`` of a sweep, by name and size: there times and values are not
+    set beyond the last event of a run. Without the columns of jumps where nothing jumped; empty where nothing happened.
+    """
+    tables = [{column.name: column for column in _table(run)} for run in runs]
+    most = max(len(table["event_time"].values) if table else 0 for table in tables)
+    found = []
+    for column in {name: column for table in tables for name, column in table.items()}.values():
+        empty: str | float = "" if column.values.dtype == object else np.nan
+        values = np.full((len(runs), most), empty, dtype=column.values.dtype)
+        for row, table in zip(values, tables, strict=True):
+            if column.name in table:
+                row[: len(table[column.name].values)] = table[column.name].values
+        shape = (*(axes or {}).values(), most)
+        found.append(replace(column, dimensions=(*(axes or {}), "event"), values=values.reshape(shape)))
+    return found
+
+
+def _table(trajectory: Trajectory) -> list[Column]:
     rows = _rows(trajectory)
     if not rows:
         return []
     columns = [
-        EventColumn("event_time", np.array([row.t for row in rows]), "s", "time of the event"),
-        EventColumn("event_name", _texts(row.name for row in rows), "1", "name of the event"),
-        EventColumn("event_reason", _texts(row.reason for row in rows), "1", "what happened"),
+        _column("event_time", [row.t for row in rows], "s", "time of the event"),
+        _column("event_name", [row.name for row in rows], "1", "name of the event"),
+        _column("event_reason", [row.reason for row in rows], "1", "what happened"),
     ]
     return columns + (_jump_columns(trajectory, rows) if trajectory.jumps else [])
+
+
+def _column(name: str, values: Sequence[float | str] | Array, unit: str, long_name: str) -> Column:
+    return Column(name, ("event",), np.array(values, object if isinstance(values[0], str) else float), unit, long_name)
 
 
 def _rows(trajectory: Trajectory) -> list[Row]:
@@ -111,40 +123,42 @@ def _telling(trajectory: Trajectory, rows: Sequence[Row]) -> list[Row]:
     return kept
 
 
-def _jump_columns(trajectory: Trajectory, rows: Sequence[Row]) -> list[EventColumn]:
+def _jump_columns(trajectory: Trajectory, rows: Sequence[Row]) -> list[Column]:
     """What jumped; where nothing did, the state goes on and nothing is released or judged."""
     jumps = [row.jump for row in rows]
-    amounts = np.array([(j.released, j.entropy) if j else (0.0, 0.0) for j in jumps])
-    verdicts = _texts(j.verdict if j else "" for j in jumps)
     columns = [
-        EventColumn("event_since", _since(rows), "s", "time since the transition before or the start"),
-        EventColumn("event_released", amounts[:, 0], "J/m^2", "energy turned into heat"),
-        EventColumn("event_entropy", amounts[:, 1], "J/(m^2 K)", "entropy produced"),
-        EventColumn("event_verdict", verdicts, "1", "whether the second law allows it; empty where nothing jumps"),
+        _column("event_since", _since(rows), "s", "time since the transition before or the start"),
+        _column("event_released", [j.released if j else 0.0 for j in jumps], "J/m^2", "energy turned into heat"),
+        _column("event_entropy", [j.entropy if j else 0.0 for j in jumps], "J/(m^2 K)", "entropy produced"),
+        _column(
+            "event_verdict",
+            [j.verdict if j else "" for j in jumps],
+            "1",
+            "whether the second law allows it; empty where nothing jumps",
+        ),
     ]
-    before, after = (np.array([getattr(row, side) for row in rows]) for side in ("before", "after"))
     for k, state in enumerate(trajectory.model.system.states):
-        if state.name in trajectory.model.system.inside:
-            continue
-        q = state.quantity
-        columns += [
-            EventColumn(f"{q.name}_before", before[:, k], q.unit, f"{q.long_name} before"),
-            EventColumn(f"{q.name}_after", after[:, k], q.unit, f"{q.long_name} after"),
-        ]
+        if state.name not in trajectory.model.system.inside:
+            q = state.quantity
+            columns += [
+                _column(f"{q.name}_before", [row.before[k] for row in rows], q.unit, f"{q.long_name} before"),
+                _column(f"{q.name}_after", [row.after[k] for row in rows], q.unit, f"{q.long_name} after"),
+            ]
     return columns
 
 
-def _since(rows: Sequence[Row]) -> Any:
+def _since(rows: Sequence[Row]) -> list[float]:
     """Times since the last jump before each row, or since the start."""
     last, found = 0.0, []
     for row in rows:
         found.append(row.jump.since if row.jump else row.t - last)
         last = row.t if row.jump else last
-    return np.array(found)
+    return found
 
 
-def _texts(values: Iterable[str]) -> Any:
-    return np.array(list(values), dtype=object)
+def entropy_destroyed(jumps: Sequence[Jump]) -> float:
+    """Most entropy that a jump has destroyed [J/(m^2 K)]; one that was refused destroys none."""
+    return max((-jump.entropy for jump in jumps if jump.verdict == VIOLATES and not jump.stops), default=0.0)
 
 
 def event_findings(jumps: Sequence[Jump]) -> list[str]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.model.conductors import Profile
+from surfacechem.results.netcdf import Column
 from surfacechem.solve.run import Trajectory
 
 Array = NDArray[np.float64]
@@ -23,12 +22,12 @@ def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     return np.stack(parts, axis=1)
 
 
-def profile_columns(trajectory: Trajectory) -> list[tuple[str, tuple[str, ...], Any, str, str]]:
-    """Name, dimensions, values, unit and long name of each profile and of its coordinate."""
-    found: list[tuple[str, tuple[str, ...], Any, str, str]] = []
+def profile_columns(trajectory: Trajectory) -> list[Column]:
+    """Each profile and its coordinate."""
+    found = []
     for profile in trajectory.model.system.profiles:
         x, values = f"x_{profile.number}", profile_values(trajectory, profile)
         places = np.array(profile.points) * trajectory.values[profile.thickness]
-        found.append((x, (x,), places, "m", f"distance from the contact into {profile.body}"))
-        found.append((profile.name, ("time", x), values, "K", f"temperature across {profile.body}"))
+        found.append(Column(x, (x,), places, "m", f"distance from the contact into {profile.body}"))
+        found.append(Column(profile.name, ("time", x), values, "K", f"temperature across {profile.body}"))
     return found

@@ -1,30 +1,26 @@
-"""A run as a labelled dataset: physics, balances, error and run time, in xarray and in netCDF with CF conventions."""
+"""A run with its balances, its error and its warnings, and all of it as a labelled dataset."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from surfacechem.results.audit import Audit, audit
+from surfacechem.results.dataset import DATASET_NAMES, Results, quantity_columns
 from surfacechem.results.detailed_balance import Verdict, verdicts
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.extremes import capped_rates, cautions
-from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save, versions
+from surfacechem.results.netcdf import Column, versions
 from surfacechem.results.profiles import profile_columns
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
-
-if TYPE_CHECKING:
-    import xarray
 
 LOST = 1e-4
 """A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
@@ -40,17 +36,6 @@ LOST_HEAT = 1e-9
 
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
-
-DATASET_NAMES = {
-    "Q_1": "Q_ext_1",
-    "Q_2": "Q_ext_2",
-    "Q_c": "Q_ext_c",
-    "W_n": "work_n",
-    "W_t": "work_t",
-    "W_t2": "work_t2",
-}
-"""Names that differ in the dataset, where no two may be the same but for their case."""
-
 
 CLASSES = {"exothermic": 1, "endothermic": -1}
 """Classes of reactions, with the sign of their heat."""
@@ -74,7 +59,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True, repr=False)
-class Solution:
+class Solution(Results):
     """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
 
     trajectory: Trajectory
@@ -175,36 +160,16 @@ class Solution:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
-        parts = (self._states(), self._named(), self._profiles(), self._ledger(), self._balances())
-        return (*(column for part in parts for column in part), *self._exact(), *self._events())
-
-    def _profiles(self) -> list[Column]:
-        return [Column(*column) for column in profile_columns(self.trajectory)]
-
-    def _states(self) -> list[Column]:
-        result = self.trajectory.result
-        columns = [Column("time", ("time",), result.times, "s", "time since the start")]
-        for j, state in enumerate(self.trajectory.model.system.states):
-            if state.name in self.trajectory.model.system.inside:
-                continue
-            q = state.quantity
-            columns.append(Column(q.name, ("time",), result.outputs[:, j], q.unit, q.long_name, q.tag))
-        return columns
-
-    def _named(self) -> list[Column]:
-        values = self.trajectory.outputs
-        items = self.trajectory.model.system.outputs
-        return [
-            Column(
-                DATASET_NAMES.get(i.name, i.name),
-                ("time",),
-                values[:, j],
-                i.quantity.unit,
-                i.quantity.long_name,
-                i.quantity.tag,
-            )
-            for j, i in enumerate(items)
-        ]
+        time = Column("time", ("time",), self.trajectory.result.times, "s", "time since the start")
+        along = [*quantity_columns([self.trajectory]), *profile_columns(self.trajectory)]
+        return (
+            time,
+            *along,
+            *self._ledger(),
+            *self._balances(),
+            *self._exact(along),
+            *event_columns([self.trajectory]),
+        )
 
     def _ledger(self) -> list[Column]:
         values = self.trajectory.result.ledger_outputs
@@ -216,41 +181,26 @@ class Solution:
 
     def _balances(self) -> list[Column]:
         books = self.audit
-        columns = [
-            Column("energy_residual", ("time",), books.energy, "J/m^2", "total energy minus the energy supplied"),
-            Column(
-                "entropy_residual",
-                ("time",),
-                books.entropy,
-                "J/(m^2 K)",
-                "total entropy minus the entropy supplied and produced",
-            ),
+        rows = [
+            ("energy_residual", books.energy, "J/m^2", "total energy minus the energy supplied"),
+            ("entropy_residual", books.entropy, "J/(m^2 K)", "total entropy minus the entropy supplied and produced"),
         ]
         if any(account.kind == "bonds" for account in self.trajectory.model.system.ledger):
-            columns.append(
-                Column("site_residual", ("time",), books.sites, "1", "largest residual of the site balances")
-            )
-        for law, low in books.least.items():
-            text = f"least entropy production of {law.replace('_', ' ')}"
-            columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
-        return columns
-
-    def _exact(self) -> list[Column]:
-        exact = self.accuracy.exact if self.accuracy else {}
-        by_name = {c.name: c for c in (*self._states(), *self._named(), *self._profiles())}
+            rows.append(("site_residual", books.sites, "1", "largest residual of the site balances"))
+        least = [
+            (f"least_sigma_{law}", np.float64(low), f"least entropy production of {law.replace('_', ' ')}")
+            for law, low in books.least.items()
+        ]
         return [
-            Column(
-                f"{name}_exact",
-                by_name[name].dimensions,
-                values,
-                by_name[name].unit,
-                f"exact {by_name[name].long_name}",
-            )
-            for name, values in exact.items()
+            *(Column(name, ("time",), values, unit, text) for name, values, unit, text in rows),
+            *(Column(name, (), low, "W/(m^2 K)", text) for name, low, text in least),
         ]
 
-    def _events(self) -> list[Column]:
-        return [Column(c.name, ("event",), c.values, c.unit, c.long_name) for c in event_columns(self.trajectory)]
+    def _exact(self, along: Sequence[Column]) -> list[Column]:
+        exact = self.accuracy.exact if self.accuracy else {}
+        computed = {column.name: column for column in along}
+        pairs = [(computed[name], values) for name, values in exact.items()]
+        return [Column(f"{c.name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}") for c, values in pairs]
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:
@@ -262,12 +212,7 @@ class Solution:
         counters = {f"count_{name}": int(value) for name, value in told.items()}
         books = self.audit
         return {
-            "Conventions": CONVENTIONS,
-            "title": self.title,
-            "source": self.source or "surfacechem",
-            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
-            "case": self.case,
-            **({"mechanism": self.mechanism} if self.mechanism else {}),
+            **self._origin(run),
             **self._departures(),
             "status": self.status,
             "reason": self.reason,
@@ -318,21 +263,6 @@ class Solution:
         if self.trajectory.result.status is Status.STOPPED:
             departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
         return {"departures": json.dumps(departures)} if departures else {}
-
-    @cached_property
-    def dataset(self) -> xarray.Dataset:
-        """The run as an xarray Dataset."""
-        import xarray
-
-        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        coordinates = {c.name: data.pop(c.name) for c in self.columns if c.dimensions == (c.name,)}
-        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
-
-    def write(self, path: str | Path) -> Path:
-        """Save as netCDF; the file appears whole or not at all."""
-        target = dataset_path(path)
-        save(target, self.columns, self.attributes)
-        return target
 
 
 def _largest(values: Any) -> float:

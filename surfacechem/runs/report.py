@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from surfacechem.results.event_table import event_counts, event_summary
+from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
         labelled("solved", f"{states(solution.system)}; {solution.system.regime}; {_method(sweep.run)}"),
         labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
         *([labelled("error", _sweep_accuracy(accuracy))] if accuracy else []),
-        labelled("time", f"{speed}; {sweep.batch.steps.sum()} steps"),
+        labelled("time", f"{speed}; {sweep.steps} steps"),
         *([labelled("events", events)] if (events := _sweep_events(solution)) else []),
         labelled("balances", _sweep_balances(sweep)),
         *([labelled("written", str(written))] if written else []),
@@ -117,7 +117,7 @@ def _sweep_accuracy(accuracy: SweepAccuracy) -> str:
 def _sweep_events(solution: SweepSolution) -> str:
     """What jumped in all runs, and what the second law says to it."""
     sweep = solution.sweep
-    runs = [sweep[i].jumps for i in range(len(sweep))] if solution.system.transitions else []
+    runs = [run.jumps for run in sweep]
     jumps = [jump for run in runs for jump in run]
     if not jumps:
         return ""
@@ -125,19 +125,21 @@ def _sweep_events(solution: SweepSolution) -> str:
     for verdict in sorted({jump.verdict for jump in jumps} - {ADMISSIBLE}):
         count = sum(any(jump.verdict == verdict for jump in run) for run in runs)
         found.append(f"{verdict} in {count} of {len(runs)} runs")
-    worst = int(np.argmax(sweep.entropy_destroyed))
-    if (most := sweep.entropy_destroyed[worst]) > 0:
-        at = zip(solution.axes, solution.plan.points[worst].values(), strict=True)
+    destroyed = [entropy_destroyed(run) for run in runs]
+    if (most := max(destroyed)) > 0:
+        at = zip(solution.axes, solution.plan.points[destroyed.index(most)].values(), strict=True)
         found.append(f"at worst {-most:.3g} J/(m^2 K) at {', '.join(f'{name} = {value:g}' for name, value in at)}")
     return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
 
 
 def _sweep_balances(sweep: Sweep) -> str:
     """The worst of all runs."""
-    errors = (("energy", sweep.energy_error), ("entropy", sweep.entropy_error), ("sites", sweep.site_error))
-    residuals = ", ".join(f"{name} {values.max():.1e}" for name, values in errors)
-    count = int(sweep.violations.sum())
-    return f"{residuals}; " + (f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy")
+    worst = ", ".join(
+        f"{name} {sweep.worst(kind):.1e}"
+        for name, kind in (("energy", "energy"), ("entropy", "entropy"), ("sites", "site"))
+    )
+    count = sum(books.destroys for books in sweep.audits)
+    return f"{worst}; " + (f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy")
 
 
 def _span(values: Sequence[float]) -> str:

@@ -20,7 +20,7 @@ from surfacechem.format import Case
 from surfacechem.model.system import System
 from surfacechem.results import choice, spatial
 from surfacechem.results.accuracy import CellErrors
-from surfacechem.results.achieved import accuracy, check_way, unknown
+from surfacechem.results.achieved import accuracy, check_way
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import Accuracy, Solution
 from surfacechem.scene import Scene
@@ -106,11 +106,7 @@ class Simulation:
             cells = cells or chosen._cell_errors(trajectory)
             return cells
 
-        found = (
-            accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
-            if len(trajectory.result.times)
-            else unknown("the run ended at its start")
-        )
+        found = accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
         if unused and error == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(

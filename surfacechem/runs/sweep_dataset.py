@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +14,10 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format.plans import Axis, Plan
 from surfacechem.model.system import System
-from surfacechem.quantities import Quantity
-from surfacechem.results.event_table import event_columns
-from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save, versions
-from surfacechem.results.solution import DATASET_NAMES
+from surfacechem.results.dataset import Results, quantities, quantity_columns
+from surfacechem.results.event_table import entropy_destroyed, event_columns
+from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs.sweeps import Sweep
-
-if TYPE_CHECKING:
-    import xarray
 
 Array = NDArray[np.float64]
 
@@ -40,8 +34,8 @@ class SweepAccuracy:
 
 
 @dataclass(frozen=True, repr=False)
-class SweepSolution:
-    """What a sweep hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
+class SweepSolution(Results):
+    """What a sweep hands back."""
 
     sweep: Sweep
     title: str = ""
@@ -69,7 +63,7 @@ class SweepSolution:
     @property
     def ends(self) -> str:
         """How many runs ended in which way, in words."""
-        every = [status for status, _ in self.sweep.ends]
+        every = [run.status for run in self.sweep]
         return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
 
     @property
@@ -78,14 +72,14 @@ class SweepSolution:
 
         That physics stops some runs is a result of a sweep; that all bonds break is what a spectrum is made for.
         """
-        every = {status for status, _ in self.sweep.ends}
+        every = {run.status for run in self.sweep}
         stopped = every == {"stopped"} and not self.sweep.statistics
         return "failed" if "failed" in every else "stopped" if stopped else "finished"
 
     @cached_property
     def axes(self) -> dict[str, Axis]:
         """The swept parameters by the names of their dimensions."""
-        taken = {*self.sweep.named, "time"}
+        taken = {*quantities(self.system), *self.system.inside, "time"}
         axes: dict[str, Axis] = {}
         for axis in self.plan.axes:
             parts = [
@@ -98,28 +92,42 @@ class SweepSolution:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the coordinates first."""
-        return (*self._coordinates(), *self._along(), *self._of_runs(), *self._events(), *self._statistics())
+        along = quantity_columns(self.sweep.runs, self.inner, self._shape)
+        events = event_columns(self.sweep.runs, self._shape) if self.system.transitions else ()
+        return (
+            *self._coordinates(next((column for column in along if column.name == self.inner), None)),
+            *(column for column in along if column.name != self.inner),
+            *self._of_runs(),
+            *events,
+            *self._statistics(),
+        )
+
+    @property
+    def _shape(self) -> dict[str, int]:
+        """Names and sizes of the dimensions of the swept parameters."""
+        return dict(zip(self.axes, self.plan.shape, strict=True))
 
     @property
     def inner(self) -> str:
         """The dimension along each run: time, or the load that all runs grow to."""
         return self.plan.until[0] if self.plan.until else "time"
 
-    def _coordinates(self) -> list[Column]:
+    def _coordinates(self, load: Column | None) -> list[Column]:
+        """The swept parameters, and the times or, where a load ends the runs, the values of this."""
         columns = []
         for name, axis in self.axes.items():
             unit, text = self._meaning(axis.path)
             columns.append(Column(name, (name,), np.asarray(axis.values, dtype=float), unit, text))
-        times = self.sweep.times
-        if self.plan.until is None:
+        times = np.array([run.result.problem.times for run in self.sweep])
+        if self.plan.until is None or load is None:
             return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]
-        quantity = self._quantities[self.inner]
-        start = float(self.sweep.named[self.inner][0, 0])
-        load = start + (self.plan.until[1] - start) * times[0] / times[0, -1]
+        start = float(load.values.flat[0])
+        values = start + (self.plan.until[1] - start) * times[0] / times[0, -1]
+        each = times.reshape(*self.plan.shape, -1)
         return [
             *columns,
-            Column(self.inner, (self.inner,), load, quantity.unit, quantity.long_name),
-            Column("time", (*self.axes, self.inner), self._shaped(times), "s", "time since the start"),
+            Column(self.inner, (self.inner,), values, load.unit, load.long_name),
+            Column("time", (*self.axes, self.inner), each, "s", "time since the start"),
         ]
 
     def _meaning(self, path: str) -> tuple[str, str]:
@@ -131,78 +139,58 @@ class SweepSolution:
         spec = next(p.spec for p in self.system.parameters if p.path == path)
         return spec.unit, f"{spec.text} ({path})"
 
-    @property
-    def _quantities(self) -> dict[str, Quantity]:
-        states = {state.name: state.quantity for state in self.system.states if state.name not in self.system.inside}
-        return states | {item.name: item.quantity for item in self.system.outputs}
-
-    def _shaped(self, values: Array) -> Array:
-        """Values whose first axis is the run, with one axis for each swept parameter."""
-        return values.reshape(*self.plan.shape, *values.shape[1:])
-
-    def _along(self) -> list[Column]:
-        dimensions = (*self.axes, self.inner)
-        return [
-            Column(
-                DATASET_NAMES.get(name, name),
-                dimensions,
-                self._shaped(self.sweep.named[name]),
-                q.unit,
-                q.long_name,
-                q.tag,
-            )
-            for name, q in self._quantities.items()
-            if name != self.inner
-        ]
-
     def _of_runs(self) -> list[Column]:
-        sweep, batch = self.sweep, self.sweep.batch
-        words = [np.array([end[k] for end in sweep.ends], dtype=object) for k in (0, 1)]
-        rows = [
-            ("status", words[0], "1", "how the run ended"),
-            ("reason", words[1], "1", "why the run ended"),
-            ("time_reached", batch.t, "s", "time that the run reached"),
-            ("steps", batch.steps.astype(float), "1", "steps of the run"),
-            ("energy_error", sweep.energy_error, "1", "largest energy residual relative to the energy exchanged"),
-            ("entropy_error", sweep.entropy_error, "1", "largest entropy residual relative to what was exchanged"),
-            ("site_error", sweep.site_error, "1", "largest residual of the site balances"),
-            ("destroys_entropy", sweep.destroys_entropy.astype(float), "1", "1 where a law or a jump does, else 0"),
+        """How each run ended, and what its balances, jumps and error are."""
+        runs, audits = self.sweep.runs, self.sweep.audits
+        destroyed = [entropy_destroyed(run.jumps) for run in runs]
+        rows: list[tuple[str, Sequence[Any] | Array, str, str]] = [
+            ("status", [run.status for run in runs], "1", "how the run ended"),
+            ("reason", [run.reason for run in runs], "1", "why the run ended"),
+            ("time_reached", [run.result.t for run in runs], "s", "time that the run reached"),
+            ("steps", [run.result.counters.steps for run in runs], "1", "steps of the run"),
+            (
+                "energy_error",
+                [books.energy_error for books in audits],
+                "1",
+                "largest energy residual relative to the energy exchanged",
+            ),
+            (
+                "entropy_error",
+                [books.entropy_error for books in audits],
+                "1",
+                "largest entropy residual relative to what was exchanged",
+            ),
+            ("site_error", [books.site_error for books in audits], "1", "largest residual of the site balances"),
+            (
+                "destroys_entropy",
+                [books.destroys or most > 0 for books, most in zip(audits, destroyed, strict=True)],
+                "1",
+                "1 where a law or a jump does, else 0",
+            ),
         ]
         if self.system.transitions:
-            text = "most entropy that a jump has destroyed"
-            rows.append(("entropy_destroyed", sweep.entropy_destroyed, "J/(m^2 K)", text))
+            rows.append(("entropy_destroyed", destroyed, "J/(m^2 K)", "most entropy that a jump has destroyed"))
         if self.accuracy:
             rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))
-        return [Column(name, tuple(self.axes), self._shaped(values), unit, text) for name, values, unit, text in rows]
+        return [self._of_each(name, values, unit, text) for name, values, unit, text in rows]
 
-    def _events(self) -> list[Column]:
-        """The events of each run where there are jumps; beyond the last one of a run times and values are not set."""
-        runs = range(len(self.sweep)) if self.system.transitions else ()
-        tables = [{column.name: column for column in event_columns(self.sweep[i])} for i in runs]
-        most = max((len(table["event_time"].values) for table in tables if table), default=0)
-        every = {name: column for table in tables for name, column in table.items()}
-        columns = []
-        for name, column in every.items():
-            empty: str | float = "" if column.values.dtype == object else np.nan
-            values = np.full((len(tables), most), empty, dtype=column.values.dtype)
-            for i, table in enumerate(tables):
-                if name in table:
-                    values[i, : len(table[name].values)] = table[name].values
-            columns.append(Column(name, (*self.axes, "event"), self._shaped(values), column.unit, column.long_name))
-        return columns
+    def _of_each(self, name: str, values: Sequence[Any] | Array, unit: str, text: str) -> Column:
+        """A column of one value a run."""
+        shaped = np.array(values, object if isinstance(values[0], str) else float).reshape(self.plan.shape)
+        return Column(name, tuple(self.axes), shaped, unit, text)
 
     def _statistics(self) -> list[Column]:
         columns = []
         exact = self.accuracy.exact if self.accuracy else {}
         for which, word in WORDS.items() if self.sweep.statistics else ():
-            quantity = self._quantities[self.inner]
+            quantity = quantities(self.system)[self.inner]
             found = np.array([getattr(statistics, which) for statistics in self.sweep.statistics])
             text = f"{word} {quantity.long_name} at rupture"
             for suffix, values in (("", found), ("_exact", exact.get(which))):
                 if values is not None:
                     name = f"{self.inner}_{which}{suffix}"
                     label = f"exact {text}" if suffix else text
-                    columns.append(Column(name, tuple(self.axes), self._shaped(values), quantity.unit, label))
+                    columns.append(self._of_each(name, values, quantity.unit, label))
         return columns
 
     @cached_property
@@ -215,12 +203,7 @@ class SweepSolution:
             worst = float(np.max(known)) if len(known) else np.nan
             error = {"error": worst, "error_source": self.accuracy.source}
         return {
-            "Conventions": CONVENTIONS,
-            "title": self.title,
-            "source": self.source or "surfacechem",
-            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
-            "case": self.case,
-            **({"mechanism": self.mechanism} if self.mechanism else {}),
+            **self._origin(run),
             "sweep": json.dumps(_recorded(self.plan)),
             **({"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}),
             "status": self.status,
@@ -229,30 +212,15 @@ class SweepSolution:
             "solver": run.solver,
             "rtol": float(run.rtol),
             "runs": len(sweep),
-            "count_steps": int(sweep.batch.steps.sum()),
+            "count_steps": sweep.steps,
             "run_seconds": float(sweep.seconds),
             "compile_seconds": float(sweep.model.compile_seconds),
             **error,
-            "energy_error": float(np.max(sweep.energy_error)),
-            "entropy_error": float(np.max(sweep.entropy_error)),
-            "site_error": float(np.max(sweep.site_error)),
+            "energy_error": sweep.worst("energy"),
+            "entropy_error": sweep.worst("entropy"),
+            "site_error": sweep.worst("site"),
             "versions": versions(),
         }
-
-    @cached_property
-    def dataset(self) -> xarray.Dataset:
-        """The sweep as an xarray Dataset."""
-        import xarray
-
-        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
-        coordinates = {name: data.pop(name) for name in (*self.axes, *dict.fromkeys((self.inner, "time")))}
-        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
-
-    def write(self, path: str | Path) -> Path:
-        """Save as netCDF; the file appears whole or not at all."""
-        target = dataset_path(path)
-        save(target, self.columns, self.attributes)
-        return target
 
 
 def _recorded(plan: Plan) -> dict[str, object]:

@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.format import Case, ExactSolution
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, largest_errors, second_tolerance
-from surfacechem.results.achieved import apart, floor, second_run, stated
-from surfacechem.results.matching import beside_events, exact_values, match, renamed
-from surfacechem.runs import sweep_runs
+from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, second_tolerance
+from surfacechem.results.achieved import against_exact, estimated, second_run, with_cells
+from surfacechem.results.event_table import event_times
+from surfacechem.results.matching import exact_values, match
 from surfacechem.runs.spectrum import Statistics
 from surfacechem.runs.sweep_dataset import WORDS, SweepAccuracy, SweepSolution
-from surfacechem.runs.sweep_runs import prepared, settings, solve
-from surfacechem.runs.sweeps import Sweep
+from surfacechem.runs.sweeps import Sweep, prepared, settings, solve
 
 __all__ = ["prepared", "settings", "solution", "solve"]
-
-Array = NDArray[np.float64]
-
 
 Cells: TypeAlias = Callable[[], Sequence[CellErrors]]
 """Errors of the cells across bodies, of each run."""
@@ -34,81 +30,81 @@ Cells: TypeAlias = Callable[[], Sequence[CellErrors]]
 
 def solution(case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Cells) -> SweepSolution:
     """Runs that were made with the settings of the case, with how far each is from the truth."""
-    accuracy = _accuracy(case, done, changes, threads, cells)
+    accuracy = _accuracy(case, done, threads, cells)
     return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", accuracy, changes)
 
 
-def _accuracy(
-    case: Case, done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Cells
-) -> SweepAccuracy:
-    if case.reference is None or case.reference.options:
-        unused = case.reference.fixed if case.reference else case.unused
-        estimate = _against_tighter(done, changes, threads, cells())
-        return replace(estimate, source="; ".join(filter(None, (estimate.source, unused))))
-    try:
-        return _against_exact(case, done, case.reference)
-    except InputError as error:
-        estimate = _against_tighter(done, changes, threads, cells())
-        unused = f"the exact solution {case.reference.name} is not of this scene: {error.message}"
-        return replace(estimate, source=f"{estimate.source}; {unused}")
+def _accuracy(case: Case, done: Sweep, threads: int | None, cells: Cells) -> SweepAccuracy:
+    unused, named = case.unused, case.reference
+    if named is not None and not named.options:
+        try:
+            return _against_exact(case, done, named, threads)
+        except InputError as error:
+            unused = f"the exact solution {named.name} is not of this scene: {error.message}"
+    elif named is not None:
+        unused = named.fixed
+    estimate = _against_tighter(_second(done, threads), done, cells())
+    return replace(estimate, source="; ".join(filter(None, (estimate.source, unused))))
 
 
-def _against_exact(case: Case, done: Sweep, named: ExactSolution) -> SweepAccuracy:
+def _second(done: Sweep, threads: int | None) -> Sweep:
+    """The runs at another tolerance, as :meth:`Model.resolve` has each."""
+    rtol = second_tolerance(done.run.rtol)
+    pairs = [(run.run.second(rtol), run.values) for run in done]
+    runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=True)
+    return replace(done, run=done.run.second(rtol), runs=runs)
+
+
+def _against_exact(case: Case, done: Sweep, named: ExactSolution, threads: int | None) -> SweepAccuracy:
     """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs.
 
-    Runs that end before their first output have no error.
+    A run with one output has nothing to compare but its events, one without any has no error.
     """
-    begun = np.flatnonzero(done.reached.any(axis=1)).tolist()
+    begun = [i for i, run in enumerate(done) if len(run.result.times) > 1]
     if not begun:
-        raise InputError("no run reached an output.")
-    for i in {begun[0], begun[-1]}:
-        exact_values(named.name, named.options, case.scene, done[i])
+        raise InputError("no run reached a second output.")
+    second = cache(lambda: _second(done, threads))
     errors = np.full(len(done), np.nan)
-    found = {which: np.full(len(done), np.nan) for which in WORDS if done.statistics}
-    for i in begun:
-        reference = match(references.get(named.name), named.options, SceneView(case.scene, done[i]))
-        for which, values in found.items():
-            values[i] = getattr(reference, which)
-        errors[i] = _of_statistics(done, i, reference) if found else _of_quantities(done, i, reference)
-    return SweepAccuracy(np.maximum(errors, ROUNDING), f"exact solution {named.name}", found)
+    exact = {which: np.full(len(done), np.nan) for which in WORDS if done.statistics}
+    for i, run in enumerate(done):
+        tested = i in (begun[0], begun[-1])
+        if len(run.result.times) < 2:
+            errors[i] = estimated(run, second()[i]).error if len(run.result.times) else np.nan
+        elif exact:
+            if tested:
+                exact_values(named.name, named.options, case.scene, run)
+            reference = match(references.get(named.name), named.options, SceneView(case.scene, run))
+            errors[i] = _of_statistics(done, i, reference)
+            for which, values in exact.items():
+                values[i] = getattr(reference, which)
+        else:
+            errors[i] = against_exact(
+                run,
+                case.scene,
+                named.name,
+                named.options,
+                tested=tested,
+                second=second()[i] if event_times(run) else None,
+            ).error
+    return SweepAccuracy(errors, f"exact solution {named.name}", exact)
 
 
 def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
     """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
     pairs = [(getattr(done.statistics[i], which), getattr(exact, which)) for which in WORDS]
-    return float(max(abs(ours - true) / abs(true) if true else abs(ours) for ours, true in pairs))
+    errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
+    return max(max(errors), ROUNDING)
 
 
-def _of_quantities(done: Sweep, i: int, reference: references.Reference) -> float:
-    """Largest error of states and named quantities."""
-    run, reached = done[i], done.reached[i]
-    exact = beside_events(lambda t: renamed(reference.solution(t), run), run)
-    ours = {name: done.named[name][i][reached] for name in exact}
-    return stated(largest_errors(ours, exact, partial(floor, run)))
-
-
-def _against_tighter(
-    done: Sweep, changes: Mapping[str, float], threads: int | None, cells: Sequence[CellErrors]
-) -> SweepAccuracy:
+def _against_tighter(second: Sweep, done: Sweep, cells: Sequence[CellErrors]) -> SweepAccuracy:
     """Errors of states, events and statistics, estimated from a second sweep, with those of the cells of each run; not
     numbers where they are not known.
     """
-    other = second_tolerance(done.run.rtol)
-    second = sweep_runs.solve(done.model, done.plan, done.run.second(other), changes, threads, nudged=True)
-    errors = np.full(len(done), np.nan)
-    for i in range(len(done)):
-        if done.statistics:
-            errors[i] = max(_of_statistics(done, i, second.statistics[i]), ROUNDING)
-        elif (
-            done.reached[i].any()
-            and np.array_equal(done.reached[i], second.reached[i])
-            and "failed" not in (done[i].status, second[i].status)
-        ):
-            differences, _ = apart(done[i], second[i])
-            errors[i] = stated(differences) if differences else np.nan
-    errors += [found.largest for found in cells]
-    source = second_run(second.run, "sweep")
+    if done.statistics:
+        errors = [_of_statistics(done, i, second.statistics[i]) + cells[i].largest for i in range(len(done))]
+    else:
+        errors = [with_cells(estimated(*pair), found).error for *pair, found in zip(done, second, cells, strict=True)]
     ways = dict.fromkeys(found.source for found in cells if found.variables)
     unknown = sum(not found.converged for found in cells)
     said = f"; unknown in {unknown} of {len(cells)} runs: {UNKNOWN}" if unknown else ""
-    return SweepAccuracy(errors, ", ".join([source, *ways]) + said)
+    return SweepAccuracy(np.array(errors), ", ".join([second_run(second.run, "sweep"), *ways]) + said)

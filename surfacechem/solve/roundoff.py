@@ -74,9 +74,11 @@ SEEN, AGAIN = 100.0, 3
 """Tolerance in units of the rounding, and how often it is raised."""
 
 
-def solve(method: Solver, problem: Problem, velocities: NDArray[np.bool_]) -> Result:
-    """The result of a method; ``velocities`` marks the algebraic states that tractions determine."""
-    result = method.solve(problem)
+def solve(method: Solver, problem: Problem, velocities: NDArray[np.bool_], first: Result | None = None) -> Result:
+    """The result of a method, or the ``first`` one found; ``velocities`` marks the algebraic states that tractions
+    determine.
+    """
+    result = first or method.solve(problem)
     for _ in range(AGAIN if velocities.any() else 0):
         if result.status is not Status.STEP_UNDERFLOW:
             break

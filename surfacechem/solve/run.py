@@ -26,6 +26,7 @@ from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Hybrid
 from surfacechem.solve.jumps import Jump, Jumper
+from surfacechem.solve.radau.solver import Radau
 from surfacechem.solve.roundoff import awaited, solve, watched
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
@@ -327,7 +328,15 @@ class Model:
         """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
         wished.
         """
-        run = self.chosen(run)
+        return self.solve_all([(run, values)], nudged=nudged)[0]
+
+    def solve_all(
+        self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1, *, nudged: bool = False
+    ) -> list[Trajectory]:
+        """Runs that differ in values and output times: in the compiled loop together where nothing but the stepper is
+        needed, else one after the other.
+        """
+        run = self.chosen(runs[0][0])
         method = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
             raise InputError(
@@ -335,6 +344,24 @@ class Model:
                 f"`solver: {ASKING[0]}` under `run`.",
                 path="run.solver",
             )
+        pairs = [(replace(each, solver=run.solver), values) for each, values in runs]
+        if self.jumper or self.system.fit or run.max_seconds or not isinstance(method, Radau):
+            return [self._solve_alone(method, *pair, nudged) for pair in pairs]
+        problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
+        method.prepare()
+        start = time.perf_counter()
+        results = [
+            solve(method, problem, self.system.sliding, first)
+            for problem, first in zip(problems, method.solve_all(problems, threads), strict=True)
+        ]
+        seconds = (time.perf_counter() - start) / len(pairs)
+        return [
+            Trajectory(self, each, result, values, *self.verdict(result, values), seconds)
+            for (each, values), result in zip(pairs, results, strict=True)
+        ]
+
+    def _solve_alone(self, method: Solver, run: Run, values: Mapping[str, float], nudged: bool) -> Trajectory:
+        """A run with its jumps, whose media are fitted again where it leaves the range of their fits."""
         fit = self.system.fit
         values = fit.started(values) if fit else values
         problem = self.problem(run, values, nudged=nudged)

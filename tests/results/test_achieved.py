@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.results.achieved import EVENTS, against_tighter, apart, difference, event_error
+from surfacechem.results.achieved import EVENTS, against_tighter, apart, difference, estimated, event_error
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.report import run_summary, sweep_summary
 
@@ -58,11 +58,9 @@ def test_an_estimate_looks_at_the_times_of_events(stick_slip):
     assert estimate > 0
 
 
-def test_other_events_in_the_second_run_are_said(stick_slip, monkeypatch):
+def test_other_events_in_the_second_run_are_said(stick_slip):
     trajectory = stick_slip.model.solve(stick_slip.case.run)
-    second = replace(trajectory, jumps=trajectory.jumps[:-1])
-    monkeypatch.setattr(type(stick_slip.model), "resolve", lambda *_: second)
-    accuracy = against_tighter(trajectory)
+    accuracy = estimated(trajectory, replace(trajectory, jumps=trajectory.jumps[:-1]))
     last = trajectory.jumps[-1].transition.name
     count = len(event_times(trajectory)[last])
     assert f"which had other events: {count - 1} {last} instead of {count}" in accuracy.source
@@ -70,22 +68,20 @@ def test_other_events_in_the_second_run_are_said(stick_slip, monkeypatch):
     assert math.isnan(accuracy.error)  # one of the two went another way
 
 
-def test_a_second_run_that_ends_earlier_leaves_the_error_unknown(monkeypatch):
+def test_a_second_run_that_ends_earlier_leaves_the_error_unknown():
     simulation = surfacechem.load("exothermic")
     trajectory = simulation.model.solve(simulation.case.run)
-    short = simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0)))
-    monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: short)
-    accuracy = against_tighter(trajectory)
+    short = simulation.model.solve(replace(simulation.case.run, rtol=1e-13, times=(0.0, 1.0)))
+    accuracy = estimated(trajectory, short)
     assert accuracy.source.startswith("unknown: a second run at rtol 1e-13 ended earlier")
     assert np.isnan(accuracy.error)
 
 
-def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier(monkeypatch):
+def test_a_second_run_that_fails_later_than_the_first_did_not_end_earlier():
     simulation = surfacechem.load("exothermic")
     first, second = (simulation.model.solve(replace(simulation.case.run, times=(0.0, 1.0, 2.0)[:n])) for n in (2, 3))
     first, second = (replace(each, status="failed") for each in (first, second))
-    monkeypatch.setattr(type(simulation.model), "resolve", lambda *_: second)
-    assert against_tighter(first).source.startswith("unknown: a second run at rtol 1e-13 failed later")
+    assert estimated(first, second).source.startswith("unknown: a second run at rtol 1e-11 failed later")
 
 
 def test_the_end_of_a_stopped_run_is_an_event():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray
+from case_runs import load, solved
 from test_references import bell, build, table
 from typer.testing import CliRunner
 
@@ -11,6 +12,7 @@ from surfacechem import format as cases
 from surfacechem import plots
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
+from surfacechem.format.plans import Axis, Plan
 from surfacechem.references import get
 from surfacechem.runs import rerun
 from surfacechem.runs.report import sweep_summary
@@ -100,9 +102,32 @@ def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
     assert one["time_reached"] == single.attrs["time_reached"]
 
 
+@pytest.mark.parametrize("name", cases.names())
+def test_a_case_is_the_same_as_a_sweep_of_one(name):
+    """Status, events, balances, error and every other variable that a sweep has."""
+    simulation, solution = load(name), solved(name)
+    values = solution.trajectory.values
+    path = next(path for path in simulation.system.changeable if path in values)
+    swept = simulation.sweep_plan(Plan([Axis(path, (values[path],))]))
+    (axis,) = swept.axes
+    one = {c.name: c.values[0] for c in swept.columns if c.dimensions[0] == axis != c.name}
+    alone = solution.attributes | {c.name: c.values for c in solution.columns}
+    alone |= {"steps": alone["count_steps"], "destroys_entropy": alone["entropy_violations"] != "none"}
+    left = {"entropy_destroyed"}
+    if simulation.case.reference and simulation.case.reference.options:
+        left |= {"error"}  # an exact solution with values of its own is of the case alone
+    assert {"status", "reason", "energy_error", "site_error", "error", *simulation.system.rows} <= one.keys() | set(
+        simulation.system.inside
+    )
+    for variable in one.keys() - left:
+        expected = np.asarray(alone[variable])
+        ours = np.asarray(one[variable])[tuple(slice(size) for size in expected.shape)]
+        np.testing.assert_array_equal(ours, expected, err_msg=variable)
+
+
 def test_the_number_of_threads_changes_nothing(bonding):
-    one, two = (bonding.sweep({K_0: np.linspace(1, 300, 600)}, threads=n).sweep.batch for n in (1, 2))
-    assert one.outputs.tobytes() == two.outputs.tobytes()
+    one, two = (bonding.sweep({K_0: np.linspace(1, 300, 600)}, threads=n).dataset for n in (1, 2))
+    assert one["T"].values.tobytes() == two["T"].values.tobytes()
 
 
 def test_a_sweep_compiles_nothing_once_it_has_run(spectrum, monkeypatch):

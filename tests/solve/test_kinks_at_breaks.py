@@ -17,7 +17,7 @@ from surfacechem.solve.run import Model, Run
 
 def times(scene, solver="radau", rtol=1e-11):
     run = Run(np.linspace(0.0, 4.0, 9).tolist(), rtol, solver=solver)
-    columns = {column.name: column.values for column in event_columns(Model(assemble(scene)).solve(run))}
+    columns = {column.name: column.values for column in event_columns([Model(assemble(scene)).solve(run)])}
     return columns["event_time"][columns["event_name"] == "v"]
 
 
@@ -59,7 +59,7 @@ def test_kinks_at_one_moment_are_events_once_each():
     loading = {"p": Hold(level=1e5), "v": Harmonic(**swing), "v_2": Harmonic(**swing)}
     scene = Scene(bodies("T", "T"), Interface("T", [], [Coulomb(mu=0.3)]), (), loading, None, 300.0, {"T": 300.0})
     trajectory = Model(assemble(scene)).solve(Run([0.0, 6.0], 1e-11))
-    columns = {column.name: column.values for column in event_columns(trajectory)}
+    columns = {column.name: column.values for column in event_columns([trajectory])}
     turns = [(k * math.pi - 0.3) / (2 * math.pi * 0.37) for k in range(1, 5)]
     for name in ("v", "v_2"):
         np.testing.assert_allclose(columns["event_time"][columns["event_name"] == name], turns, rtol=1e-13)

@@ -172,7 +172,7 @@ def test_a_sweep_ends_pieces_where_each_run_needs_it():
     rates = [-10e-6, -7e-6, -4e-6, -20e-6]
     swept = simulation.sweep({"loading.g_n.ramp.rate": rates})
     singly = [simulation.run({"loading.g_n.ramp.rate": rate}).trajectory.result.y for rate in rates]
-    np.testing.assert_array_equal(swept.sweep.batch.y, singly)
+    np.testing.assert_array_equal([run.result.y for run in swept.sweep], singly)
 
 
 def test_gaps_that_touch_often_are_paid_for():

@@ -360,22 +360,33 @@ def test_batch_with_times_of_their_own_and_events() -> None:
     program = compile_program(t, [y], [dy], [k], [dy + k * y], margins=[y - 0.5])
     rates = np.array([1.0, 10.0, 100.0])
     ends = 3.0 / rates
-    batch = solve_many(
-        program,
-        np.ones((3, 1)),
-        rates[:, None, None],
-        np.stack([np.zeros(3), ends], axis=1),
-        1e-11,
-        [1e-17],
-        times=np.outer(ends, [0.0, 0.5, 1.0]),
-        margins=[Margin.restart()],
-        event_rows=4,
+    problems = [
+        problem(
+            program,
+            [1.0],
+            [0.0, end],
+            1e-11,
+            parameters=[rate],
+            times=np.array([0.0, 0.5, 1.0]) * end,
+            atol=1e-17,
+            margins=(Margin.restart(),),
+            record_steps=True,
+        )
+        for rate, end in zip(rates, ends, strict=True)
+    ]
+    results = radau.solve_all(problems)
+    np.testing.assert_allclose([result.t for result in results], ends)
+    np.testing.assert_allclose(
+        [result.outputs[:, 0] for result in results], np.exp([[0.0, -1.5, -3.0]] * 3), rtol=1e-10
     )
-    np.testing.assert_allclose(batch.t, ends)
-    np.testing.assert_allclose(batch.outputs[:, :, 0], np.exp([[0.0, -1.5, -3.0]] * 3), rtol=1e-10)
-    np.testing.assert_allclose([events.t[0] for events in batch.events], np.log(2.0) / rates, rtol=1e-10)
-    with pytest.raises(ValueError, match="segments and times too"):
-        solve_many(program, np.ones((3, 1)), rates[:, None, None], [[0.0, 1.0]], 1e-8, 1e-8, times=[[1.0]])
+    np.testing.assert_allclose([result.events.t[0] for result in results], np.log(2.0) / rates, rtol=1e-10)
+    for result, each in zip(results, problems, strict=True):
+        assert result.steps.y.tobytes() == radau.solve(each).steps.y.tobytes()
+
+
+def test_a_batch_needs_parameters_for_each_run() -> None:
+    with pytest.raises(ValueError, match="3 initial values but 2 parameter tables"):
+        solve_many(exothermic(), np.ones((3, 2)), np.ones((2, 1, 5)), [0.0, 1.0], 1e-8, 1e-8)
 
 
 def test_a_return_code_without_words_ends_the_step():

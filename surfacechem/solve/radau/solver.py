@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
@@ -114,28 +114,42 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-def _tables(problem: Problem, step_rows: int, event_rows: int) -> _Tables:
+def _tables(problems: Sequence[Problem], step_rows: int, event_rows: int) -> _Tables:
+    """Tables of problems with as many segments and output times each."""
+    first = problems[0]
+    segments, times = _shared([problem.segments for problem in problems], [problem.times for problem in problems])
     return _Tables(
-        problem.program,
-        _contiguous(problem.y0)[None],
-        _contiguous(problem.parameters)[None],
-        _contiguous(problem.segments),
-        _contiguous(problem.times),
-        problem.rtol,
-        _contiguous(problem.atol),
-        problem.margins,
-        problem.max_steps,
+        first.program,
+        _stacked([problem.y0 for problem in problems]),
+        _stacked([problem.parameters for problem in problems]),
+        segments,
+        times,
+        first.rtol,
+        _contiguous(first.atol),
+        first.margins,
+        first.max_steps,
         step_rows,
         event_rows,
-        problem.exchanged,
-        problem.seen,
-        problem.goes_on,
-        problem.spacing,
+        first.exchanged,
+        first.seen,
+        first.goes_on,
+        _stacked([problem.spacing for problem in problems]) if segments.ndim == 2 else first.spacing,
     )
 
 
-def _run_timed(tables: _Tables, seconds: float | None) -> list[int]:
-    """Run once and count; the compiled loop looks at the stop flag before every step."""
+def _stacked(rows: Sequence[Any]) -> Array:
+    """Values of each problem below each other, without a copy of those of one."""
+    return _contiguous(rows[0])[None] if len(rows) == 1 else np.array(rows, dtype=float)
+
+
+def _shared(*columns: Sequence[Array]) -> list[Array]:
+    """Values that all problems have in common, or those of each where they differ in any."""
+    alike = all(np.array_equal(values, rows[0]) for rows in columns for values in rows[1:])
+    return [_contiguous(rows[0]) if alike else np.array(rows, dtype=float) for rows in columns]
+
+
+def _run_timed(tables: _Tables, seconds: float | None) -> None:
+    """Run once; the compiled loop looks at the stop flag before every step."""
     if seconds is None:
         tables.run(0, 1)
     else:
@@ -145,8 +159,6 @@ def _run_timed(tables: _Tables, seconds: float | None) -> list[int]:
             tables.run(0, 1)
         finally:
             timer.cancel()
-    counts: list[int] = tables.counts[0].tolist()
-    return counts
 
 
 def _points(rows: Array, n: int) -> tuple[Array, Array, Array, Array]:
@@ -165,24 +177,62 @@ class Radau(Solver):
         stepper.compile_stepper()
 
     def solve(self, problem: Problem) -> Result:
-        rows = STEP_ROWS if problem.record_steps else 0
-        tables = _tables(problem, rows, EVENT_ROWS if problem.margins else 0)
-        counts = _run_timed(tables, problem.max_seconds)
-        while counts[EVENTS] > tables.events.shape[1] or (
-            problem.record_steps and counts[RECORDS] > tables.steps.shape[1]
-        ):
-            # The tables were too short; the run is repeated with the sizes it turned out to need, which a limit in
-            # seconds may change.
-            tables = _tables(problem, counts[RECORDS] if problem.record_steps else 0, counts[EVENTS])
-            counts = _run_timed(tables, problem.max_seconds)
-        return _result(problem, tables, counts)
+        tables = _tables([problem], *_usual_rows(problem))
+        _run_timed(tables, problem.max_seconds)
+        return _whole(problem, tables, 0)
+
+    def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
+        """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
+        number of threads; limits in seconds do not count.
+        """
+        alike: dict[tuple[int, int], list[int]] = {}
+        for i, problem in enumerate(problems):
+            alike.setdefault((len(problem.segments), len(problem.times)), []).append(i)
+        chunks = [group[k : k + CHUNK] for group in alike.values() for k in range(0, len(group), CHUNK)]
+        self.prepare()
+        with ThreadPoolExecutor(threads) as pool:
+            spread = pool.map if len(chunks) > 1 else map
+            solved = spread(lambda chunk: _solved([problems[i] for i in chunk]), chunks)
+            found = {
+                i: result
+                for chunk, each in zip(chunks, solved, strict=True)
+                for i, result in zip(chunk, each, strict=True)
+            }
+        return [found[i] for i in range(len(problems))]
 
 
-def _result(problem: Problem, tables: _Tables, counts: list[int]) -> Result:
+def _solved(problems: Sequence[Problem]) -> list[Result]:
+    tables = _tables(problems, *_usual_rows(problems[0]))
+    tables.run(0, len(problems))
+    return [_whole(problem, tables, i) for i, problem in enumerate(problems)]
+
+
+def _whole(problem: Problem, tables: _Tables, i: int) -> Result:
+    """The result of a run in tables; where these were too short it is repeated with the sizes it turned out to need,
+    which a limit in seconds may change.
+    """
+    while True:
+        needed, records = int(tables.counts[i, EVENTS]), int(tables.counts[i, RECORDS]) if problem.record_steps else 0
+        if needed <= tables.events.shape[1] and records <= tables.steps.shape[1]:
+            return _result(problem, tables, i)
+        tables, i = _tables([problem], records, needed), 0
+        _run_timed(tables, problem.max_seconds)
+
+
+def _usual_rows(problem: Problem) -> tuple[int, int]:
+    """Steps and events for which there is room at first."""
+    return STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
+
+
+def _result(problem: Problem, tables: _Tables, i: int) -> Result:
     program, n = problem.program, problem.program.n
-    outputs, end = counts[OUTPUTS], tables.ends[0]
+    counts: list[int] = tables.counts[i].tolist()
+    outputs, end = counts[OUTPUTS], tables.ends[i]
     m = 1 + 2 * n + program.n_ledger
-    values = tables.outputs[0, :outputs]
+    values = tables.outputs[i, :outputs]
+    events, steps = tables.events[i, : counts[EVENTS]], tables.steps[i, : counts[RECORDS]]
+    if len(tables.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
+        events, steps = events.copy(), steps.copy()
     return Result(
         problem=problem,
         status=_STATUSES[counts[END]],
@@ -194,9 +244,9 @@ def _result(problem: Problem, tables: _Tables, counts: list[int]) -> Result:
         times=problem.times if outputs == len(problem.times) else problem.times[:outputs],
         outputs=values[:, :n],
         ledger_outputs=values[:, n:],
-        events=_events(tables.events[0, : counts[EVENTS]], n) if counts[EVENTS] else _no_events(n, program.n_ledger),
+        events=_events(events, n) if counts[EVENTS] else _no_events(n, program.n_ledger),
         counters=Counters(*counts[RECORDS + 1 :]),
-        steps=Points(*_points(tables.steps[0, : counts[RECORDS]], n)) if problem.record_steps else None,
+        steps=Points(*_points(steps, n)) if problem.record_steps else None,
     )
 
 
@@ -211,20 +261,14 @@ def _no_events(n: int, q: int) -> Events:
 
 @dataclass(frozen=True)
 class Batch:
-    """Ends of many runs; ``outputs[i, :counts[i]]`` are the outputs run i reached, the rest is not set."""
+    """Ends of many runs as arrays; ``outputs[i, :counts[i]]`` are the outputs run i reached, the rest is not set."""
 
     status: NDArray[np.int64]
     t: Array
     y: Array
-    ydot: Array
-    ledger: Array
-    margins: Array
     outputs: Array
     ledger_outputs: Array
     counts: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    events: Sequence[Events]
-    """Events of each run, where they were asked for."""
 
 
 def solve_many(
@@ -239,83 +283,31 @@ def solve_many(
     margins: Sequence[Margin] = (),
     max_steps: int = 100_000,
     threads: int = 1,
-    event_rows: int = 0,
-    spacing: ArrayLike = np.inf,
 ) -> Batch:
-    """Run a batch of initial values [run, state] and parameters [run, segment, parameter]; independent of the number
-    of threads.
-
-    Segments and output times are shared by all runs, or have one row a run, both of them; so may the spacing have.
-    Events are recorded where ``event_rows``, the usual number of them, is not zero.
+    """Run arrays of initial values [run, state] and parameters [run, segment, parameter] that share segments and output
+    times, without anything of the way but the outputs; independent of the number of threads.
     """
     states, table, breaks, outputs = map(_contiguous, (y0, parameters, segments, times))
-    weights = np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))
-    own = breaks.ndim == 2
-    rows = {len(states), len(table), *((len(breaks), len(outputs)) if own else ())}
-    if len(rows) != 1 or outputs.ndim != breaks.ndim:
-        counts = f"{len(states)} initial values but {len(table)} parameter tables"
-        raise ValueError(f"{counts}; a batch needs one of each a run, and of segments and times too if of either.")
-    kinds = tuple(margins)
-    for i in range(len(states) if own else min(1, len(states))):  # runs that share times share all that is checked
-        when, pieces = (outputs[i], breaks[i]) if own else (outputs, breaks)
-        Problem(program, states[i], when, pieces, table[i], rtol, weights, kinds, max_steps)
-    while True:
-        tables = _Tables(
-            program,
-            states,
-            table,
-            breaks,
-            outputs,
-            rtol,
-            np.array(weights),
-            kinds,
-            max_steps,
-            0,
-            event_rows,
-            spacing=np.asarray(spacing, dtype=float),
+    if len(states) != len(table):
+        raise ValueError(
+            f"{len(states)} initial values but {len(table)} parameter tables; one of each a run is needed."
         )
-        _run_all(tables, len(states), threads)
-        most = int(tables.counts[:, EVENTS].max(initial=0))
-        if not 0 < event_rows < most:
-            return _batch(program, tables)
-        event_rows = most
-
-
-def _run_all(tables: _Tables, runs: int, threads: int) -> None:
+    weights, kinds = np.array(np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))), tuple(margins)
+    if len(states):  # of what the runs share is checked that it fits together
+        Problem(program, states[0], outputs, breaks, table[0], rtol, weights, kinds, max_steps)
+    tables = _Tables(program, states, table, breaks, outputs, rtol, weights, kinds, max_steps, 0, 0)
     stepper.run_batch()
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda start: tables.run(start, min(start + CHUNK, runs)), range(0, runs, CHUNK)))
-
-
-def _batch(program: Program, tables: _Tables) -> Batch:
-    n, q = program.n, program.n_ledger
-    _, y, ydot, rest = _points(tables.ends, n)
-    room = tables.events.shape[1]
-    events = zip(tables.events, np.minimum(tables.counts[:, EVENTS], room).tolist(), strict=True)
+        list(pool.map(lambda i: tables.run(i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
+    n = program.n
     return Batch(
         status=tables.counts[:, END],
         t=tables.ends[:, 0],
-        y=y,
-        ydot=ydot,
-        ledger=rest[:, :q],
-        margins=rest[:, q:],
+        y=tables.ends[:, 1 : 1 + n],
         outputs=tables.outputs[:, :, :n],
         ledger_outputs=tables.outputs[:, :, n:],
         counts=tables.counts[:, OUTPUTS],
-        steps=tables.counts[:, RECORDS + 1],
-        events=[_events(found[:count], n) if count else _no_events(n, q) for found, count in events],
     )
-
-
-def gathered(batches: Sequence[Batch], order: NDArray[np.int64]) -> Batch:
-    """One batch of many; ``order`` is which run each of theirs is, one batch after the other."""
-    if len(batches) == 1:
-        return batches[0]
-    back = np.argsort(order)
-    columns = {item.name: [getattr(batch, item.name) for batch in batches] for item in fields(Batch)}
-    events = [found for batch in columns.pop("events") for found in batch]
-    joined = {name: np.concatenate(parts)[back] for name, parts in columns.items()}
-    return Batch(**joined, events=[events[i] for i in back])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+"""Datasets of runs: the columns that a run and a sweep have in common, in xarray and in netCDF with CF conventions."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surfacechem.model.system import System
+from surfacechem.quantities import Quantity
+from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save
+from surfacechem.solve.run import Run, Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+DATASET_NAMES = {
+    "Q_1": "Q_ext_1",
+    "Q_2": "Q_ext_2",
+    "Q_c": "Q_ext_c",
+    "W_n": "work_n",
+    "W_t": "work_t",
+    "W_t2": "work_t2",
+}
+"""Names that differ in the dataset, where no two may be the same but for their case."""
+
+
+def quantities(system: System) -> dict[str, Quantity]:
+    """States, but for those inside bodies, and named quantities, by name."""
+    states = {state.name: state.quantity for state in system.states if state.name not in system.inside}
+    return states | {item.name: item.quantity for item in system.outputs}
+
+
+def quantity_columns(
+    runs: Sequence[Trajectory], inner: str = "time", axes: Mapping[str, int] | None = None
+) -> list[Column]:
+    """States and named quantities at the output times of one run, or of many along the ``axes`` of a sweep, by name and
+    size: there a quantity is not a number where a run did not arrive.
+    """
+    system = runs[0].model.system
+    kept = [j for j, state in enumerate(system.states) if state.name not in system.inside]
+    most = max(len(run.result.problem.times if axes else run.result.times) for run in runs)
+    found = quantities(system)
+    table = np.full((len(runs), most, len(found)), np.nan)
+    for rows, run in zip(table, runs, strict=True):
+        reached = len(run.result.times)
+        rows[:reached, : len(kept)], rows[:reached, len(kept) :] = run.result.outputs[:, kept], run.outputs
+    table = table.reshape(*(axes or {}).values(), most, len(found))
+    return [
+        Column(DATASET_NAMES.get(name, name), (*(axes or {}), inner), table[..., j], q.unit, q.long_name, q.tag)
+        for j, (name, q) in enumerate(found.items())
+    ]
+
+
+class Results(ABC):
+    """What a run and a sweep hand back: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
+
+    title: str
+    source: str
+    case: str
+    mechanism: str
+
+    @property
+    @abstractmethod
+    def columns(self) -> Sequence[Column]:
+        """Every variable of the dataset, the coordinates first."""
+
+    @property
+    @abstractmethod
+    def attributes(self) -> Mapping[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+
+    def _origin(self, run: Run) -> dict[str, str | float | int]:
+        """Attributes that say where the dataset is from."""
+        return {
+            "Conventions": CONVENTIONS,
+            "title": self.title,
+            "source": self.source or "surfacechem",
+            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
+            "case": self.case,
+            **({"mechanism": self.mechanism} if self.mechanism else {}),
+        }
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The xarray Dataset."""
+        import xarray
+
+        data = {c.name: (c.dimensions, c.values, c.attributes) for c in self.columns}
+        names = [c.name for c in self.columns if c.dimensions == (c.name,) or c.name == "time"]
+        coordinates = {name: data.pop(name) for name in names}
+        return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
+
+    def write(self, path: str | Path) -> Path:
+        """Save as netCDF; the file appears whole or not at all."""
+        target = dataset_path(path)
+        save(target, self.columns, self.attributes)
+        return target
