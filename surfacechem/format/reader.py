@@ -80,7 +80,9 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     names are gathered first.
     """
     top = tree.mapping(keys(Document))
-    bodies, interface = (top[name].mapping() if name in top else {} for name in ("bodies", "interface"))
+    nothing = Tree(None, tree.place)
+    bodies = top.get("bodies", nothing).mapping()
+    interface = top.get("interface", nothing).mapping(keys(InterfaceSection))
     if "bodies" in top:
         _check_bodies(top["bodies"], bodies)
     owners = [body.mapping().get("temperature") for body in bodies.values()] + [interface.get("temperature")]
@@ -307,21 +309,14 @@ def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
     """Initial values by variable; whether each evolves, the assembly decides."""
     values = dict(case.initial or {})
     given = values.pop("coverages", None)
-    if mechanism is None:
-        if given is not None:
-            place = case.tree.value["initial"].value["coverages"].place
-            raise InputError("coverages are those of a mechanism. Add `interface.mechanism`, or remove them.", place)
-        return values
-    if given is None:
-        remedy = "add `initial: {coverages: {species: value}}`."
-        raise InputError(f"the coverages of the mechanism: {remedy}", _place(case, "initial", "interface"))
-    return values | mechanism.coverages(given, case.tree.value["initial"].value["coverages"].place)
-
-
-def _place(case: Document, first: str, other: str) -> Place:
-    """Where a section stands, or the mechanism of the interface."""
-    tree: Tree = case.tree.value[first] if case.has(first) else case.tree.value[other].value["mechanism"]
-    return tree.place
+    if mechanism is not None and given is not None:
+        return values | mechanism.coverages(given, case.tree.value["initial"].value["coverages"].place)
+    if mechanism is not None:
+        message = "the coverages of the mechanism: add `initial: {coverages: {species: value}}`."
+        raise case.error(message, "initial") if case.has("initial") else case.interface.error(message, "mechanism")
+    if given is not None:
+        raise case.error("coverages are those of a mechanism. Add `interface.mechanism`, or remove them.", "initial")
+    return values
 
 
 # -- mechanism --------------------------------------------------------------------------------------------------------
