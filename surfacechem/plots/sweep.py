@@ -53,7 +53,7 @@ def _axes(dataset: xarray.Dataset) -> list[str]:
 
 
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Callable[[Axes], None]]:
-    known = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
+    known = _numbers(dataset)
     for name in variables or ():
         if name not in known:
             raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
@@ -62,6 +62,11 @@ def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Ca
         return [partial(_draw_spectrum, dataset=dataset, load=load)]
     groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset, known) or [["time_reached"]]
     return [partial(_draw_final, dataset=dataset, names=names) for names in groups]
+
+
+def _numbers(dataset: xarray.Dataset) -> list[str]:
+    """Names of the numbers that each run has at its end or along it."""
+    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
 
 
 def _dependent(dataset: xarray.Dataset, known: Sequence[str]) -> list[list[str]]:

@@ -120,6 +120,13 @@ def check_solvers(wanted: Sequence[str], path: str) -> None:
     check_some(wanted, path)
 
 
+def check_tolerances(wanted: Sequence[float], path: str) -> None:
+    """InputError for a tolerance that no solver takes, and for none."""
+    for rtol in wanted:
+        check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", path)
+    check_some(wanted, path)
+
+
 def check_some(wanted: Sequence[object], path: str) -> None:
     """InputError where nothing is wanted."""
     if len(wanted) == 0:

@@ -19,7 +19,7 @@ from surfacechem.runs.simulation import Simulation, load
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.radau.solver import LOOSEST
 from surfacechem.solve.run import Trajectory
-from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_some, filled
+from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_tolerances, filled
 from surfacechem.studies.report import Section, Study, Table, Variable
 from surfacechem.studies.truth import KINDS, MEANING, Errors, Subject, Truth, establish
 
@@ -111,9 +111,7 @@ def precision(
     before anything runs.
     """
     check_solvers(solvers, "solvers")
-    for rtol in tolerances:
-        check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", "tolerances")
-    check_some(tolerances, "tolerances")
+    check_tolerances(tolerances, "tolerances")
     check_range(repeat, 1 <= repeat <= MOST_REPEAT, f">= 1 and <= {MOST_REPEAT}", "repeat")
     subjects = _subjects([cases] if isinstance(cases, str | Path) else cases, overrides, variables)
     tolerances = sorted(set(map(float, tolerances)), reverse=True)

@@ -28,7 +28,7 @@ from surfacechem.solve import names as known_solvers
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.condition import condition, least
-from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, filled
+from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, check_tolerances, filled
 from surfacechem.studies.regimes import Exact, Expectation, Problem, Refused, Regime, Stops, chosen
 from surfacechem.studies.report import Section, Study, Table, Variable
 
@@ -134,7 +134,7 @@ def stability(
     """
     found = chosen(regimes)
     check_solvers(solvers, "--solvers")
-    check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", "--rtol")
+    check_tolerances([rtol], "--rtol")
     check_range(rounds, 0 <= rounds <= MOST_ROUNDS, f">= 0 and <= {MOST_ROUNDS}", "--search")
     rows = []
     for number, regime in enumerate(found, 1):
