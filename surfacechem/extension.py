@@ -25,8 +25,9 @@ from surfacechem.mechanism.fields import converted
 from surfacechem.mechanism.keys import REACTION
 from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
-from surfacechem.mechanism.rates import KILO, CoverageTerm, InterfaceArrhenius
+from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import sides
+from surfacechem.mechanism.thermo import KILO
 from surfacechem.quantities import VARIABLES
 
 __all__ = ["LoadedInterface"]

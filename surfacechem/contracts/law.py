@@ -195,6 +195,16 @@ class Law(ABC):
         default = next(item.default for item in dataclasses.fields(self) if item.name == name)
         return bool(getattr(self, name) == default)
 
+    def with_parts(self, bind: Callable[[Law, str, str], Any]) -> Self:
+        """The same law with the laws that it shares with others, if any, put through ``bind``, each with the path under
+        which a case finds its parameters and what is added to their names.
+        """
+        return self
+
+    def given(self, numbers: Mapping[str, float]) -> Self:
+        """The same law with other numbers, which are checked."""
+        return dataclasses.replace(self, **dict(numbers))
+
     def bind(self, values: Mapping[str, Expression]) -> Self:
         """The same law with some of its parameters replaced, by symbols for instance; nothing is checked."""
         bound = copy.copy(self)

@@ -11,6 +11,9 @@ from surfacechem.errors import InputError, Place, suggestion
 WRITTEN_OUT = ("level", "value", "rises-to")
 """Keys of a value that may also stand by itself."""
 
+WHOLE = {"interface.mechanism": "file"}
+"""Sections that may be one value, and the key that it is short for."""
+
 
 def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:
     """The tree with the given values; texts are "path=value" with the value in YAML.
@@ -44,6 +47,8 @@ def parameter_path(path: str, known: Container[str]) -> str:
     """
     above, _, last = path.rpartition(".")
     others = [path, f"{path}.level", *([above] if last in WRITTEN_OUT else [])]
+    if path.startswith("mechanism."):  # the path in datasets of version 0.1
+        others.append(f"interface.mechanism.reactions.{path.removeprefix('mechanism.')}")
     return next((other for other in others if other in known), path)
 
 
@@ -72,6 +77,8 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return _set_item(tree, keys, new, place)
     if len(keys) == 1 and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not _removes(new):
         return new  # a bare value is, for example, the level of a constant history
+    if isinstance(tree.value, str) and tree.place.path in WHOLE:
+        tree = replace(tree, value={WHOLE[tree.place.path]: tree})
     if tree.value is not None and not isinstance(tree.value, dict):
         raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
     known = tree.value or {}

@@ -17,6 +17,7 @@ from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, read
+from surfacechem.format.mechanism import with_numbers
 from surfacechem.format.sections import (
     BODY_NAME,
     LINEAR,
@@ -338,7 +339,8 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     }
 
     def load(path: Path, shown: str) -> Mechanism:
-        return load_mechanism(path, section.phase, section.bonds, tree.place, evaluate, neighbours, shown)
+        loaded = load_mechanism(path, section.phase, section.bonds, tree.place, evaluate, neighbours, shown)
+        return with_numbers(loaded, section.species, section.reactions)
 
     if content is None:
         path = _find(file, base, tree.value["file"] if isinstance(named, MechanismSection) else tree)

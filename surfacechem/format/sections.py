@@ -166,6 +166,9 @@ class NeighbourSection(Section):
     electric_potential: float = quantity("V", "electric potential against the surface", 0.0, name="electric-potential")
 
 
+NUMBERS = Entries(others=amount("1"))
+
+
 class MechanismSection(Section):
     """Cantera surface mechanism"""
 
@@ -177,6 +180,10 @@ class MechanismSection(Section):
     neighbours: Mapping[str, NeighbourSection] | None = key(
         Entries(others=Nested(NeighbourSection)), "states in which the phases beside the surface are held, by name"
     )
+    species: Tree | None = key(
+        Later(Entries(others=Entries(others=Shapes(amount("1"), NUMBERS)))), "other numbers of species, by name"
+    )
+    reactions: Tree | None = key(Later(Entries(others=NUMBERS)), "other numbers of reactions, the first being `R1`")
 
 
 DENSITY = amount("1/m^2", "density of bonding sites", above=0)

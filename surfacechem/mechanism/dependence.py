@@ -8,8 +8,8 @@ from typing import Any
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.mechanism.interaction import Curve, Interaction
-from surfacechem.mechanism.rates import KILO
 from surfacechem.mechanism.source import Source
+from surfacechem.mechanism.thermo import KILO
 
 KEY = "coverage-dependencies"
 

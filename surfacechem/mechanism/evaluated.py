@@ -14,7 +14,8 @@ from surfacechem.contracts.terms import option, parameter
 from surfacechem.expressions import Expression
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
 from surfacechem.mechanism.neighbours import Held
-from surfacechem.mechanism.rates import KILO, MechanismReaction
+from surfacechem.mechanism.rates import MechanismReaction
+from surfacechem.mechanism.thermo import KILO
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""

@@ -8,13 +8,9 @@ from typing import Any
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
 from surfacechem.mechanism.mixture import AVOGADRO, Spring
-from surfacechem.mechanism.rates import KILO, SurfaceReaction
+from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source
-
-SPRING = {
-    "stiffness": Spec("N/m", "stiffness of the bond", at_least=0),
-    "rest-length": Spec("m", "length without force"),
-}
+from surfacechem.mechanism.thermo import KILO
 
 
 def rate_fields(law: type[SurfaceReaction], source: Source, entry: Any) -> dict[str, float]:
@@ -40,8 +36,10 @@ def spring(source: Source, entry: Any) -> Spring | None:
     title = f"species {entry.get('name')}: bond"
     if "stiffness" not in bond:
         raise InputError(f"{title} needs `stiffness`: stiffness of the bond [N/m].", source.place(entry, "bond"))
-    numbers = {key: _number(source, entry, bond, key, spec, title) for key, spec in SPRING.items() if key in bond}
-    return Spring(numbers["stiffness"], numbers.get("rest-length", 0.0))
+    keys = {name.replace("_", "-"): (name, spec) for name, spec in Spring.specs()}
+    items = ((name, key, spec) for key, (name, spec) in keys.items() if key in bond)
+    found: Any = {name: _number(source, entry, bond, key, spec, title) for name, key, spec in items}
+    return Spring(**found)
 
 
 LONGEST = 1e-5

@@ -22,13 +22,16 @@ from surfacechem.mechanism.keys import check, has_neighbours
 from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
 from surfacechem.mechanism.neighbours import Neighbour, hold, remarks
-from surfacechem.mechanism.rates import KILO, plain
+from surfacechem.mechanism.rates import plain
 from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import LIMITS, Source, sides
-from surfacechem.mechanism.thermo import lower
+from surfacechem.mechanism.thermo import KILO, lower
 from surfacechem.scene import BondingVariable, Engine, Sites
 
 NONE: Mapping[str, Neighbour] = {}
+
+REACTIONS = "interface.mechanism.reactions"
+"""Where a case gives other numbers of reactions than the mechanism."""
 
 SUM_TOLERANCE = 1e-9
 """How far initial coverages may miss one."""
@@ -90,17 +93,22 @@ def load_mechanism(
     check(source, entry, evaluate)
     surface, said = _cantera(source, entry)
     hold(surface, neighbours, place)
-    species = _species(surface, source, entry)
+    parsed = _parsed(surface, source, entry)
+    species = _species(surface, source, entry, any(outside for _, _, outside in parsed))
     chosen = _bonds(species, bonds, place)
     density = surface.site_density * KILO * AVOGADRO
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
     temperatures = (float(surface.min_temp), float(surface.max_temp))
-    mixture = IdealMixture(species=species, temperatures=temperatures, place=_law_place(source, entry, "mechanism"))
-    reactions = _reactions(surface, source, entry, species)
+    place = _law_place(source, entry, "interface.mechanism")
+    mixture = IdealMixture(species=species, temperatures=temperatures, place=place)
+    reactions: list[RateLaw] = []
+    for number, (reaction, item, outside) in enumerate(parsed, start=1):
+        make = _evaluated if outside else _lowered
+        reactions.append(make(reaction, source, item, f"R{number}", species))
     return Mechanism(
         potentials=(mixture,),
-        reactions=reactions,
+        reactions=tuple(reactions),
         variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
         bonds=tuple(item.variable for item in chosen),
         sites=Sites(possible, possible),
@@ -113,7 +121,7 @@ def load_mechanism(
     )
 
 
-def _engine(surface: Any, species: tuple[Species, ...], reactions: tuple[RateLaw, ...]) -> Engine | None:
+def _engine(surface: Any, species: tuple[Species, ...], reactions: Sequence[RateLaw]) -> Engine | None:
     evaluated = {i: law for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)}
     return SurfaceEngine(surface, species, evaluated) if evaluated else None
 
@@ -174,7 +182,7 @@ def _translated(text: str, source: Source) -> InputError:
     return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
 
 
-def _species(surface: Any, source: Source, phase: Any) -> tuple[Species, ...]:
+def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Species, ...]:
     entries = {str(entry["name"]): entry for entry in source.species(phase)}
     names = identifiers(surface.species_names)
     result = []
@@ -187,7 +195,8 @@ def _species(surface: Any, source: Source, phase: Any) -> tuple[Species, ...]:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         entry = entries[item.name]
         own = interactions(source, entry, names)
-        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring(source, entry), own))
+        elastic = spring(source, entry)
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs, elastic, own, fixed))
     _check_potential(result, entries, source)
     return tuple(result)
 
@@ -232,15 +241,11 @@ def _law_place(source: Source, node: Any, path: str) -> Place:
     return Place(source.file, source.place(node).line, path)
 
 
-def _reactions(surface: Any, source: Source, phase: Any, species: tuple[Species, ...]) -> tuple[RateLaw, ...]:
-    beside = has_neighbours(phase)
-    own = [item.name for item in species]
-    paired = zip(surface.reactions(), _kept(source, phase, surface.kinetics_species_names), strict=True)
-    found: list[RateLaw] = []
-    for number, (reaction, entry) in enumerate(paired, start=1):
-        make = _evaluated if is_evaluated(entry, own, beside) or reaction.rate.uses_electrochemistry else _lowered
-        found.append(make(reaction, source, entry, f"R{number}", species))
-    return tuple(found)
+def _parsed(surface: Any, source: Source, phase: Any) -> list[tuple[Any, Any, bool]]:
+    """Every reaction as Cantera and as the file has it, and whether only Cantera can say how fast it is."""
+    beside, own = has_neighbours(phase), surface.species_names
+    pairs = zip(surface.reactions(), _kept(source, phase, surface.kinetics_species_names), strict=True)
+    return [(x, entry, is_evaluated(entry, own, beside) or x.rate.uses_electrochemistry) for x, entry in pairs]
 
 
 def _kept(source: Source, phase: Any, known: Iterable[str]) -> list[Any]:
@@ -255,7 +260,7 @@ def _species_of(entry: Any) -> set[str]:
 
 def _evaluated(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
     """The law of a reaction whose rate only Cantera can say."""
-    place = _law_place(source, entry, f"mechanism.{number}")
+    place = _law_place(source, entry, f"{REACTIONS}.{number}")
     names = dict.fromkeys((*reaction.reactants, *reaction.products))
     whole = _change(reaction, {name: name for name in names})
     change = {s.variable: whole[s.name] for s in species if s.name in whole}
@@ -271,7 +276,7 @@ def _evaluated(reaction: Any, source: Source, entry: Any, number: str, species: 
 
 def _lowered(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
     """The law of a reaction as a formula."""
-    place = _law_place(source, entry, f"mechanism.{number}")
+    place = _law_place(source, entry, f"{REACTIONS}.{number}")
     variables = {item.name: item.variable for item in species}
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
-from surfacechem.contracts.terms import Potential, option
+from surfacechem.contracts.terms import Law, Potential, option, parameter
 from surfacechem.expressions import Expression, mixing
 from surfacechem.mechanism.interaction import SAME, Interaction
-from surfacechem.mechanism.thermo import StandardGibbs
+from surfacechem.mechanism.thermo import Bind, StandardGibbs
 from surfacechem.quantities import BOLTZMANN
 
 AVOGADRO = 6.02214076e23
@@ -29,12 +30,18 @@ class Formula:
         return self.evaluate(values)
 
 
-@dataclass(frozen=True)
-class Spring:
-    """Elasticity of a bond across the gap: stiffness [N/m] and the gap at which it is not stretched [m]."""
+SPECIES = "interface.mechanism.species"
+"""Where a case gives other numbers of species than the mechanism."""
 
-    stiffness: float
-    rest_length: float = 0.0
+
+class Spring(Law):
+    """Elasticity of a bond across the gap."""
+
+    contract = "elasticity"
+    formula = "energy"
+
+    stiffness: float = parameter("N/m", "stiffness of the bond", at_least=0)
+    rest_length: float = parameter("m", "length without force", default=0.0)
 
     def energy(self, g_n: Expression) -> Expression:
         """Elastic energy [J] of one bond.
@@ -58,6 +65,23 @@ class Species:
     gibbs: StandardGibbs
     spring: Spring | None = None
     interactions: tuple[Interaction, ...] = ()
+    fixed: bool = False
+    """Whether its numbers cannot change, because Cantera uses those of the file."""
+
+    @property
+    def path(self) -> str:
+        """Where a case gives its numbers."""
+        return f"{SPECIES}.{self.name}"
+
+    def bound(self, bind: Bind) -> Species:
+        """The same with symbols for the parameters of its thermo and its spring."""
+        if self.fixed:
+            return self
+        end = self.variable.removeprefix("theta")
+        spring = bind(self.spring, self.path, end) if self.spring else None
+        paths = [(form, ".".join(filter(None, (self.path, key))), key) for key, form in self.gibbs.ranges.items()]
+        forms = [bind(form, path, f"{end}_{key}" if key else end) for form, path, key in paths]
+        return replace(self, gibbs=self.gibbs.with_forms(forms), spring=spring)
 
     @property
     def amount(self) -> str:
@@ -90,6 +114,10 @@ class IdealMixture(Potential):
 
     species: tuple[Species, ...] = option("species of the surface phase")
     temperatures: tuple[float, float] = option("range of the species' thermodynamic data [K]")
+
+    def with_parts(self, bind: Bind) -> Self:
+        """With symbols for the parameters of its species."""
+        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:

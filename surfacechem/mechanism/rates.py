@@ -9,15 +9,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from surfacechem.contracts.terms import RateLaw, Spec, option, parameter
 from surfacechem.expressions import Expression, log, log_fraction, power, scaled_exp, where
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
+from surfacechem.mechanism.thermo import KILO, Bind
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-
-KILO = 1000.0
-"""Moles in a kmol, in which Cantera counts."""
 
 NO_COVERAGES: Mapping[str, Expression] = {}
 
@@ -114,6 +112,10 @@ class SurfaceReaction(MechanismReaction):
     @abstractmethod
     def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
         """Own fields of the class, in SI units per molecule, from a Cantera reaction of total order ``order``."""
+
+    def with_parts(self, bind: Bind) -> Self:
+        """With symbols for the parameters of the species that take part."""
+        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
 
     @classmethod
     def own_keys(cls) -> dict[str, str]:

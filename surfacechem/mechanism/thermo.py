@@ -6,79 +6,162 @@ constant-cp, NASA7, NASA9 and Shomate (McBride, Zehe & Gordon, NASA/TP-2002-2115
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self, cast
 
+from surfacechem.contracts.terms import Law, option, parameter
 from surfacechem.expressions import Expression, log, where
 from surfacechem.quantities import GAS_CONSTANT
 
-Form = Callable[[Sequence[float], Expression], Expression]
+Bind = Callable[[Law, str, str], Any]
+"""Puts symbols for the parameters of a law, which gets its path in a case and the end of their names."""
+
+
+class GibbsForm(Law):
+    """Standard molar Gibbs energy over R [K] as a function of temperature."""
+
+    contract = "thermo"
+    formula = "over_R"
+
+    @abstractmethod
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+
+
+class ConstantCp(GibbsForm):
+    """Constant heat capacity: h = h0 + cp0 (T - T0), s = s0 + cp0 ln(T/T0).
+
+    >>> round(ConstantCp(h0=-8314.462618, s0=16.628925236).over_R(300.0), 9)
+    -1600.0
+    """
+
+    T0: float = parameter("K", "temperature at which h0 and s0 hold", default=298.15, above=0)
+    h0: float = parameter("J/mol", "enthalpy at T0", default=0.0)
+    s0: float = parameter("J/(mol K)", "entropy at T0", default=0.0)
+    cp0: float = parameter("J/(mol K)", "heat capacity", default=0.0)
+
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+        value = self.h0 / GAS_CONSTANT - T * (self.s0 / GAS_CONSTANT)
+        # Without a heat capacity T0 is in no equation.
+        return value + self.cp0 / GAS_CONSTANT * (T - self.T0 - T * log(T / self.T0)) if self.cp0 != 0 else value
+
+
+class Series(GibbsForm):
+    """A form of many coefficients, which stand in formulas as numbers, so that those of a reaction are summed up.
+
+    A coefficient that a case gives becomes a parameter like any other.
+    """
+
+    free: frozenset[str] = option("coefficients that are parameters", default=frozenset())
+
+    def given(self, numbers: Mapping[str, float]) -> Self:
+        """The same form with other coefficients."""
+        return replace(super().given(numbers), free=self.free | set(numbers))
+
+    def is_default(self, name: str) -> bool:
+        """Whether a coefficient is a number of the formula."""
+        return name not in self.free
+
+
+class Nasa7(Series):
+    """cp/R = a0 + a1 T + ... + a4 T^4, h/R = ... + a5, s/R = ... + a6."""
+
+    a0: float = parameter("1", "constant part of cp/R")
+    a1: float = parameter("1/K", "coefficient of T in cp/R")
+    a2: float = parameter("1/K^2", "coefficient of T^2 in cp/R")
+    a3: float = parameter("1/K^3", "coefficient of T^3 in cp/R")
+    a4: float = parameter("1/K^4", "coefficient of T^4 in cp/R")
+    a5: float = parameter("K", "constant part of h/R")
+    a6: float = parameter("1", "constant part of s/R")
+
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+        power = self.a0 * T * (1 - log(T)) - self.a1 * T**2 / 2 - self.a2 * T**3 / 6
+        return power - self.a3 * T**4 / 12 - self.a4 * T**5 / 20 + self.a5 - self.a6 * T
+
+
+class Nasa9(Series):
+    """cp/R = a0/T^2 + a1/T + a2 + a3 T + ... + a6 T^4, h/R = ... + a7, s/R = ... + a8."""
+
+    a0: float = parameter("K^2", "coefficient of 1/T^2 in cp/R")
+    a1: float = parameter("K", "coefficient of 1/T in cp/R")
+    a2: float = parameter("1", "constant part of cp/R")
+    a3: float = parameter("1/K", "coefficient of T in cp/R")
+    a4: float = parameter("1/K^2", "coefficient of T^2 in cp/R")
+    a5: float = parameter("1/K^3", "coefficient of T^3 in cp/R")
+    a6: float = parameter("1/K^4", "coefficient of T^4 in cp/R")
+    a7: float = parameter("K", "constant part of h/R")
+    a8: float = parameter("1", "constant part of s/R")
+
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+        inverse = -self.a0 / (2 * T) + self.a1 * (log(T) + 1) + self.a2 * T * (1 - log(T))
+        power = -self.a3 * T**2 / 2 - self.a4 * T**3 / 6 - self.a5 * T**4 / 12 - self.a6 * T**5 / 20
+        return inverse + power + self.a7 - self.a8 * T
+
+
+class Shomate(Series):
+    """cp = A + B t + C t^2 + D t^3 + E / t^2 with t = T / 1000 K, h = 1000 K (A t + ... - E / t + F), s = ... + G."""
+
+    A: float = parameter("J/(mol K)", "constant part of cp")
+    B: float = parameter("J/(mol K)", "coefficient of t in cp")
+    C: float = parameter("J/(mol K)", "coefficient of t^2 in cp")
+    D: float = parameter("J/(mol K)", "coefficient of t^3 in cp")
+    E: float = parameter("J/(mol K)", "coefficient of 1/t^2 in cp")
+    F: float = parameter("J/(mol K)", "constant part of h over 1000 K")
+    G: float = parameter("J/(mol K)", "constant part of s")
+
+    def over_R(self, T: Expression) -> Expression:
+        """Value [K] at T [K]."""
+        t = T / 1000
+        h = self.A * t + self.B * t**2 / 2 + self.C * t**3 / 3 + self.D * t**4 / 4 - self.E / t + self.F
+        s = self.A * log(t) + self.B * t + self.C * t**2 / 2 + self.D * t**3 / 3 - self.E / (2 * t**2) + self.G
+        return 1000 * (h - t * s) / GAS_CONSTANT
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Coefficients that hold up to the temperature ``top`` [K], which belongs to this piece if ``closed``."""
+    """A form that holds up to the temperature ``top`` [K], which belongs to this piece if ``closed``."""
 
     top: float
-    coefficients: tuple[float, ...]
+    form: GibbsForm
     closed: bool = True
 
 
 @dataclass(frozen=True)
 class StandardGibbs:
-    """Standard molar Gibbs energy over R [K] as a function of temperature.
+    """Standard molar Gibbs energy over R [K] as a function of temperature, from one range to the next.
 
-    >>> water = StandardGibbs("constant-cp", (Piece(1e9, (298.15, -1000.0, 2.0, 0.0)),))
-    >>> water(300.0)
+    >>> water = StandardGibbs((Piece(1e9, ConstantCp(h0=-8314.462618, s0=16.628925236)),))
+    >>> round(water(300.0), 9)
     -1600.0
     """
 
-    model: str
     pieces: tuple[Piece, ...]
     shift: float = 0.0
     """What is added to it for each kelvin, by a standard state of another coverage than one."""
 
     def __call__(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
-        form = FORMS[self.model]
-        value = form(self.pieces[-1].coefficients, T)
+        value = self.pieces[-1].form.over_R(T)
         for piece in reversed(self.pieces[:-1]):
             below = piece.top >= T if piece.closed else piece.top > T
-            value = where(below, form(piece.coefficients, T), value)
+            value = where(below, piece.form.over_R(T), value)
         return value + self.shift * T if self.shift else value
 
+    @property
+    def ranges(self) -> dict[str, GibbsForm]:
+        """The forms by the name of their range, which has none where one form holds for all temperatures."""
+        several = len(self.pieces) > 1
+        return {f"range_{k}" if several else "": piece.form for k, piece in enumerate(self.pieces, start=1)}
 
-def constant_cp(c: Sequence[float], T: Expression) -> Expression:
-    """From (T0, h0/R, s0/R, cp/R): h = h0 + cp (T - T0), s = s0 + cp ln(T/T0)."""
-    T0, h0, s0, cp = c
-    value = h0 - T * s0
-    return value + cp * (T - T0 - T * log(T / T0)) if cp else value
-
-
-def nasa7(c: Sequence[float], T: Expression) -> Expression:
-    """From a0..a6 of cp/R = a0 + a1 T + ... + a4 T^4, h/R = ... + a5, s/R = ... + a6."""
-    power = c[0] * T * (1 - log(T)) - c[1] * T**2 / 2 - c[2] * T**3 / 6 - c[3] * T**4 / 12 - c[4] * T**5 / 20
-    return power + c[5] - c[6] * T
-
-
-def nasa9(c: Sequence[float], T: Expression) -> Expression:
-    """From a0..a8 of cp/R = a0/T^2 + a1/T + a2 + a3 T + ... + a6 T^4, h/R = ... + a7, s/R = ... + a8."""
-    inverse = -c[0] / (2 * T) + c[1] * (log(T) + 1) + c[2] * T * (1 - log(T))
-    power = -c[3] * T**2 / 2 - c[4] * T**3 / 6 - c[5] * T**4 / 12 - c[6] * T**5 / 20
-    return inverse + power + c[7] - c[8] * T
-
-
-def shomate(c: Sequence[float], T: Expression) -> Expression:
-    """From A..G, with t = T / 1000 K and cp = A + B t + C t^2 + D t^3 + E / t^2 [J/(mol K)]."""
-    t = T / 1000
-    A, B, C, D, E, F, G = c
-    h = A * t + B * t**2 / 2 + C * t**3 / 3 + D * t**4 / 4 - E / t + F
-    s = A * log(t) + B * t + C * t**2 / 2 + D * t**3 / 3 - E / (2 * t**2) + G
-    return 1000 * (h - t * s) / GAS_CONSTANT
-
-
-FORMS: dict[str, Form] = {"constant-cp": constant_cp, "NASA7": nasa7, "NASA9": nasa9, "Shomate": shomate}
+    def with_forms(self, forms: Sequence[GibbsForm]) -> StandardGibbs:
+        """The same with other forms in its ranges."""
+        pairs = zip(self.pieces, forms, strict=True)
+        return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
 
 
 def lower(thermo: Any) -> StandardGibbs | None:
@@ -90,31 +173,36 @@ def lower(thermo: Any) -> StandardGibbs | None:
         "ShomatePoly2": _from_shomate,
     }
     reader = readers.get(type(thermo).__name__)
-    return reader([float(x) for x in thermo.coeffs], float(thermo.max_temp)) if reader else None
+    return StandardGibbs(reader([float(x) for x in thermo.coeffs], float(thermo.max_temp))) if reader else None
 
 
-MOLAR = GAS_CONSTANT * 1000.0
-"""Gas constant per kmol, in which Cantera counts."""
+KILO = 1000.0
+"""Moles in a kmol, in which Cantera counts."""
 
 
-def _from_constant_cp(c: list[float], top: float) -> StandardGibbs:
-    return StandardGibbs("constant-cp", (Piece(top, (c[0], c[1] / MOLAR, c[2] / MOLAR, c[3] / MOLAR)),))
+def _from_constant_cp(c: list[float], top: float) -> tuple[Piece, ...]:
+    return (Piece(top, ConstantCp(T0=c[0], h0=c[1] / KILO, s0=c[2] / KILO, cp0=c[3] / KILO)),)
 
 
-def _from_nasa7(c: list[float], top: float) -> StandardGibbs:
-    return StandardGibbs("NASA7", _two(c[0], c[8:15], c[1:8], top))
+def _from_nasa7(c: list[float], top: float) -> tuple[Piece, ...]:
+    return _two(Nasa7, c[0], c[8:15], c[1:8], top)
 
 
-def _from_shomate(c: list[float], top: float) -> StandardGibbs:
-    return StandardGibbs("Shomate", _two(c[0], c[1:8], c[8:15], top))
+def _from_shomate(c: list[float], top: float) -> tuple[Piece, ...]:
+    return _two(Shomate, c[0], c[1:8], c[8:15], top)
 
 
-def _two(middle: float, low: list[float], high: list[float], top: float) -> tuple[Piece, ...]:
+def _two(form: type[Series], middle: float, low: list[float], high: list[float], top: float) -> tuple[Piece, ...]:
     if low == high:
-        return (Piece(top, tuple(low)),)
-    return Piece(middle, tuple(low)), Piece(top, tuple(high))
+        return (Piece(top, _filled(form, low)),)
+    return Piece(middle, _filled(form, low)), Piece(top, _filled(form, high))
 
 
-def _from_nasa9(c: list[float], top: float) -> StandardGibbs:
+def _from_nasa9(c: list[float], top: float) -> tuple[Piece, ...]:
     regions = [c[1 + 11 * i : 12 + 11 * i] for i in range(int(c[0]))]
-    return StandardGibbs("NASA9", tuple(Piece(r[1], tuple(r[2:]), closed=False) for r in regions))
+    return tuple(Piece(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions)
+
+
+def _filled(form: type[Series], coefficients: Sequence[float]) -> Series:
+    names = (name for name, _ in form.specs())
+    return form(**cast(dict[str, Any], dict(zip(names, coefficients, strict=True))))

@@ -146,7 +146,7 @@ def test_bond_of_one_site_is_counted_by_the_site_density():
 
 def test_parameters_have_paths_places_and_units():
     (law,) = load("dna-film.yaml").reactions
-    assert law.path == "mechanism.R1"
+    assert law.path == "interface.mechanism.reactions.R1"
     assert law.place.line == load("dna-film.yaml").text.splitlines().index("- equation: A(s) + B(s) <=> AB(s)") + 1
     specs = {name: law.refine(name, spec).unit for name, spec in law.specs()}
     assert specs == {"A": "m^2/s", "b": "1", "Ea": "J/mol"}

@@ -189,7 +189,7 @@ def test_phi_counts_bonds_and_is_in_the_dataset():
     assert phi.output
     assert numbers(system, [phi.expression], {"theta_AB_s": 0.4}) == pytest.approx([0.4])
     (law,) = mechanism.reactions
-    assert {p.path for p in system.parameters} >= {"mechanism.R1.A", "interface.theta_AB_s.density"}
+    assert {p.path for p in system.parameters} >= {"interface.mechanism.reactions.R1.A", "interface.theta_AB_s.density"}
     assert next(p for p in system.parameters if p.path == f"{law.path}.A").spec.unit == "m^2/s"
 
 

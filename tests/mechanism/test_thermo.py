@@ -1,0 +1,126 @@
+"""Numbers of a mechanism as run-time parameters: changed, swept and checked as if the file had them."""
+
+import cantera as ct
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.documents.shipped import cases, mechanisms
+from surfacechem.errors import InputError
+from surfacechem.mechanism.thermo import Nasa7, lower
+from surfacechem.runs import rerun
+from surfacechem.solve.run import Model
+
+SPECIES = "interface.mechanism.species"
+STIFFNESS, ENTROPY, CAPACITY = (f"{SPECIES}.bond(s).{name}" for name in ("stiffness", "s0", "cp0"))
+RATE, ORDER = (f"interface.mechanism.reactions.R1.{name}" for name in ("A", "b"))
+
+NASA7 = "{model: NASA7, temperature-ranges: [200, 290, 1000], data: [[1, 0, 0, 0, 0, 1, 1], [2, 0, 0, 0, 0, 3, 4]]}"
+
+
+def case(folder, *replaced, name="press-hold-pull", mechanism="selectin-pulled"):
+    """A shipped case whose mechanism has other text in some places."""
+    text = (mechanisms() / f"{mechanism}.yaml").read_text(encoding="utf-8")
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / f"{mechanism}.yaml").write_text(text, encoding="utf-8")
+    path = folder / f"{name}.yaml"
+    path.write_text((cases() / path.name).read_text(encoding="utf-8"), encoding="utf-8")
+    return path
+
+
+def ends(solution):
+    """Coverages at all times."""
+    dataset = solution.dataset
+    return np.array([dataset[name].values for name in ("theta_free_s", "theta_bond_s", "g_n")])
+
+
+EDITS = {
+    STIFFNESS: ("6 pN/nm", ("stiffness: 5.3 pN/nm", "stiffness: 6 pN/nm")),
+    RATE: ("0.03 1/s", ("A: 0.02 1/s", "A: 0.03 1/s")),
+    ENTROPY: ("21 J/mol/K", ("s0: 19.14475 J/mol/K", "s0: 21 J/mol/K")),
+    ORDER: (0.1, ("b: 0, Ea: 0", "b: 0.1, Ea: 0")),
+}
+
+
+@pytest.mark.parametrize("path", EDITS, ids=lambda path: path.rpartition(".")[2])
+def test_a_number_that_is_changed_is_that_of_the_file(tmp_path, path):
+    value, edit = EDITS[path]
+    expected = ends(surfacechem.load(case(tmp_path, edit)).run(error="balances"))
+    given = surfacechem.load("press-hold-pull", {path: value}).run(error="balances")
+    changed = surfacechem.load("press-hold-pull").run({path: value}, error="balances")
+    np.testing.assert_allclose(ends(given), expected, rtol=1e-8, atol=1e-15)
+    np.testing.assert_allclose(ends(changed), expected, rtol=1e-8, atol=1e-15)
+
+
+def test_the_equations_name_what_may_change():
+    system = surfacechem.load("press-hold-pull").system
+    named = {p.path: (str(p.symbol), p.spec.unit, p.value) for p in system.parameters}
+    assert named[STIFFNESS] == ("stiffness_bond_s", "N/m", pytest.approx(5.3e-3))
+    assert named[ENTROPY] == ("s0_bond_s", "J/(mol K)", 19.14475)
+    force = next(item.expression for item in system.named if item.name == "f_theta_bond_s")
+    assert str(force) == "g_n*stiffness_bond_s"
+    assert {CAPACITY, ORDER} <= set(system.constants)  # at their defaults they are numbers until they are changed
+
+
+def test_a_sweep_compiles_once(monkeypatch):
+    simulation = surfacechem.load("press-hold-pull", ["run.until=1 s"])
+    assert simulation.model
+    made = []
+    monkeypatch.setattr(Model, "__init__", lambda *_: made.append(1))
+    swept = simulation.sweep({STIFFNESS: [4e-3, 6e-3], "mechanism.R1.A": ["0.01 1/s", "0.04 1/s"]})
+    assert not made
+    assert swept.dataset.sizes[STIFFNESS.rpartition(".")[2]] == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (STIFFNESS, "-1 N/m", r"stiffness = -1 is outside its range: >= 0"),
+        (STIFFNESS, "1 m", r"1 m is a length; stiffness needs a"),
+        ("interface.mechanism.reactions.R2.A", 1, r"unknown key 'R2'. Known: R1"),
+        ("interface.mechanism.reactions.R1.x-beta", "1 nm", r"Did you mean 'x_beta'\?"),
+        (f"{SPECIES}.free(s).stiffness", "1 N/m", r"unknown key 'stiffness'. Known: T0, cp0, h0, s0"),
+        (f"{SPECIES}.bond.s0", 1, r"unknown key 'bond'. Did you mean 'bond\(s\)'"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_path(path, value, message):
+    with pytest.raises(InputError, match=message) as refused:
+        surfacechem.load("press-hold-pull", {path: value})
+    assert refused.value.place.path.startswith("interface.mechanism.")
+
+
+def test_coefficients_of_polynomials_are_parameters_by_range(tmp_path):
+    old = "thermo: {model: constant-cp, T0: 298.15 K, h0: 0 kJ/mol, s0: 19.14475 J/mol/K, cp0: 0 J/mol/K}"
+    simulation = surfacechem.load(case(tmp_path, (old, f"thermo: {NASA7}")))
+    path = f"{SPECIES}.bond(s).range_2.a5"
+    assert path not in {p.path for p in simulation.system.parameters}
+    changed = surfacechem.load(case(tmp_path, (old, f"thermo: {NASA7.replace('3, 4]', '99, 4]')}")))
+    np.testing.assert_allclose(
+        ends(simulation.run({path: 99.0}, error="balances")), ends(changed.run(error="balances")), rtol=1e-8, atol=1e-15
+    )
+
+
+def test_thermo_that_cantera_uses_too_does_not_change(tmp_path):
+    evaluated = "rate-constant: {A: 0.02 1/s, b: 0, Ea: 0}\n  x-beta: 0.25 nm"
+    masel = "rate-constant: {A: 0.02 1/s, b: 0, Ea0: 10 kJ/mol, w: 100 kJ/mol}"
+    edits = (evaluated, masel), ("type: Bell", "type: Blowers-Masel"), ("<=>", "=>")
+    path = case(tmp_path, *edits)
+    assert ENTROPY not in {p.path for p in surfacechem.load(path, {"run.solver": "cantera"}).system.parameters}
+    with pytest.raises(InputError, match="Change it in the file"):
+        surfacechem.load(path, {"run.solver": "cantera", ENTROPY: "1 J/mol/K"})
+
+
+def test_a_saved_run_with_a_changed_number_is_run_again(tmp_path):
+    simulation = surfacechem.load("press-hold-pull", {STIFFNESS: "6 pN/nm", "run.until": "2 s"})
+    record = rerun.read(simulation.run({RATE: 0.03, ORDER: 0.1}).write(tmp_path / "changed.nc"))
+    assert rerun.differences(record, rerun.run_again(record)) == []
+
+
+@pytest.mark.parametrize("T", [250.0, 310.0])
+def test_forms_are_cantera_s(T):
+    thermo = ct.NasaPoly2(200, 1000, 1e5, [290, 2, 0, 0, 0, 0, 3, 4, 1, 0, 0, 0, 0, 1, 1])
+    gibbs = lower(thermo)
+    assert {key: type(form) for key, form in gibbs.ranges.items()} == {"range_1": Nasa7, "range_2": Nasa7}
+    assert gibbs(T) == pytest.approx((thermo.h(T) - T * thermo.s(T)) / ct.gas_constant, rel=1e-12)
