@@ -203,7 +203,8 @@ class Law(ABC):
 
     def given(self, numbers: Mapping[str, float]) -> Self:
         """The same law with other numbers, which are checked."""
-        return dataclasses.replace(self, **dict(numbers))
+        changed: Any = dict(numbers)
+        return dataclasses.replace(self, **changed)
 
     def bind(self, values: Mapping[str, Expression]) -> Self:
         """The same law with some of its parameters replaced, by symbols for instance; nothing is checked."""

@@ -20,17 +20,14 @@ from surfacechem.laws import laws
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
-from surfacechem.laws.contact import BondStiffness, Penalty
-from surfacechem.laws.friction import BondedCoulomb, Coulomb, MohrCoulomb, Stribeck
+from surfacechem.laws.contact import BondStiffness
+from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Hold
 from surfacechem.laws.longrange import (
     WALL,
-    ElectrostaticFlatFlat,
-    ElectrostaticSpherePlane,
     LennardJonesDerjaguin,
     LennardJonesFlatFlat,
     LennardJonesSpherePlane,
-    VanDerWaalsFlatFlat,
     VanDerWaalsSpherePlane,
 )
 from surfacechem.model.assemble import assemble
@@ -98,21 +95,6 @@ def test_traction_is_the_slope_of_the_energy(law):
             above, below = (number(energy, point | {x: value + side * step}) for side in (1, -1))
             exact, difference = number(slope, point | {x: value}), (above - below) / (2 * step)
             assert abs(exact - difference) <= 1e-14 * (1 + abs(exact)), "constants are doubles"
-
-
-def test_penalty_bears_pressure_only():
-    energy = symbolic(Penalty(E_n=1e12))
-    traction = derivative(energy, g)
-    assert [at(traction, g_n=x) for x in (-1e-6, 0.0, 1e-6)] == [-1e6, 0.0, 0.0]
-    assert [at(derivative(traction, g), g_n=x) for x in (-1e-6, 1e-6)] == [1e12, 0.0]
-
-
-def test_bonds_weaken_in_tension_and_not_in_compression():
-    energy = symbolic(BondStiffness(E_b=1e12, E_n=3e12))
-    traction, affinity = derivative(energy, g), derivative(energy, phi)
-    assert at(traction, g_n=1e-6, phi=0.25) == 2.5e5
-    assert at(traction, g_n=-1e-6, phi=0.25) == -3e6
-    assert (at(affinity, g_n=1e-6, phi=0.25), at(affinity, g_n=-1e-6, phi=0.25)) == pytest.approx((0.5, 0.0))
 
 
 def test_bond_springs_in_chemical_equilibrium():
@@ -286,19 +268,6 @@ def test_derjaguin_is_the_limit_of_a_large_sphere():
     assert ratio == pytest.approx([(1e-9 / (2 * R + 1e-9)) ** 2 for R in (1e-8, 1e-7, 1e-6)], rel=1e-3)
 
 
-def test_van_der_waals():
-    flats = VanDerWaalsFlatFlat(A_H=6.5e-20)
-    traction = derivative(symbolic(flats), g)
-    assert at(traction, g_n=1e-9) == pytest.approx(6.5e-20 / (6 * math.pi * (1.165e-9) ** 3), rel=1e-14)
-    assert at(traction, g_n=-1e-9) == pytest.approx(6.5e-20 / (6 * math.pi * (0.165e-9) ** 3), rel=1e-14)
-    sphere = VanDerWaalsSpherePlane(A_H=6.5e-20, R=1e-5, area=1e-12)
-    force = derivative(symbolic(sphere), g)
-    for x in (0.0, 1e-9):
-        h = x + 1.65e-10
-        assert 1e-12 * at(force, g_n=x) == pytest.approx(6.5e-20 * 1e-5 / (6 * h**2), rel=2.1 * h / 2e-5)
-        assert 1e-12 * at(force, g_n=x) == pytest.approx(2 * 6.5e-20 * 1e-15 / (3 * h**2 * (h + 2e-5) ** 2), rel=1e-13)
-
-
 def test_van_der_waals_sphere_is_the_sum_of_its_shells():
     """A ball in front of a half-space: slices of the ball at their distance, each attracted as by A_H / (6 pi z^3)."""
     R, h = 5e-8, 2e-9
@@ -308,30 +277,6 @@ def test_van_der_waals_sphere_is_the_sum_of_its_shells():
     law = VanDerWaalsSpherePlane(A_H=6.5e-20, R=R, area=1e-16)
     force = 1e-16 * at(derivative(symbolic(law), g), g_n=h - 1.65e-10)
     assert force == pytest.approx(6.5e-20 / (2 * math.pi) * slices, rel=1e-10)
-
-
-def test_charged_surfaces():
-    flats, sphere = (
-        ElectrostaticFlatFlat(s_1=1e-4, s_2=2e-4),
-        ElectrostaticSpherePlane(s_1=1e-4, s_2=2e-4, R=1e-6, area=1.0),
-    )
-    repulsion = [at(derivative(symbolic(law), g), g_n=1e-7) for law in (flats, sphere)]
-    assert repulsion == pytest.approx([-2e-8 / 2 / 8.8541878128e-12, -4 * math.pi * 1e-12 * 1e-8 / 8.8541878128e-12])
-
-
-def test_friction_at_rest_and_sliding():
-    assert Coulomb(mu=0.4).limit(p=1e5) == Coulomb(mu=0.4).traction(p=1e5, direction=1.0)
-    assert Coulomb(mu=0.4, mu_s=0.6).limit(p=1e5) == 6e4
-    adhesive = MohrCoulomb(mu=0.5, t_n_max=2e4, c=1e3, mu_s=0.7)
-    found = [adhesive.traction(p=-2e4, direction=-1.0), adhesive.traction(p=-9e4, direction=1.0)]
-    assert found == [-1e3, 1e3]
-    assert adhesive.limit(p=1e4) == pytest.approx(0.7 * 3e4 + 1e3)
-    for same in (MohrCoulomb(mu=0.5, c=1e4), MohrCoulomb(mu=0.5, t_n_max=2e4)):
-        assert same.traction(p=1e5, direction=1.0) == 6e4
-    bonded = BondedCoulomb(mu=0.4, mu_b=0.7, mu_ub=0.4)
-    assert bonded.breaks_bonds
-    assert bonded.limit(p=1e5, phi=0.0, T_c=300.0, T_0=300.0) == 4e4
-    assert bonded.limit(p=1e5, phi=1.0, T_c=600.0, T_0=300.0) == 3.5e4
 
 
 @pytest.mark.parametrize("delta", [0.5, 1.0, 2.0])
