@@ -23,6 +23,7 @@ from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
+from surfacechem.references.couette_flow import CouetteFlow
 from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
 from surfacechem.runs import simulation
@@ -178,18 +179,10 @@ def test_heat_made_across_a_gas_passes_the_jump_at_each_wall(alphas):
     assert values["q_2"] == pytest.approx(heat - slope / r, rel=1e-6)
 
 
-def couette_flow(beta: float, v: float, T_w: float = 300.0) -> dict[str, float]:
-    r"""Mean and largest temperature and the traction of a film of viscosity ETA exp(-beta (T - T_w)) between two walls.
-
-    T - T_w = 2/beta ln(cosh lambda / cosh(lambda s)) with s from -1 to 1 across it, sinh(lambda)^2 = Na / 8.
-    Source: Nahme (1940), Ing.-Arch. 11, 191; Gavis & Laurence (1968), doi 10.1021/i160025a032.
-    """
-    lam = np.arcsinh(np.sqrt(beta * ETA * v**2 / K_M / 8))
-    nodes, weights = np.polynomial.legendre.leggauss(80)
-    s = np.append((nodes + 1) / 2, 0.0)
-    rise = 2 / beta * np.log1p(2 * np.sinh(lam * (1 + s) / 2) * np.sinh(lam * (1 - s) / 2) / np.cosh(lam * s))
-    traction = ETA * v / D_M * 2 * lam / np.sinh(2 * lam)
-    return {"T_c": T_w + weights @ rise[:-1] / 2, "T_max": T_w + rise[-1], "t_t": traction}
+def couette_flow(beta: float, v: float) -> dict[str, float]:
+    """Steady values of a film of viscosity ETA exp(-beta (T - 300 K)) between two walls at 300 K."""
+    film = CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v)
+    return {name: float(value) for name, value in film.solution(0.0).items()}
 
 
 @pytest.mark.parametrize("Na", [0.01, 1.0, 18.2, 1e4])
