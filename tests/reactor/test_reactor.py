@@ -170,8 +170,8 @@ def test_components_have_names():
     assert interface.component_index("T_c") == interface.names.index("T_c")
     assert net.component_name(0) == f"interface: {interface.names[0]}"
     assert net.solver_stats["rhs_evals"] > 0
-    with pytest.raises(InputError, match=r"no quantity 'T_d'\. Did you mean 'T_c'"):
-        interface["T_d"]
+    with pytest.raises(InputError, match=r"no quantity 'Tc'\. Did you mean 'T_c'"):
+        interface["Tc"]
 
 
 def test_sensitivity_to_a_rate():
