@@ -26,6 +26,8 @@ from surfacechem.expressions import (
 )
 from surfacechem.quantities import BOLTZMANN
 
+Coefficient = tuple[Expression, Expression]
+
 
 class BellFactor(RateFactor):
     r"""Force lowers the barrier by its work on the way to the transition state.
@@ -183,8 +185,18 @@ class StatedBothWays(RateLaw):
     """Bonds that form and break at coefficients of their own; subclasses state these."""
 
     @abstractmethod
+    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
+        """Of formation and of rupture: the rate at no force [1/s] and the logarithm of the factor of the force."""
+
+    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
+        """Net rate [1/(m^2 s)]."""
+        on, off = (scaled_exp(k, log_factor) for k, log_factor in self._coefficients(f, T_c))
+        return n_c * (on * (1 - phi) - off * phi)
+
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
+        on, off = (log_fraction(k) + log_factor for k, log_factor in self._coefficients(f, T_c))
+        return on, off
 
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
@@ -219,16 +231,9 @@ class Bell(StatedBothWays):
         """What the two distances to the transition state differ by, where bonds form too."""
         return None if self.log_ratio is None else self.x_on - self.x_off
 
-    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
-        """Logarithms of the coefficients of formation and rupture."""
+    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
         on, off = (BellFactor(x_beta=x).log_factor(f, T_c) for x in (self.x_on, self.x_off))
-        return log_fraction(self.k_on) + on, log_fraction(self.k_off) + off
-
-    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]."""
-        on = scaled_exp(self.k_on, BellFactor(x_beta=self.x_on).log_factor(f, T_c))
-        off = scaled_exp(self.k_off, BellFactor(x_beta=self.x_off).log_factor(f, T_c))
-        return n_c * (on * (1 - phi) - off * phi)
+        return (self.k_on, on), (self.k_off, off)
 
 
 class ReversibleBell(RateLaw):
@@ -287,22 +292,10 @@ class DemboSpring(StatedBothWays):
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
 
-    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
-        """Logarithms of the coefficients of formation and rupture."""
-        bond, transition = self.stiffness, self.transition_stiffness
-        formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
-        rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
-        on, off = formation.log_factor(f, T_c), rupture.log_factor(f, T_c)
-        return log_fraction(self.k_on) + on, log_fraction(self.k_off) + off
-
-    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]."""
-        bond, transition = self.stiffness, self.transition_stiffness
-        formation = DemboFormationFactor(stiffness=bond, transition_stiffness=transition)
-        rupture = DemboFactor(stiffness=bond, transition_stiffness=transition)
-        on = scaled_exp(self.k_on, formation.log_factor(f, T_c))
-        off = scaled_exp(self.k_off, rupture.log_factor(f, T_c))
-        return n_c * (on * (1 - phi) - off * phi)
+    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
+        springs = {"stiffness": self.stiffness, "transition_stiffness": self.transition_stiffness}
+        on, off = (factor(**springs).log_factor(f, T_c) for factor in (DemboFormationFactor, DemboFactor))
+        return (self.k_on, on), (self.k_off, off)
 
 
 class TwoPathway(StatedBothWays):
@@ -324,17 +317,10 @@ class TwoPathway(StatedBothWays):
     x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
     k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
 
-    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
-        """Logarithms of the coefficients of formation and rupture."""
+    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
         ratio = self.k_catch / self.k_slip
         factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
-        return log_fraction(self.k_on), log_fraction(self.k_slip) + factor.log_factor(f, T_c)
-
-    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]."""
-        slip = scaled_exp(self.k_slip, BellFactor(x_beta=self.x_slip).log_factor(f, T_c))
-        catch = scaled_exp(self.k_catch, BellFactor(x_beta=-self.x_catch).log_factor(f, T_c))
-        return n_c * (self.k_on * (1 - phi) - (slip + catch) * phi)
+        return (self.k_on, 0), (self.k_slip, factor.log_factor(f, T_c))
 
 
 class DudkoHummerSzabo(StatedBothWays):
@@ -362,16 +348,9 @@ class DudkoHummerSzabo(StatedBothWays):
         """Forces below that at which the barrier vanishes."""
         return DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu).ranges
 
-    def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
-        """Logarithms of the coefficients of formation and rupture."""
+    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
         factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
-        return log_fraction(self.k_on), log_fraction(self.k_off) + factor.log_factor(f, T_c)
-
-    def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
-        """Net rate [1/(m^2 s)]."""
-        factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
-        off = scaled_exp(self.k_off, factor.log_factor(f, T_c))
-        return n_c * (self.k_on * (1 - phi) - off * phi)
+        return (self.k_on, 0), (self.k_off, factor.log_factor(f, T_c))
 
 
 class GapAttachment(RateLaw):

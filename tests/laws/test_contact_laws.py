@@ -206,19 +206,6 @@ def test_adhesion_breaks_where_the_elastic_energy_exceeds_it():
         assert rate.rate(mu=mu, n_c=1e18, N_c=1e18) / 1e18 == pytest.approx(expected, rel=1e-13)
 
 
-def test_lennard_jones_between_flats():
-    _, rows, expect = read("i_lj_flat_flat")
-    law = LennardJonesFlatFlat(**SITES)
-    traction = derivative(symbolic(law), g)
-    for x, W, t in rows:
-        assert law.energy(g_n=float(x)) == pytest.approx(W, rel=1e-14)
-        assert at(traction, g_n=x) == pytest.approx(t, rel=1e-13)
-        assert compiled(traction, g_n=x) == pytest.approx(t, rel=1e-13)
-    assert at(traction, g_n=expect["g_peak"]) == pytest.approx(expect["t_peak"], rel=1e-14)
-    assert law.energy(g_n=expect["g_zero"]) == pytest.approx(-expect["W_adh"], rel=1e-14)
-    assert law.stiffness == pytest.approx(expect["A"], rel=1e-15)
-
-
 def test_lennard_jones_between_sphere_and_plane():
     _, rows, expect = read("i_lj_sphere_plane")
     sphere = {**SITES, "R": 5e-8, "area": 2e-16}
