@@ -21,13 +21,13 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.affinity import AffinityReaction
-from surfacechem.mechanism.fields import converted
 from surfacechem.mechanism.keys import REACTION
 from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import sides
 from surfacechem.mechanism.thermo import KILO
+from surfacechem.mechanism.values import converted
 from surfacechem.quantities import VARIABLES
 
 __all__ = ["LoadedInterface"]

@@ -293,7 +293,7 @@ class DemboSpring(StatedBothWays):
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
 
     def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        springs = {"stiffness": self.stiffness, "transition_stiffness": self.transition_stiffness}
+        springs: Any = {"stiffness": self.stiffness, "transition_stiffness": self.transition_stiffness}
         on, off = (factor(**springs).log_factor(f, T_c) for factor in (DemboFormationFactor, DemboFactor))
         return (self.k_on, on), (self.k_off, off)
 

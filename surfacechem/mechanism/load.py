@@ -15,9 +15,8 @@ from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.dependence import interactions
 from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
-from surfacechem.mechanism.fields import rate_fields, spring
+from surfacechem.mechanism.interaction import interactions
 from surfacechem.mechanism.keys import check, has_neighbours
 from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
@@ -26,6 +25,7 @@ from surfacechem.mechanism.rates import plain
 from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import LIMITS, Source, sides
 from surfacechem.mechanism.thermo import KILO, lower
+from surfacechem.mechanism.values import rate_fields, spring
 from surfacechem.scene import BondingVariable, Engine, Sites
 
 NONE: Mapping[str, Neighbour] = {}
