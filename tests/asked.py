@@ -15,7 +15,7 @@ import surfacechem
 from surfacechem.format import names
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.model.assemble import assemble
-from surfacechem.results import choice
+from surfacechem.results import error_estimates
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.run import Model, Run, Trajectory
@@ -46,7 +46,7 @@ def settings(times, accuracy: float) -> Run:
 
 def achieved(trajectory: Trajectory, error: float, source: str) -> Achieved:
     steps = trajectory.result.counters.steps
-    return Achieved(error, choice.rounding_of_time(trajectory), steps, trajectory.run.rtol, source)
+    return Achieved(error, error_estimates.rounding_of_time(trajectory), steps, trajectory.run.rtol, source)
 
 
 # -- tables of one trajectory ---------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ def table(name: str) -> tuple[tables.Table, Model]:
 
 def of_table(name: str, accuracy: float) -> Achieved:
     exact, model = table(name)
-    trajectory, estimate = choice.solve(model, settings(exact.times, accuracy))
+    trajectory, estimate = error_estimates.verified(model.solve(settings(exact.times, accuracy)))
     assert trajectory.status == "finished", trajectory.reason
     return achieved(trajectory, max(errors(exact, trajectory).values()), estimate.source)
 
@@ -185,7 +185,7 @@ def of_motion(name: str, accuracy: float) -> Achieved:
     sources: list[str] = []
 
     def solve(model, times, changes=None):
-        trajectory, estimate = choice.solve(model, settings(times, accuracy), changes)
+        trajectory, estimate = error_estimates.verified(model.solve(settings(times, accuracy), changes))
         sources.append(estimate.source)
         return mechanics.Solved(trajectory)
 

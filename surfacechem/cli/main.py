@@ -138,7 +138,7 @@ def check(
     accuracy: Wanted = None,
 ) -> None:
     """Say a case back in words, without running it."""
-    from surfacechem.results.choice import reasons
+    from surfacechem.results.error_estimates import reasons
     from surfacechem.runs.check import cautions, groups, lumping_warnings, warnings
     from surfacechem.runs.report import check_summary
     from surfacechem.runs.simulation import load

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +95,20 @@ def largest_errors(
 
 UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
 """Why the error of a run with cells is not known."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
+
+    error: float
+    source: str
+    """Words: the exact solution's name, the second run and its tolerance, or the balances."""
+    variables: Mapping[str, float] = field(default_factory=dict)
+    exact: Mapping[str, Any] = field(default_factory=dict)
+    """Exact values at the output times, by variable, where an exact solution was named."""
+    asked: float | None = None
+    """What was asked for, where the tolerance was chosen from it."""
 
 
 @dataclass(frozen=True)

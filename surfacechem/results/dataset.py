@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from surfacechem.model.conductors import Profile
 from surfacechem.model.system import System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save
@@ -18,6 +20,8 @@ from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
     import xarray
+
+Array = NDArray[np.float64]
 
 DATASET_NAMES = {
     "Q_1": "Q_ext_1",
@@ -55,6 +59,27 @@ def quantity_columns(
         Column(DATASET_NAMES.get(name, name), (*(axes or {}), inner), table[..., j], q.unit, q.long_name, q.tag)
         for j, (name, q) in enumerate(found.items())
     ]
+
+
+def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
+    """Temperatures across a body at the output times, shape (times, points)."""
+    system, outputs = trajectory.model.system, trajectory.result.outputs
+    states = {state.name: j for j, state in enumerate(system.states)}
+    named = {item.name: j for j, item in enumerate(system.outputs)}
+    names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
+    parts = [outputs[:, states[n]] if n in states else trajectory.outputs[:, named[n]] for n in names]
+    return np.stack(parts, axis=1)
+
+
+def profile_columns(trajectory: Trajectory) -> list[Column]:
+    """Each profile and its coordinate."""
+    found = []
+    for profile in trajectory.model.system.profiles:
+        x, values = f"x_{profile.number}", profile_values(trajectory, profile)
+        places = np.array(profile.points) * trajectory.values[profile.thickness]
+        found.append(Column(x, (x,), places, "m", f"distance from the contact into {profile.body}"))
+        found.append(Column(profile.name, ("time", x), values, "K", f"temperature across {profile.body}"))
+    return found
 
 
 class Results(ABC):

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
-from surfacechem.results.dataset import DATASET_NAMES, Results, quantity_columns
+from surfacechem.results.dataset import DATASET_NAMES, Results, profile_columns, quantity_columns
 from surfacechem.results.detailed_balance import Verdict, verdicts
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
 from surfacechem.results.extremes import capped_rates, cautions
 from surfacechem.results.netcdf import Column, versions
-from surfacechem.results.profiles import profile_columns
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
@@ -39,23 +39,6 @@ RECORDED = ("times", "atol", "max_steps")
 
 CLASSES = {"exothermic": 1, "endothermic": -1}
 """Classes of reactions, with the sign of their heat."""
-
-EARLIER = "ended earlier"
-"""What is said of a second run that did not come as far."""
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """How far a run is from the truth: the largest relative error of the compared variables and where it is from."""
-
-    error: float
-    source: str
-    """Words: the exact solution's name, the second run and its tolerance, or the balances."""
-    variables: Mapping[str, float] = field(default_factory=dict)
-    exact: Mapping[str, Any] = field(default_factory=dict)
-    """Exact values at the output times, by variable, where an exact solution was named."""
-    asked: float | None = None
-    """What was asked for, where the tolerance was chosen from it."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,11 +24,11 @@ from scipy.interpolate import CubicSpline
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts import grids
 from surfacechem.model.system import System
-from surfacechem.results.accuracy import MARGIN, UNKNOWN, CellErrors, largest_errors
-from surfacechem.results.achieved import EVENTS, beside_jumps, difference, event_error, floor
+from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors
+from surfacechem.results.dataset import profile_values
+from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_error, floor
 from surfacechem.results.event_table import event_times
-from surfacechem.results.profiles import profile_values
-from surfacechem.results.solution import WITHIN, Accuracy
+from surfacechem.results.solution import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.run import Run, Trajectory
 

@@ -18,11 +18,11 @@ from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format import Case
 from surfacechem.model.system import System
-from surfacechem.results import choice, spatial
-from surfacechem.results.accuracy import CellErrors
-from surfacechem.results.achieved import accuracy, check_way
+from surfacechem.results import spatial
+from surfacechem.results.accuracy import Accuracy, CellErrors
+from surfacechem.results.error_estimates import accuracy, check_way, verified
 from surfacechem.results.event_table import event_times
-from surfacechem.results.solution import Accuracy, Solution
+from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
@@ -96,7 +96,7 @@ class Simulation:
         chosen, trajectory, cells = self._as_accurate(settings)._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
-            trajectory, estimate = choice.verified(trajectory)
+            trajectory, estimate = verified(trajectory)
         case = chosen.case
         unused = case.reference.fixed if case.reference and self._departs(values) else case.unused
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None

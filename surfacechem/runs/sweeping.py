@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import Case, ExactSolution
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, second_tolerance
-from surfacechem.results.achieved import against_exact, estimated, second_run, with_cells
+from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values, match
 from surfacechem.runs.spectrum import Statistics

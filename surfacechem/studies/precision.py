@@ -11,8 +11,8 @@ from pathlib import Path
 from statistics import median
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
+from surfacechem.results.error_estimates import computed
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.report import duration
 from surfacechem.runs.simulation import Simulation, load

@@ -23,7 +23,7 @@ from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.plots.study import MARKS, NO_ANSWER
 from surfacechem.results.accuracy import largest_errors
-from surfacechem.results.achieved import computed
+from surfacechem.results.error_estimates import computed
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import OWN, Model, Run, Trajectory

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.results.accuracy import ROUNDING, TIGHTEST, errors_over_time
-from surfacechem.results.achieved import computed, difference, event_error, floor
+from surfacechem.results.error_estimates import computed, difference, event_error, floor
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver

@@ -24,8 +24,8 @@ from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
 from surfacechem.references.couette_flow import CouetteFlow
-from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
+from surfacechem.results.error_estimates import computed
 from surfacechem.runs import simulation
 from surfacechem.scene import Body, Interface, Medium, Scene
 from surfacechem.solve.run import Model, Run

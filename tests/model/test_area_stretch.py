@@ -22,8 +22,8 @@ from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
+from surfacechem.results.error_estimates import computed
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites
 from surfacechem.solve.run import Model, Run
 

@@ -17,7 +17,7 @@ from surfacechem.format import load_text
 from surfacechem.references import get
 from surfacechem.references.conducting_slabs import HELD
 from surfacechem.results import spatial
-from surfacechem.results.achieved import against_tighter, with_cells
+from surfacechem.results.error_estimates import against_tighter, with_cells
 from surfacechem.results.spatial import judged
 from surfacechem.runs.simulation import Simulation
 

@@ -28,8 +28,8 @@ from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import STEFAN_BOLTZMANN
-from surfacechem.results.achieved import computed
 from surfacechem.results.audit import audit
+from surfacechem.results.error_estimates import computed
 from surfacechem.results.solution import Solution
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Body, Interface, Scene

@@ -20,8 +20,8 @@ from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.references import get
-from surfacechem.results.achieved import EVENTS, apart
 from surfacechem.results.audit import audit
+from surfacechem.results.error_estimates import EVENTS, apart
 from surfacechem.results.event_table import event_times
 from surfacechem.scene import Body, Interface, Mounting, Scene
 from surfacechem.solve.run import Model, Run

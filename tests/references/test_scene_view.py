@@ -9,7 +9,7 @@ from surfacechem import format as cases
 from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.references.base import SceneView
-from surfacechem.results.achieved import against_exact
+from surfacechem.results.error_estimates import against_exact
 
 CELLS = ("sudden-contact", "epoxy-cure-thick")
 """Cases whose cells have an error of their own."""

@@ -7,7 +7,7 @@ from asked import ACCURACIES, EXACT, exact
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.results import choice
+from surfacechem.results import error_estimates
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.solve.run import Run
 
@@ -81,7 +81,7 @@ def test_what_rounding_forbids_is_said():
 def test_events_that_only_one_of_two_runs_has_count_as_a_miss():
     model = surfacechem.load("stick-slip").model
     first, second = (model.solve(Run(times=(0.0, end))) for end in (3.0, 2.0))
-    found = choice.compared(replace(first, run=replace(first.run, rtol=1e-6)), second)
+    found = error_estimates.compared(replace(first, run=replace(first.run, rtol=1e-6)), second)
     assert found.error == float("inf")
     assert "which had other events" in found.source
 
@@ -98,7 +98,7 @@ def test_without_a_solver_an_accuracy_leaves_the_choice():
 def test_the_choice_explains_itself():
     simulation = surfacechem.load("stick-slip")
     run = replace(simulation.case.run, solver="auto", accuracy=1e-8, rtol=first_tolerance(1e-8))
-    words = "\n".join(" ".join(row) for row in choice.reasons(simulation.model, run))
+    words = "\n".join(" ".join(row) for row in error_estimates.reasons(simulation.model, run))
     assert "solver radau" in words
     assert "jumps" in words
     assert "a hundredth of the accuracy 1e-08" in words

@@ -17,7 +17,7 @@ from surfacechem.format import names
 from surfacechem.model.assemble import assemble
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import largest_errors
-from surfacechem.results.achieved import against_exact, against_tighter, floor
+from surfacechem.results.error_estimates import against_exact, against_tighter, floor
 
 STOPPED = {
     "cooling-to-zero": "the temperature T reached zero",

@@ -12,7 +12,7 @@ import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.plots.study import LABELS, figure
 from surfacechem.results.accuracy import relative_errors
-from surfacechem.results.achieved import computed
+from surfacechem.results.error_estimates import computed
 from surfacechem.solve import names
 from surfacechem.solve.adapters import sundials
 from surfacechem.studies import precision

@@ -17,15 +17,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.results.accuracy import FLOOR, ROUNDING, UNKNOWN, CellErrors, largest_errors, second_tolerance
+from surfacechem.results.accuracy import (
+    FLOOR,
+    MARGIN,
+    ROUNDING,
+    TIGHTEST,
+    UNKNOWN,
+    Accuracy,
+    CellErrors,
+    largest_errors,
+    second_tolerance,
+)
 from surfacechem.results.audit import audit
+from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
-from surfacechem.results.profiles import profile_values
-from surfacechem.results.solution import EARLIER, Accuracy
 from surfacechem.scene import Scene
-from surfacechem.solve.run import Run, Trajectory
+from surfacechem.solve import ASKING
+from surfacechem.solve.run import Model, Run, Trajectory
 
 Array = NDArray[np.float64]
+
+EARLIER = "ended earlier"
+"""What is said of a second run that did not come as far."""
 
 WAYS = ("auto", "estimate", "balances")
 """How a run tells its error: against the exact solution if there is one, else by a second run; always by a second run;
@@ -253,3 +266,82 @@ def event_error(found: Mapping[str, Array], expected: Mapping[str, Array], end: 
         if len(times) == len(found.get(name, ())) > 0
     ]
     return float(max((error.max() for error in errors), default=0.0))
+
+
+def asked(run: Run) -> float:
+    """The relative accuracy that a run asks for."""
+    return run.accuracy if run.accuracy is not None else run.rtol / MARGIN
+
+
+def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
+    """The loosest of a row of runs, each tighter by a hundred, that differs from the next by no more than was asked.
+
+    The first has a hundredth of the accuracy as its tolerance. Most runs are confirmed by their second, so the cost is
+    that of two runs, the second at a hundredth of the tolerance.
+    """
+    wanted = asked(first.run)
+    while True:
+        last = first.run.rtol <= TIGHTEST
+        second = first.model.resolve(first, second_tolerance(first.run.rtol))
+        found = replace(compared(first, second), asked=wanted)
+        if second.status == "failed" or found.error <= wanted:
+            return first, found
+        if last:
+            return first, replace(found, source=f"{found.source}; {_missed(first, wanted)}")
+        first = second
+
+
+def compared(first: Trajectory, second: Trajectory) -> Accuracy:
+    """Largest differences of two runs: of states and of times of events, the end among them where physics set it."""
+    rtol = second.run.rtol
+    if second.status == "failed":
+        return unknown(f"a second run at rtol {rtol:.0e} failed: {second.reason}")
+    source = second_run(second.run)
+    if first.status != second.status:
+        return Accuracy(math.inf, f"{source}, which {second.status}: {second.reason}")
+    errors, others = apart(first, second)
+    if others and first.run.rtol > TIGHTEST:  # there rounding decides of events that change nothing
+        return Accuracy(math.inf, f"{source}, which had {others}")
+    if not errors:
+        return unknown("the run ended before its second output")
+    return Accuracy(stated(errors), source, errors)
+
+
+def rounding_of_time(trajectory: Trajectory) -> float:
+    """Largest relative change of a state by the last bit of an output time: no run is nearer than that.
+
+    It is large where a state runs towards a singular end.
+    """
+    result = trajectory.result
+    size = np.maximum(np.abs(result.outputs), floors(trajectory))
+    change = np.finfo(float).eps * np.abs(trajectory.rates) * result.times[:, None]
+    return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
+
+
+def _missed(trajectory: Trajectory, wanted: float) -> str:
+    lost = rounding_of_time(trajectory)
+    if lost > wanted / 10:
+        return f"{wanted:.0e} is out of reach, as rounding of the time alone changes a state by {lost:.0e}"
+    return f"{wanted:.0e} is not reached at the tightest tolerance"
+
+
+def reasons(model: Model, run: Run) -> list[tuple[str, str, str]]:
+    """What was chosen for a run and why, a row each."""
+    chosen, system = model.chosen(run), model.system
+    parts = ["algebraic states"] if any(state.algebraic for state in system.states) else []
+    parts += ["jumps" if system.transitions else "margins"] if system.transitions or model.margins else []
+    method = f"compiled, with exact Jacobian{''.join(f', {part}' for part in parts)}; order 5 to 13 by tolerance"
+    if chosen.solver in ASKING:
+        method = "rates of the mechanism come from Cantera itself, which it can ask"
+    part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
+    if run.rtol == TIGHTEST:
+        part = f"for the accuracy {asked(run):.0e}; below this is rounding"
+    return [
+        ("solver", chosen.solver, method),
+        ("rtol", f"{run.rtol:.0e}", part),
+        (
+            "verified",
+            f"{second_tolerance(run.rtol):.0e}",
+            "a second run must agree to the accuracy, else it is verified in turn",
+        ),
+    ]

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.results.achieved import EVENTS, against_tighter, apart, difference, estimated, event_error
+from surfacechem.results.error_estimates import EVENTS, against_tighter, apart, difference, estimated, event_error
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.report import run_summary, sweep_summary
 
