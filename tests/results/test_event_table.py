@@ -94,8 +94,8 @@ def test_a_stage_waits_for_a_temperature_by_its_own_name():
 @pytest.mark.parametrize(
     ("end", "message"),
     [
-        ("{T_plate: 302 K}", "no variable 'T_plate'"),
-        ("{t_e: 302 Pa}", "no variable 't_e'"),
+        ("{T_plate: 302 K}", "unknown key 'T_plate'"),
+        ("{t_e: 302 Pa}", "unknown key 't_e'"),
         ("{J_c: 2}", "the stage warm waits for 'J_c'"),
     ],
 )
