@@ -1,9 +1,10 @@
 """Random laws with parameters over many decades, about the scales of one scene; a new law is drawn by itself."""
 
 import random
+from typing import Any
 
+from surfacechem import laws as registry
 from surfacechem.contracts.terms import Factor, Law, Load, Varying, reads
-from surfacechem.laws import laws
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.quantities import BOLTZMANN
 
@@ -17,6 +18,18 @@ LEFT_OUT = 0.5
 
 VARIES = 0.12
 """How often a parameter depends on a variable."""
+
+DRAWN_LATE = [
+    *("film-shear", "rate-and-state-aging", "rate-and-state-slip", "anisotropic-coulomb", "anisotropic-viscous"),
+    *("gap-conductance", "gas-gap", "gap-table", "film", "rarefied-film"),
+]
+"""Laws that are drawn last of their contract, in this order, so that a seed keeps its scene wherever a law stands."""
+
+
+def laws(contract: Any) -> dict[str, Any]:
+    """All laws of a contract by name, in the order in which they are drawn."""
+    late = {name: i + 1 for i, name in enumerate(DRAWN_LATE)}
+    return dict(sorted(registry.laws(contract).items(), key=lambda item: late.get(item[0], 0)))
 
 
 class Dice:

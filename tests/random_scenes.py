@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import cache
 
-from random_laws import T_0, Dice
+from random_laws import T_0, Dice, laws
 
 from surfacechem.contracts.substances import Property
 from surfacechem.contracts.terms import (
@@ -18,7 +18,6 @@ from surfacechem.contracts.terms import (
     reads,
 )
 from surfacechem.documents.shipped import mechanisms
-from surfacechem.laws import laws
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, CompliantDebonding
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity, InterfaceCapacity
 from surfacechem.laws.loading import Hold
