@@ -66,8 +66,6 @@ def keep(kernel: Any, folder: Path) -> None:
         done = subprocess.run(command, env=environment, capture_output=True, timeout=LONGEST)
         if done.returncode == 0:
             keep_file(folder / FILE, data)
-        else:
-            (folder / FILE).unlink(missing_ok=True)  # a damaged one
 
 
 def load(folder: Path) -> Callable[..., None] | None:

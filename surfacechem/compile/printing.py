@@ -52,8 +52,7 @@ def _apart(expression: Expression) -> tuple[Any, dict[str, Any]]:
     """
     whole = symengine.sympify(expression)
     inner = {piece for relation in whole.atoms(*RELATIONS) for piece in relation.atoms(symengine.Piecewise)}
-    outermost = inner - {deep for piece in inner for deep in piece.atoms(symengine.Piecewise) - {piece}}
-    terms = {f"{APART}{k}": piece for k, piece in enumerate(sorted(outermost, key=str))}
+    terms = {f"{APART}{k}": piece for k, piece in enumerate(sorted(inner, key=str))}
     return whole.xreplace({piece: symengine.Symbol(name) for name, piece in terms.items()}), terms
 
 

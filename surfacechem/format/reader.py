@@ -405,7 +405,7 @@ def _listed(section: RunSection, times: Sequence[float]) -> tuple[float, ...]:
     for name in ("until", "outputs", "spacing", "first"):
         if section.has(name):
             raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
-    if times[-1:] in ((), (0.0,)):
+    if max(times, default=0.0) == 0.0:
         raise section.error("at least one time after 0 is needed.", "times")
     return tuple(times) if times[0] == 0.0 else (0.0, *times)
 

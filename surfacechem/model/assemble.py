@@ -174,4 +174,7 @@ def _refuse_idle_initial_values(build: Build) -> None:
         if build.variables.has(name):
             message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
             raise InputError(message, path=f"initial.{name}")
+        if name in ("phi", "ln_phi"):
+            message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
+            raise InputError(message, path=f"initial.{name}")
         raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, states)}", path=f"initial.{name}")

@@ -88,23 +88,21 @@ def against_exact(
     scene: Scene,
     name: str,
     options: Mapping[str, float],
-    *,
-    tested: bool = True,
     second: Trajectory | None = None,
 ) -> Accuracy:
     """Largest errors at the output times, and those of the times of events, which a second run tells; it is made where
     it is needed and none is given.
 
-    InputError where the exact solution is another scene's; whether it is one is ``tested``.
+    InputError where the exact solution is another scene's.
     """
     from surfacechem.results.matching import exact_values
 
-    exact = exact_values(name, options, scene, trajectory, tested=tested)
+    exact = exact_values(name, options, scene, trajectory)
     errors = largest_errors(computed(trajectory), exact, partial(floor, trajectory))
     if found := event_times(trajectory):
         expected = event_times(second or _second(trajectory))
         if not difference(found, expected):
-            errors[EVENTS] = event_error(found, expected, trajectory.run.times[-1])
+            errors |= event_errors(found, expected, trajectory.run.times[-1])
     return Accuracy(stated(errors), f"exact solution {name}", errors, exact)
 
 
@@ -165,7 +163,7 @@ def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]
         ours, theirs = ({name: values[shared] for name, values in states(run).items()} for run in (first, second))
         errors = largest_errors(ours, theirs, partial(floor, first))
     if found and not note:
-        errors[EVENTS] = event_error(found, expected, first.run.times[-1])
+        errors |= event_errors(found, expected, first.run.times[-1])
     return errors, note
 
 
@@ -255,17 +253,17 @@ def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str
     return f"other events: {', '.join(parts)}" if parts else ""
 
 
-def event_error(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> float:
+def event_errors(found: Mapping[str, Array], expected: Mapping[str, Array], end: float) -> dict[str, float]:
     """Largest error of the times of events, each relative to its own time, or to FLOOR of the run if that is more.
 
-    Kinks of which one of the two has more are left out.
+    Kinks of which one of the two has more are left out; empty where no time is compared.
     """
     errors = [
         np.abs(found[name] - times) / np.maximum(times, FLOOR * end)
         for name, times in expected.items()
         if len(times) == len(found.get(name, ())) > 0
     ]
-    return float(max((error.max() for error in errors), default=0.0))
+    return {EVENTS: float(max(error.max() for error in errors))} if errors else {}
 
 
 def asked(run: Run) -> float:

@@ -49,21 +49,16 @@ BRIEF = 1e-7
 """Part of the time so far below which a stretch is too short for differences in time."""
 
 
-def exact_values(
-    name: str, options: Mapping[str, float], scene: Scene, run: Trajectory, *, tested: bool = True
-) -> dict[str, Array]:
-    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's,
-    where that is ``tested``.
-    """
+def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
+    """Exact values at the output times by the names of the scene's variables; InputError if it is another scene's."""
     view = SceneView(scene, run)
     reference = match(references.get(name), options, view)
     solution = partial(_solution, reference, view)
     exact = beside_events(solution, run)
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
-    if tested:
-        _check_start(exact, run)
-        _check(solution, run)
+    _check_start(exact, run)
+    _check(solution, run)
     return exact
 
 

@@ -26,7 +26,7 @@ from surfacechem.contracts import grids
 from surfacechem.model.system import System
 from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors
 from surfacechem.results.dataset import profile_values
-from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_error, floor
+from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_errors, floor
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
@@ -245,7 +245,7 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
     if other:
         errors[EVENTS] = math.inf
     elif found:
-        errors[EVENTS] = event_error(found, expected, better.run.times[-1])
+        errors |= event_errors(found, expected, better.run.times[-1])
     return errors
 
 

@@ -56,7 +56,9 @@ def _second(done: Sweep, threads: int | None) -> Sweep:
 
 
 def _against_exact(case: Case, done: Sweep, named: ExactSolution, threads: int | None) -> SweepAccuracy:
-    """Errors of the load at rupture, else of all; that the solution is one is tested on the outermost runs.
+    """Errors of the load at rupture, else of all; InputError where the solution is not that of every run.
+
+    For the loads at rupture that is tested on the outermost runs.
 
     A run with one output has nothing to compare but its events, one without any has no error.
     """
@@ -67,11 +69,10 @@ def _against_exact(case: Case, done: Sweep, named: ExactSolution, threads: int |
     errors = np.full(len(done), np.nan)
     exact = {which: np.full(len(done), np.nan) for which in WORDS if done.statistics}
     for i, run in enumerate(done):
-        tested = i in (begun[0], begun[-1])
         if len(run.result.times) < 2:
             errors[i] = estimated(run, second()[i]).error if len(run.result.times) else np.nan
         elif exact:
-            if tested:
+            if i in (begun[0], begun[-1]):
                 exact_values(named.name, named.options, case.scene, run)
             reference = match(references.get(named.name), named.options, SceneView(case.scene, run))
             errors[i] = _of_statistics(done, i, reference)
@@ -83,7 +84,6 @@ def _against_exact(case: Case, done: Sweep, named: ExactSolution, threads: int |
                 case.scene,
                 named.name,
                 named.options,
-                tested=tested,
                 second=second()[i] if event_times(run) else None,
             ).error
     return SweepAccuracy(errors, f"exact solution {named.name}", exact)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.results.accuracy import ROUNDING, TIGHTEST, errors_over_time
-from surfacechem.results.error_estimates import computed, difference, event_error, floor
+from surfacechem.results.error_estimates import computed, difference, event_errors, floor
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
@@ -166,7 +166,7 @@ class Truth:
                 "final": {name: float(error[-1]) for name, error in found.items()},
                 "max": {name: float(error.max()) for name, error in found.items()},
                 "l2": {name: mean_square(self.times[: len(error)], error) for name, error in found.items()},
-                "event": {"": event_error(events, self.events, self.end)} if self.events else {},
+                "event": dict(zip([""], event_errors(events, self.events, self.end).values(), strict=False)),
             }
         )
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.results.error_estimates import EVENTS, against_tighter, apart, difference, estimated, event_error
+from surfacechem.results.error_estimates import EVENTS, against_tighter, apart, difference, estimated, event_errors
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.report import run_summary, sweep_summary
 
@@ -52,7 +52,7 @@ def test_the_balances_are_the_error_where_nothing_else_is_asked_for():
 def test_an_estimate_looks_at_the_times_of_events(stick_slip):
     run = replace(stick_slip.case.run, rtol=1e-6, times=(0.0, 3.0))
     loose, tight = (stick_slip.model.solve(replace(run, rtol=rtol)) for rtol in (1e-6, 1e-12))
-    true = event_error(event_times(loose), event_times(tight), 3.0)
+    true = event_errors(event_times(loose), event_times(tight), 3.0)[EVENTS]
     estimate = against_tighter(loose).variables[EVENTS]
     assert estimate == pytest.approx(true, rel=0.1)
     assert estimate > 0

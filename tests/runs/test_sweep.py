@@ -355,3 +355,13 @@ def test_command_line(tmp_path, monkeypatch):
     assert CliRunner().invoke(app, ["plot", "s.nc", "-o", "s.svg"]).exit_code == 0
     again = CliRunner().invoke(app, ["rerun", "s.nc"])
     assert again.exit_code == 0, again.output
+
+
+def test_an_exact_solution_is_that_of_every_run_or_of_none(tmp_path):
+    """Between two runs that it fits lies one that it does not: no number there is held against another scene's."""
+    case = surfacechem.load("stick-slip")
+    swept = case.sweep({"interface.friction.coulomb.mu": [0.2, 0.6, 0.3]})
+    alone = case.run({"interface.friction.coulomb.mu": 0.6})
+    assert "exact solution stick-slip is not of this scene" in alone.accuracy.source
+    assert "exact solution stick-slip is not of this scene" in swept.accuracy.source
+    assert swept.accuracy.errors[1] == pytest.approx(alone.accuracy.error, rel=1e-9, nan_ok=True)
