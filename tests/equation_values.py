@@ -35,16 +35,16 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
         ("margin", ((margin.name, margin.expression) for margin in system.margins)),
         ("residual", ((e.state, e.residual) for e in system.equilibria)),
         ("size", ((e.state, e.size) for e in system.equilibria)),
-        ("transition", ((transition.name, transition.guard) for transition in system.transitions)),
+        ("transition", ((edge.name, edge.masked) for edge in system.edges)),
         ("start of mode", ((m.name, m.start) for m in system.modes if m.start is not None)),
         ("given", system.given.items()),
     ):
         yield from ((f"{kind} {name}", expression) for name, expression in items)
-    for transition in system.transitions:
-        for symbol, value in {**transition.modes, **transition.jump}.items():
-            yield f"{transition.name}: {symbol}", value
-        if transition.fold:
-            yield f"{transition.name}: tangent", transition.fold.tangent
+    for edge in system.edges:
+        for symbol, value in {**edge.modes, **edge.reset}.items():
+            yield f"{edge.name}: {symbol}", value
+        if edge.fold:
+            yield f"{edge.name}: tangent", edge.fold.tangent
     for kind, sinks in system.sinks.items():
         for sink in sinks:
             yield f"{kind} sink {sink.node}", sink.share

@@ -33,7 +33,7 @@ def run(scene: Scene, times, **changes) -> Solved:
 
 
 def events(solved: Solved) -> list[str]:
-    return [jump.transition.name for jump in solved.jumps]
+    return [jump.edge.name for jump in solved.jumps]
 
 
 def moments(solved: Solved) -> list[float]:

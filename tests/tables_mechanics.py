@@ -83,7 +83,7 @@ class Solved:
 
     def of(self, name: str) -> list[Jump]:
         """The jumps of a transition."""
-        return [jump for jump in self.jumps if jump.transition.name.startswith(name)]
+        return [jump for jump in self.jumps if jump.edge.name.startswith(name)]
 
     @property
     def energy_error(self) -> float:

@@ -160,13 +160,13 @@ def test_the_page_on_events_names_every_transition():
     spelt = {
         call.args[0].value
         for call in calls
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Transition"
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Edge"
         if isinstance(call.args[0], ast.Constant)
     }
     assert {"soften", "tear", "rejoin", "open"} <= spelt
     systems = [surfacechem.load(name).system for name in names()]
     systems.append(assemble(surfacechem.load("exothermic").case.scene, frozenset((-1, 1))))
-    happen = {item.name for system in systems for item in system.transitions}
+    happen = {item.name for system in systems for item in system.edges}
     assert {"loosen", "debond", "snap"} <= happen
     page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
     told = set(re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (`.*?) \|", page, re.MULTILINE))))

@@ -88,7 +88,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
-    if build.transitions or any(state.finest for state in build.states) or stands_for_velocity(build):
+    if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
@@ -115,7 +115,7 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
         breakpoints=tuple(sorted(build.breakpoints)),
         cycles=tuple(build.cycles),
         modes=tuple(build.modes),
-        transitions=tuple(build.transitions),
+        edges=tuple(build.edges),
         equilibria=tuple(build.equilibria),
         sinks=taking,
         follows={str(x): value for x, value in build.motion.follows.items()},

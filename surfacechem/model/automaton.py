@@ -1,4 +1,4 @@
-"""What a scene has besides states: modes, the transitions at which they change, and where gaps and energy go then."""
+"""The automaton of a scene: modes, the edges along which they change, and where gaps and energy go then."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RESTS = "run.rebounds_rest_at"
 
 @dataclass(frozen=True)
 class Mode:
-    """A discrete variable, such as sticking or sliding; it changes at transitions only."""
+    """A discrete variable, such as sticking or sliding; it changes along edges only."""
 
     name: str
     symbol: Any
@@ -58,20 +58,20 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class Transition:
+class Edge:
     """A guard that must stay positive while the modes are those of ``when``; at its zero, modes and state jump.
 
-    ``modes`` and ``jump`` give new values as expressions of the old state. Then the gaps in ``settles`` find the next
-    equilibrium, and the energy that this releases is heat where ``sinks`` says.
+    ``modes`` and ``reset`` give new values as expressions of the old state. Then the gaps find their next equilibrium,
+    where the edge ``equilibrates``, and the energy that this releases is ``heat`` of the bodies or of the interface.
     """
 
     name: str
-    margin: Expression
+    guard: Expression
     reason: str
     modes: Mapping[Any, Expression] = field(default_factory=dict)
-    jump: Mapping[Any, Expression] = field(default_factory=dict)
-    settles: bool = False
-    sinks: str = "joint"
+    reset: Mapping[Any, Expression] = field(default_factory=dict)
+    equilibrates: bool = False
+    heat: str = "joint"
     """Who makes heat of what it releases before gaps move: 'joint', what supports the bodies along the normal; 'local',
     the interface. Then each gap that moves is damped by its own support, and what slides makes the heat of friction. In
     a 'snap' the interface, which has given way, makes it all.
@@ -80,23 +80,23 @@ class Transition:
     """What makes it a fold, where it is one."""
     passes: bool = False
     """Whether nothing happens to the interface: a stage of the loading ends."""
-    to_pass: bool = False
-    """Whether it takes more than to touch zero."""
+    strict: bool = False
+    """Whether its guard has to be passed, not only touched."""
     measure: str = ""
-    """What its margin measures, where that of other transitions measures the same."""
+    """The state that its guard measures, where those of other edges measure the same."""
     times: tuple[float, ...] = ()
     """Times [s] at which it happens, where these are given."""
     returns: Expression | None = None
-    """Time in which it may happen again [s], zero where that is open: its margin begins anew at an exact zero."""
+    """Time in which it may happen again [s], zero where that is open: its guard begins anew at an exact zero."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
     when: Mapping[Any, Collection[int]] = field(default_factory=dict)
     """Values of modes, by their symbols, in which it is in play; in any value of the others."""
 
     @property
-    def guard(self) -> Expression:
-        """The margin while it is in play, else 1."""
-        guard = self.margin
+    def masked(self) -> Expression:
+        """The guard while it is in play, else 1."""
+        guard = self.guard
         for mode, values in self.when.items():
             guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
         return guard

@@ -128,7 +128,7 @@ def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
 
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
-    if not build.transitions:
+    if not build.edges:
         return {}
     _jump_accounts(build)
     centre = build.node_of.get("interface")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
-from surfacechem.model.automaton import Equilibrium, Mode, Sink, Transition
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Sink
 from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.holding import Holding
 from surfacechem.model.refit import Fit
@@ -245,7 +245,7 @@ class System:
     cycles: tuple[str, ...] = ()
     """Frequencies, by path, of loads under which the state may rest: their work still has to be followed."""
     modes: tuple[Mode, ...] = ()
-    transitions: tuple[Transition, ...] = ()
+    edges: tuple[Edge, ...] = ()
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
     """Who takes the heat of a jump, by what makes it: the interface, or the support of an axis."""

@@ -38,7 +38,7 @@ class EndError(Exception):
 
 
 def _refuse_folds(system: System) -> None:
-    folds = [item.reason for item in system.transitions if item.fold is not None]
+    folds = [item.reason for item in system.edges if item.fold is not None]
     if folds:
         raise InputError(
             f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "

@@ -183,7 +183,7 @@ class InterfaceReactor(HeldReactor):
 
     def _check_piece(self, t: float) -> None:
         if self.scene.moments and not self.passes_breakpoints:
-            reasons = "; ".join(dict.fromkeys(item.reason for item in self.scene.model.system.transitions))
+            reasons = "; ".join(dict.fromkeys(item.reason for item in self.scene.model.system.edges))
             raise InputError(
                 f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow. Use "
                 "surfacechem.reactor.ReactorNet."

@@ -327,7 +327,7 @@ def reasons(model: Model, run: Run) -> list[tuple[str, str, str]]:
     """What was chosen for a run and why, a row each."""
     chosen, system = model.chosen(run), model.system
     parts = ["algebraic states"] if any(state.algebraic for state in system.states) else []
-    parts += ["jumps" if system.transitions else "margins"] if system.transitions or model.margins else []
+    parts += ["jumps" if system.edges else "margins"] if system.edges or model.margins else []
     method = f"compiled, with exact Jacobian{''.join(f', {part}' for part in parts)}; order 5 to 13 by tolerance"
     if chosen.solver in ASKING:
         method = "rates of the mechanism come from Cantera itself, which it can ask"

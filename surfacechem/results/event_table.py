@@ -84,7 +84,7 @@ def _rows(trajectory: Trajectory) -> list[Row]:
         for t, i, y in zip(events.t, events.index, events.y, strict=True)
         if i < len(margins) and not margins[i].peak
     ]
-    jumped = [Row(j.t, j.transition.name, j.transition.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
+    jumped = [Row(j.t, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
     return sorted([*smooth, *jumped], key=lambda row: row.t)
 
 
@@ -113,7 +113,7 @@ def _telling(trajectory: Trajectory, rows: Sequence[Row]) -> list[Row]:
     names = [state.name for state in trajectory.model.system.states]
     kept, fastest, slow = [], 0.0, -np.inf
     for row in rows:
-        if row.jump and row.jump.transition.returns is not None:
+        if row.jump and row.jump.edge.returns is not None:
             speed = abs(float(row.before[names.index("v_n")]))
             fastest = max(fastest, speed)
             slow = row.t if speed < SLOW * fastest else -np.inf
@@ -165,8 +165,8 @@ def event_findings(jumps: Sequence[Jump]) -> list[str]:
     """Jumps against the second law that the case did not accept, in words; those that repeat in one line."""
     flagged: dict[tuple[str, str], list[Jump]] = {}
     for jump in jumps:
-        if jump.verdict != ADMISSIBLE and jump.transition.violation != "accept":
-            flagged.setdefault((jump.transition.reason, jump.verdict), []).append(jump)
+        if jump.verdict != ADMISSIBLE and jump.edge.violation != "accept":
+            flagged.setdefault((jump.edge.reason, jump.verdict), []).append(jump)
     return [_finding(reason, verdict, same) for (reason, verdict), same in flagged.items()]
 
 
@@ -192,12 +192,12 @@ def event_waits(trajectory: Trajectory) -> list[str]:
 
 def event_violations(jumps: Sequence[Jump]) -> list[str]:
     """Names of the transitions that have destroyed entropy, or would have."""
-    return list(dict.fromkeys(jump.transition.name for jump in jumps if jump.verdict != ADMISSIBLE))
+    return list(dict.fromkeys(jump.edge.name for jump in jumps if jump.verdict != ADMISSIBLE))
 
 
 def event_counts(jumps: Sequence[Jump]) -> str:
     """Names of the transitions, and how often each happened."""
-    names = [jump.transition.name for jump in jumps]
+    names = [jump.edge.name for jump in jumps]
     return ", ".join(f"{names.count(name)} {name}" if names.count(name) > 1 else name for name in dict.fromkeys(names))
 
 

@@ -220,14 +220,14 @@ def _audited(system: System) -> list[object]:
         + [m.expression for m in system.margins]
         + [i.expression for i in system.outputs]
         + [c.resistance for c in system.conductors]
-        + [x for item in system.transitions for x in (item.margin, *item.modes.values(), *item.jump.values())]
+        + [x for item in system.edges for x in (item.guard, *item.modes.values(), *item.reset.values())]
     )
 
 
 def _heated(system: System) -> list[object]:
     """Parts of the heat of jumps; what slides or snaps makes all of it in the interface, none in supports."""
-    jumps = [item for item in system.transitions if (item.settles or item.jump) and not item.measure]
-    supported = any(item.sinks == "joint" for item in jumps)
+    jumps = [item for item in system.edges if (item.equilibrates or item.reset) and not item.measure]
+    supported = any(item.heat == "joint" for item in jumps)
     makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
     return [sink.share for sinks in makers for sink in sinks]
 

@@ -206,7 +206,7 @@ def check_summary(
         _section("States", _state_rows(system)),
         _section("Roles", [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]),
         _section("Modes", _mode_rows(system)),
-        _section("Transitions", [(item.name, item.reason) for item in system.transitions]),
+        _section("Transitions", [(item.name, item.reason) for item in system.edges]),
         _section("Laws", _law_rows(scene)),
         _section("Numbers", [(g.name, _value(g), g.text) for g in groups]),
         _section("Warnings", [(warning,) for warning in warnings]),

@@ -123,7 +123,7 @@ def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     model, result = trajectory.model, trajectory.result
     names = [item.name for item in model.system.outputs]
     column, density = names.index(variable), names.index(f"density_{variable}")
-    told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.transitions)]
+    told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
     reasons = np.array(told)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
     halves, peaks = at[reasons == MEDIAN], np.concatenate([trajectory.outputs[:1], at[reasons == MODE]])

@@ -93,7 +93,7 @@ class SweepSolution(Results):
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the coordinates first."""
         along = quantity_columns(self.sweep.runs, self.inner, self._shape)
-        events = event_columns(self.sweep.runs, self._shape) if self.system.transitions else ()
+        events = event_columns(self.sweep.runs, self._shape) if self.system.edges else ()
         return (
             *self._coordinates(next((column for column in along if column.name == self.inner), None)),
             *(column for column in along if column.name != self.inner),
@@ -168,7 +168,7 @@ class SweepSolution(Results):
                 "1 where a law or a jump does, else 0",
             ),
         ]
-        if self.system.transitions:
+        if self.system.edges:
             rows.append(("entropy_destroyed", destroyed, "J/(m^2 K)", "most entropy that a jump has destroyed"))
         if self.accuracy:
             rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))

@@ -43,19 +43,19 @@ class Rebounds:
 
     def __init__(self, system: System, first: int) -> None:
         self.system = system
-        self.margins = [first + j for j, item in enumerate(system.transitions) if item.returns is not None]
+        self.margins = [first + j for j, item in enumerate(system.edges) if item.returns is not None]
         self.count = 0
         self.last = (0.0, 0.0)
         """Time of the last one, and how long it takes to return [s]; zero where that is open."""
 
     @cached_property
     def _times(self) -> Function:
-        known = [item.returns for item in self.system.transitions if item.returns is not None]
+        known = [item.returns for item in self.system.edges if item.returns is not None]
         return compile_function(self.system.inputs, [self.system.expand(item) for item in known])
 
     def see(self, jump: Jump) -> None:
         """Remember a jump where it is a rebound, or ends them."""
-        if jump.transition.returns is not None:
+        if jump.edge.returns is not None:
             self.count += 1
             self.last = jump.t, float(np.max(self._times(jump.after.inputs())))
 

@@ -63,7 +63,7 @@ class Margin:
     direction: int = -1
     smooth: bool = False
     """Whether the equations neither jump nor bend there: then the step onto it has to pass the test of its error."""
-    to_pass: bool = False
+    strict: bool = False
     """Whether it has to be passed: touched, or passed for a moment by less than the tolerance, it holds."""
 
     @classmethod
@@ -74,7 +74,7 @@ class Margin:
     @classmethod
     def bear(cls) -> "Margin":
         """The run ends where the margin falls below zero."""
-        return cls(terminal=True, to_pass=True)
+        return cls(terminal=True, strict=True)
 
     @classmethod
     def restart(cls, direction: int = 0) -> "Margin":

@@ -430,7 +430,7 @@ class Equilibria:
     @cached_property
     def _folds(self) -> list[tuple[Function, Function] | None]:
         """Tangent of the transitions that are folds; and with it how it falls, the warming, and the stiffness."""
-        return [self._compiled_fold(item.fold) if item.fold else None for item in self.system.transitions]
+        return [self._compiled_fold(item.fold) if item.fold else None for item in self.system.edges]
 
     def _compiled_fold(self, fold: Fold) -> tuple[Function, Function]:
         inputs, expand = self.system.inputs, self.system.expand
@@ -477,7 +477,7 @@ class Equilibria:
     @cached_property
     def _approaches(self) -> list[Function | None]:
         """Tangent of the transitions that are folds, how fast it changes, and how each balance does by itself."""
-        return [self._compiled_approach(item.fold) if item.fold else None for item in self.system.transitions]
+        return [self._compiled_approach(item.fold) if item.fold else None for item in self.system.edges]
 
     def _compiled_approach(self, fold: Fold) -> Function:
         system, t = self.system, self.system.t
@@ -526,7 +526,7 @@ class Equilibria:
 
     def lost(self, point: Point, rtol: float) -> int | None:
         """The fold that is so close to a point that time cannot tell them apart."""
-        for index, item in enumerate(self.system.transitions):
+        for index, item in enumerate(self.system.edges):
             found = self.at_fold(index, point) if item.fold else None
             if found is not None and self._is_close(point, found.point, DRIFT * rtol):
                 return index

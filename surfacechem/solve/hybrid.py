@@ -121,7 +121,7 @@ class Hybrid:
     def _begun(self, point: Point, before: Point | None) -> Point | None:
         """The start of a piece of time, where loads that jump there have moved what is in equilibrium with them."""
         polished = self.jumper.equilibria.polished
-        steps = [index for index, item in enumerate(self.system.transitions) if point.t in item.times]
+        steps = [index for index, item in enumerate(self.system.edges) if point.t in item.times]
         if not steps or before is None:
             return polished(point)
         before = polished(before)
@@ -238,12 +238,12 @@ class Hybrid:
 
     def _end_of_chatter(self, last: Jump) -> None:
         """A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run."""
-        if last.transition.fold is not None and np.array_equal(last.before.y, last.after.y):
-            while self.jumps[-2:-1] and self.jumps[-2].transition is last.transition and self.jumps[-2].t == last.t:
+        if last.edge.fold is not None and np.array_equal(last.before.y, last.after.y):
+            while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
                 self.jumps.pop()
-            self.status, self.reason = Status.EVENT, f"{last.transition.reason}, but {NO_PUSH}"
+            self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"
         else:
-            endless = f"transitions follow each other without end (chatter): {last.transition.reason}"
+            endless = f"transitions follow each other without end (chatter): {last.edge.reason}"
             self.status, self.reason = Status.FAILED, endless
 
     def _chatters(self, t: float) -> bool:
@@ -262,7 +262,7 @@ class Hybrid:
             self.sharpened, self.calm, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
             return True
         rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
-        if rests is None or self.jumps[-1].transition.returns is None or point.parameters[rests] == point.t:
+        if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == point.t:
             return False
         point.parameters[rests], self.calm = point.t, len(self.jumps)
         return True
@@ -285,7 +285,7 @@ class Hybrid:
     @cached_property
     def _alike(self) -> list[list[int]]:
         """Margins that measure the same in different modes."""
-        measures = [item.measure for item in self.system.transitions]
+        measures = [item.measure for item in self.system.edges]
         return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
 
     @cached_property
@@ -330,7 +330,7 @@ class Hybrid:
     def _jump(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out a transition and book it; None where the run ends with it."""
         largest, drift = float(self.largest[self.first + index]), DRIFT * self.problem.rtol
-        balanced = BALANCED if self.system.transitions[index].times else drift
+        balanced = BALANCED if self.system.edges[index].times else drift
         small, drift = NOISE * largest, drift * largest
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         jump = self.jumper.make(
@@ -339,7 +339,7 @@ class Hybrid:
         self.jumps.append(jump)
         if jump.stops:
             word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
-            self.status, self.reason = Status.EVENT, f"{jump.transition.reason}, which {word}"
+            self.status, self.reason = Status.EVENT, f"{jump.edge.reason}, which {word}"
             return None
         self.rebounds.see(jump)
         changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import INTERFACE, RESTS, Transition
+from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Account, System
 from surfacechem.solve.branches import Domain
@@ -46,7 +46,7 @@ class Jump:
     """What happened at a transition."""
 
     t: float
-    transition: Transition
+    edge: Edge
     before: Point
     after: Point
     released: float
@@ -67,7 +67,7 @@ class Jump:
     @property
     def stops(self) -> bool:
         """Whether the run cannot, or may not, go on."""
-        return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.transition.violation == "refuse")
+        return self.verdict == IMPOSSIBLE or (self.verdict == VIOLATES and self.edge.violation == "refuse")
 
 
 def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
@@ -105,10 +105,10 @@ class Jumper:
         return [
             compile_function(
                 system.inputs,
-                [system.expand(item.jump.get(s.symbol, s.symbol)) for s in system.states]
+                [system.expand(item.reset.get(s.symbol, s.symbol)) for s in system.states]
                 + [system.expand(item.modes.get(m, m)) for m in modes],
             )
-            for item in system.transitions
+            for item in system.edges
         ]
 
     def modes_after(self, index: int, point: Point) -> Array:
@@ -117,7 +117,7 @@ class Jumper:
 
     @cached_property
     def _moving_margins(self) -> list[Expression]:
-        return [self.system.expand(item.guard) for item in self.system.transitions]
+        return [self.system.expand(item.masked) for item in self.system.edges]
 
     @cached_property
     def margins_read_rates(self) -> bool:
@@ -168,7 +168,7 @@ class Jumper:
             moved["n"].update(self.system.follows)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
-    def _made(self, rows: Array, item: Transition, start: Point, energy: float) -> Array:
+    def _made(self, rows: Array, item: Edge, start: Point, energy: float) -> Array:
         """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
 
         Friction is last, with the bonds that it breaks.
@@ -179,10 +179,10 @@ class Jumper:
         made = np.zeros((len(rows), len(makers) + 1))
 
         def maker(axis: str) -> int:
-            return makers.index(axis if axis in makers and item.sinks != "snap" else INTERFACE)
+            return makers.index(axis if axis in makers and item.heat != "snap" else INTERFACE)
 
         level = self._energy(start.inputs())[0]
-        first = -1 if item.sinks == "local" else maker("n" if item.sinks == "joint" else INTERFACE)
+        first = -1 if item.heat == "local" else maker("n" if item.heat == "joint" else INTERFACE)
         made[:, first] += energy - level
         here = np.repeat(start.inputs()[None], len(rows), axis=0)
         here[:, 1 + 2 * len(start.y) :] = rows[:, 1 + 2 * len(start.y) :]
@@ -223,7 +223,7 @@ class Jumper:
         balance. ``last`` is the state before loads jump, or where the integration ended close to a fold. ``step`` are
         loads that have jumped at this moment; what their way decides is found within ``rtol``.
         """
-        item = self.system.transitions[index]
+        item = self.system.edges[index]
         lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
         before = lost.point if lost is not None else before
         values = self._maps[index](before.inputs())
@@ -245,7 +245,7 @@ class Jumper:
             self._load_path.reach(index, step, before)
         after: Point | None = start
         shares: Array | None = None
-        for _ in range(ROUNDS if item.settles else 0):
+        for _ in range(ROUNDS if item.equilibrates else 0):
 
             def heat(rows: Array, shares: Array | None = shares) -> Array:
                 return self._heat.warmed(rows, self._made(rows, item, start, energy), shares)
@@ -263,7 +263,7 @@ class Jumper:
             obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
             return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
         final, released, out, taken = heated
-        if item.settles and self.equilibria.is_pushed_back(final, balanced):  # friction pulls nothing back
+        if item.equilibrates and self.equilibria.is_pushed_back(final, balanced):  # friction pulls nothing back
             final = self.equilibria.with_slip(final, 0.0)
         jump = Jump(
             before.t, item, before, final, released, taken, ADMISSIBLE, since, lift, heat_out=out, entropy_out=taken
@@ -290,7 +290,7 @@ class Jumper:
         (_, *old), (_, *new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (before, point))
         return not np.allclose([old[0], old[2]], [new[0], new[2]], rtol=BALANCED, atol=ATOM)
 
-    def _opened(self, item: Transition, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
+    def _opened(self, item: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
         """The books before a jump, and the work up to there that the integration has not seen.
 
         That of far-field displacements that jump before anything moves, and that on the last of the way to a fold.
@@ -331,19 +331,19 @@ class Jumper:
         return found.settle(onward, heat, balanced)
 
     def _path_shares(
-        self, step: LoadStep | None, item: Transition, start: Point, after: Point | None, energy: float, rtol: float
+        self, step: LoadStep | None, item: Edge, start: Point, after: Point | None, energy: float, rtol: float
     ) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
-        if step is None or after is None or item.sinks == "snap" or not self._load_path.slides(start, after):
+        if step is None or after is None or item.heat == "snap" or not self._load_path.slides(start, after):
             return None
         made = float(self._made(after.inputs()[None], item, start, energy)[0, -1])
-        broken = energy - float(self._energy(start.inputs())[0]) if item.sinks == "local" else 0.0
+        broken = energy - float(self._energy(start.inputs())[0]) if item.heat == "local" else 0.0
         small = self._rounding(after, energy)
         return self._load_path.shares(step, start, after, broken, rtol * made + small) if made > small else None
 
-    def _beyond(self, item: Transition, after: Point | None) -> str:
+    def _beyond(self, item: Edge, after: Point | None) -> str:
         """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
-        if after is None or not item.settles or item.measure:
+        if after is None or not item.equilibrates or item.measure:
             return ""
         return self._domain.beyond(after.inputs())
 
@@ -351,7 +351,7 @@ class Jumper:
     def _domain(self) -> Domain:
         return Domain(self.system)
 
-    def _kept(self, item: Transition, after: Point | None, parameters: Array, small: float) -> Point | None:
+    def _kept(self, item: Edge, after: Point | None, parameters: Array, small: float) -> Point | None:
         """The modes that a transition sets hold while its measure is as good as zero."""
         if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > small:
             return after
@@ -374,15 +374,15 @@ class Jumper:
         """Entropy that the last digits of the states stand for, and the noise of what the margin measures."""
         point, n = jump.before, len(jump.before.y)
         nudges = DIGITS * np.abs(point.y)
-        if jump.transition.measure:
-            nudges[self.states.index(jump.transition.measure)] += noise
+        if jump.edge.measure:
+            nudges[self.states.index(jump.edge.measure)] += noise
         rows = np.repeat(point.inputs()[None], 1 + n, axis=0)
         rows[1:, 1 : 1 + n] += np.diag(nudges)
         entropies = self._books(rows)[:, 1]
         return float(np.sum(np.abs(entropies[1:] - entropies[0])))
 
     def _heated(
-        self, point: Point, item: Transition, start: Point, energy: float, shares: Array | None
+        self, point: Point, item: Edge, start: Point, energy: float, shares: Array | None
     ) -> tuple[Point, float, float, float] | None:
         """The point with the heat made in its nodes: point, energy, heat and entropy passed to reservoirs."""
         rows = point.inputs()[None]

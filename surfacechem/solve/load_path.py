@@ -166,13 +166,11 @@ class LoadPath:
 
     @cached_property
     def _margins(self) -> Function:
-        return compile_function(
-            self.system.inputs, [self.system.expand(item.guard) for item in self.system.transitions]
-        )
+        return compile_function(self.system.inputs, [self.system.expand(item.masked) for item in self.system.edges])
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:
         """Go along the way of the loads to where a transition takes place that follows from them."""
-        if self.equilibria.slip is None or not self.varies or self.system.transitions[index].times:
+        if self.equilibria.slip is None or not self.varies or self.system.edges[index].times:
             return
         change = step.levels(self.system, before)
 

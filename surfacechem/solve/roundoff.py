@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.system import Margin as Watched
 from surfacechem.model.system import System
 from surfacechem.solve.arcs import changed
@@ -31,14 +31,14 @@ def watched(margin: Watched) -> Margin:
     return Margin.stop() if margin.terminal else Margin.restart()
 
 
-def awaited(item: Transition) -> Margin:
+def awaited(item: Edge) -> Margin:
     """What the stepper does at the margin of a transition."""
-    return Margin.bear() if item.to_pass else Margin.stop()
+    return Margin.bear() if item.strict else Margin.stop()
 
 
 def to_pass(problem: Problem) -> NDArray[np.bool_]:
     """Which margins it takes more to than to touch zero."""
-    return np.array([kind.to_pass for kind in problem.margins], dtype=bool)
+    return np.array([kind.strict for kind in problem.margins], dtype=bool)
 
 
 def sizes(problem: Problem, system: System, point: Point, seen: Array) -> Array:

@@ -41,7 +41,7 @@ def expanded(system, name):
         "residual": list(system.rows.values()),
         "outputs": [item.expression for item in system.outputs],
         "ledger": [account.rate for account in system.ledger],
-        "margins": [m.expression for m in system.moving_margins()] + [item.guard for item in system.transitions],
+        "margins": [m.expression for m in system.moving_margins()] + [item.masked for item in system.edges],
     }[name]
     return [system.expand(e) for e in expressions]
 

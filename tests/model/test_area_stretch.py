@@ -165,7 +165,7 @@ def test_a_tensile_strength():
         return mounted(on, [BondStiffness(E_b=1e14 / on, E_n=1e15 / on)], limits=[TensileStrength(t_max=3e5)])
 
     runs = [Model(assemble(make(on))).solve(Run(times=(0.0, 0.9))) for on in (1.0, J)]
-    (t,), (again,) = ([jump.t for jump in run.jumps if jump.transition.name == "debond"] for run in runs)
+    (t,), (again,) = ([jump.t for jump in run.jumps if jump.edge.name == "debond"] for run in runs)
     assert t == pytest.approx(again, rel=1e-12)
     assert t == pytest.approx(3e5 * J * 2 / 1e14 / 2e-8, rel=1e-9)
 

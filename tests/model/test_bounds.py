@@ -60,7 +60,7 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
 
     trajectory = solve(damage())
     unbonded, rebond = trajectory.jumps
-    assert (unbonded.transition.name, rebond.transition.name) == ("unbonded", "rebond")
+    assert (unbonded.edge.name, rebond.edge.name) == ("unbonded", "rebond")
     assert unbonded.t == pytest.approx(brentq(free, 0.3, 1.0, xtol=1e-15), rel=1e-10)
     assert rebond.t == pytest.approx(2 - math.sqrt(2 * K / E) / TOP, rel=1e-12)
     assert unbonded.released == rebond.released == 0.0
@@ -84,7 +84,7 @@ def test_held_bonds_are_said_in_the_dataset_and_dissipate_nothing():
 
 def test_no_bond_at_the_start_under_a_load_that_allows_none():
     trajectory = solve(damage(phi=0.0, gaps=(TOP, TOP)), until=1.0)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["unbonded"]
     assert trajectory.jumps[0].t == 0.0
     assert trajectory.status == "finished"
     assert np.all(trajectory.everywhere["phi"] == 0.0)
@@ -93,7 +93,7 @@ def test_no_bond_at_the_start_under_a_load_that_allows_none():
 def test_a_bound_is_touched_again_and_again():
     gaps = (0.0, *(TOP, 0.0) * 20)
     trajectory = solve(damage(gaps=gaps, until=40.0), until=40.0, outputs=11)
-    names = [jump.transition.name for jump in trajectory.jumps]
+    names = [jump.edge.name for jump in trajectory.jumps]
     assert names == ["unbonded", "rebond"] * 20
     assert audit(trajectory).energy_error < 1e-9
 
@@ -101,7 +101,7 @@ def test_a_bound_is_touched_again_and_again():
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-13])
 def test_bounds_at_any_tolerance(rtol):
     trajectory = solve(damage(), rtol=rtol)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
 
 
 def test_constant_affinity_bonds_all_sites():
@@ -134,7 +134,7 @@ def test_a_limit_frees_complete_bonding():
         normal=Mounting(k=1e13),
     )
     trajectory = solve(scene)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["complete", "debond", "complete"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["complete", "debond", "complete"]
     assert audit(trajectory).energy_error < 1e-9
 
 
@@ -184,7 +184,7 @@ def test_mixing_entropy_yields_to_stretched_springs(law):
     loading = {"g_n": Table(times=[0.0, 1.0, 2.0], values=[0.0, 1e-7, 0.0])}
     scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial={"phi": 0.5, "T": 300.0})
     trajectory = solve(scene)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
     assert trajectory.status == "finished"
     assert trajectory.everywhere["phi"].min() > -1e-14
     gap = math.sqrt(2 * (6e-20 - BOLTZMANN * 300.0 * math.log(1e-15)) / 1e-3)

@@ -136,7 +136,7 @@ def test_sliding_breaks_the_bonds_of_a_mechanism(two_bonds):
     whole = scene(two_bonds, ["weak(s)", "strong(s)"], start, loading, [friction], tangential=mount)
     trajectory = solve(whole)
     slip = trajectory.jumps[0]
-    assert slip.transition.name == "slip forward"
+    assert slip.edge.name == "slip forward"
     assert slip.t == pytest.approx(0.8, rel=1e-12)
     assert coverages(trajectory, "after")["theta_free_s"] == pytest.approx(1.0, rel=1e-14)
 

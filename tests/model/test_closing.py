@@ -154,7 +154,7 @@ def test_bodies_do_not_pass_through_each_other(mount, start, t, names):
     given = scene((), {"F_n": Hold(level=-39.0)}, mount, {"g_n": 1e-3} | start)
     assert assemble(given).warnings == ()
     trajectory = solve(given, 30.0)
-    assert [jump.transition.name for jump in trajectory.jumps] == names
+    assert [jump.edge.name for jump in trajectory.jumps] == names
     assert [jump.t for jump in trajectory.jumps] == pytest.approx(len(names) * [t], rel=1e-12)
     assert (trajectory.status, gap(trajectory)) == ("finished", 0.0)
 
@@ -214,7 +214,7 @@ def test_a_body_bounces_on_a_contact_that_is_not_bonded():
     speed, sag = F / m * fall, F / E_n
     contact = 2 * (math.pi - math.atan2(speed / omega, sag)) / omega
     trajectory = solve(given, 2 * fall + contact)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["touch", "release"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["touch", "release"]
     assert trajectory.jumps[0].t == pytest.approx(fall, rel=1e-10)
     assert gap(trajectory) == pytest.approx(g_0, rel=1e-8)
 
@@ -240,7 +240,7 @@ def test_a_limit_of_a_tension_that_bonds_do_not_carry_is_refused(rest):
         NormalStiffness(E_n=varying(2e14, Proportional(of="phi"))),
     ):
         trajectory = solve(scene([carries, potentials[1]], loading, **rest, **extra), 5.0)
-        (debond,) = [jump for jump in trajectory.jumps if jump.transition.name == "debond"]
+        (debond,) = [jump for jump in trajectory.jumps if jump.edge.name == "debond"]
         assert debond.released > 0
 
 

@@ -45,7 +45,7 @@ def velocity(trajectory):
 
 
 def happened(trajectory):
-    return [jump.transition.name for jump in trajectory.jumps]
+    return [jump.edge.name for jump in trajectory.jumps]
 
 
 def plain(law, pull, m, times, y, p=lambda t: P, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6, turn=0.0):

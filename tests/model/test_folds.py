@@ -36,7 +36,7 @@ def solve(loading, until=40.0, potentials=(ZONE,), frictions=(), reactions=(), i
 
 
 def snaps(trajectory):
-    return [jump for jump in trajectory.jumps if jump.transition.name == "snap"]
+    return [jump for jump in trajectory.jumps if jump.edge.name == "snap"]
 
 
 def shear(x):

@@ -165,11 +165,11 @@ def debonding(k, path):
 
 def debonded(trajectory):
     """The jumps, without touch and release, which rounding decides at a gap of zero."""
-    return [jump for jump in trajectory.jumps if jump.transition.name not in ("touch", "release")]
+    return [jump for jump in trajectory.jumps if jump.edge.name not in ("touch", "release")]
 
 
 def names(trajectory):
-    return [jump.transition.name for jump in debonded(trajectory)]
+    return [jump.edge.name for jump in debonded(trajectory)]
 
 
 def test_a_stiff_mounting_follows_the_falling_line_and_unloads_to_the_origin():

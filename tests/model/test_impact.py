@@ -47,11 +47,11 @@ def solve(given, until, rtol=1e-11, points=11):
 
 
 def names(trajectory):
-    return [jump.transition.name for jump in trajectory.jumps]
+    return [jump.edge.name for jump in trajectory.jumps]
 
 
 def made(trajectory, name):
-    return [jump for jump in trajectory.jumps if jump.transition.name == name]
+    return [jump for jump in trajectory.jumps if jump.edge.name == name]
 
 
 def state(trajectory, name):

@@ -190,7 +190,7 @@ def envelope(g):
 
 
 def names(solution):
-    return [jump.transition.name for jump in solution.trajectory.jumps]
+    return [jump.edge.name for jump in solution.trajectory.jumps]
 
 
 def test_bonds_that_form_stay_on_the_envelope():
@@ -276,7 +276,7 @@ run: {until: 3, outputs: 4}
     for name in ("phi", "g_n"):
         assert jumped.dataset[name][-1] == pytest.approx(float(moved.dataset[name][-1]), rel=1e-9, abs=1e-15)
     assert jumped.audit.energy_error < 1e-9
-    (load,) = (jump for jump in jumped.trajectory.jumps if jump.transition.name == "load")
+    (load,) = (jump for jump in jumped.trajectory.jumps if jump.edge.name == "load")
     assert float(jumped.dataset["T_c"][-1]) == pytest.approx(300 + load.released / 10, rel=1e-7)
     assert load.released > 10 * (float(moved.dataset["T_c"][-1]) - 300) > 0
 

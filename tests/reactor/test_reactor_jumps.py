@@ -33,7 +33,7 @@ def network(case, **bodies) -> tuple[InterfaceReactor, ReactorNet]:
 
 def compare(interface, solution, within):
     ours, theirs = interface.scene.moments.jumps, solution.trajectory.jumps
-    assert [jump.transition.name for jump in ours] == [jump.transition.name for jump in theirs]
+    assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
     end = solution.trajectory.run.times[-1]
     np.testing.assert_allclose([j.t for j in ours], [j.t for j in theirs], atol=within * end, rtol=0)
     for state in interface.scene.states:
@@ -61,7 +61,7 @@ def test_the_books_hold_what_jumps_release(name):
         assert float(history[account][-1]) == pytest.approx(float(data[account][-1]), abs=1e-5 * size)
     assert history.attrs["energy_error"] < 1e-7
     table = [str(name) for name in history["event_name"].values]
-    assert table == [jump.transition.name for jump in solution.trajectory.jumps]
+    assert table == [jump.edge.name for jump in solution.trajectory.jumps]
 
 
 def test_endless_rebounds_end_in_a_network_too():
@@ -69,7 +69,7 @@ def test_endless_rebounds_end_in_a_network_too():
     interface, net = network("bouncing-plate")
     net.advance(3.0)
     jumps = interface.scene.moments.jumps
-    assert [jump.transition.name for jump in jumps] == (len(jumps) - 1) * ["impact"] + ["rest"]
+    assert [jump.edge.name for jump in jumps] == (len(jumps) - 1) * ["impact"] + ["rest"]
     assert jumps[-1].t == pytest.approx(2.55863396, rel=1e-6)
     assert (interface["g_n"], interface["v_n"]) == (0.0, 0.0)
 
@@ -79,7 +79,7 @@ def test_single_steps_end_at_the_event():
     times = []
     while net.time < 0.7:
         times.append(net.step())
-    assert [jump.transition.name for jump in interface.scene.moments.jumps][:2] == ["slip forward", "stop"]
+    assert [jump.edge.name for jump in interface.scene.moments.jumps][:2] == ["slip forward", "stop"]
     for jump in interface.scene.moments.jumps:
         assert min(abs(t - jump.t) for t in times) < 1e-15
     assert all(later > before for before, later in pairwise(times))

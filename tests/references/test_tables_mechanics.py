@@ -75,7 +75,7 @@ class TestFriction:
             assert_close(solved[name], exact[column], 1e-12)
         stop = expected("g_coulomb_stop")["t_stop"]
         assert np.all(solved["v"][exact["t"] > stop] == 0.0)
-        assert [jump.transition.name for jump in solved.jumps] == ["stop"]
+        assert [jump.edge.name for jump in solved.jumps] == ["stop"]
         assert solved.jumps[0].t == pytest.approx(stop, rel=1e-13)
         assert_closed(solved)
 
@@ -98,7 +98,7 @@ class TestFriction:
         p = parameters("g_stickslip_period_vs_V")
         onset = p["mu_s"] * p["p"] / (p["k"] * row["V"])
         solved = solve(scenes.slider(), (0.0, onset + 3.5 * row["period"]), {"loading.w_t.rate": row["V"]})
-        names = [jump.transition.name for jump in solved.jumps]
+        names = [jump.edge.name for jump in solved.jumps]
         assert names[:6] == ["slip forward", "stop"] * 3
         assert set(names[6:]) <= {"slip forward", "stop"}
         stick, slip = solved.jumps[2].since, solved.jumps[1].since

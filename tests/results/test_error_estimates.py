@@ -61,7 +61,7 @@ def test_an_estimate_looks_at_the_times_of_events(stick_slip):
 def test_other_events_in_the_second_run_are_said(stick_slip):
     trajectory = stick_slip.model.solve(stick_slip.case.run)
     accuracy = estimated(trajectory, replace(trajectory, jumps=trajectory.jumps[:-1]))
-    last = trajectory.jumps[-1].transition.name
+    last = trajectory.jumps[-1].edge.name
     count = len(event_times(trajectory)[last])
     assert f"which had other events: {count - 1} {last} instead of {count}" in accuracy.source
     assert EVENTS not in accuracy.variables

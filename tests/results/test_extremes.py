@@ -175,7 +175,7 @@ def test_bonding_ends_at_the_sites_of_the_poorer_side():
     interface = Interface(Hold(level=300.0), [BondEnergy(K_0=1.0)], (), [Relaxation(tau=1.0)], sites)
     trajectory = run(Scene(pair, interface, initial={"phi": 0.0}, T_0=300.0), 10.0)
     (complete,) = trajectory.jumps
-    assert complete.transition.name == "complete"
+    assert complete.edge.name == "complete"
     assert complete.t == pytest.approx(-math.log(0.6), rel=1e-9)
     assert trajectory.status == "finished"
     assert trajectory.result.y[0] == 0.4

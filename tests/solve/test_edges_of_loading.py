@@ -30,7 +30,7 @@ def solved(tmp_path):
 
 
 def events(solution):
-    return [(jump.transition.name, jump.t) for jump in solution.trajectory.jumps]
+    return [(jump.edge.name, jump.t) for jump in solution.trajectory.jumps]
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def slider(friction, mounting, drive, p=1e5, potentials=(), programme=(), **init
 
 
 def names(solved) -> list[str]:
-    return [jump.transition.name for jump in solved.jumps]
+    return [jump.edge.name for jump in solved.jumps]
 
 
 class TestTime:
@@ -97,7 +97,7 @@ class TestTime:
 
     def test_outputs_never_change_the_events(self):
         runs = [scenes.slider().solve(Run(times=(0.0, *times))) for times in ([9.0], np.linspace(0.01, 9.0, 1234))]
-        first, second = ([(j.t, j.transition.name, *j.after.y) for j in run.jumps] for run in runs)
+        first, second = ([(j.t, j.edge.name, *j.after.y) for j in run.jumps] for run in runs)
         assert len(first) > 30
         assert first == second
 

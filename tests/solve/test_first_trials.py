@@ -37,7 +37,7 @@ def solve(until, potentials=(), frictions=(), limits=(), initial=None, loading=N
 
 
 def events(trajectory):
-    return [(jump.transition.name, jump.t) for jump in trajectory.jumps]
+    return [(jump.edge.name, jump.t) for jump in trajectory.jumps]
 
 
 def final(trajectory, name):

@@ -259,7 +259,7 @@ def test_bonds_that_sliding_breaks_take_their_heat_as_it_begins():
         return given.replace("coulomb: {mu: 0.5}", "bonded-coulomb: {mu: 0.3, mu_b: 0.5, mu_ub: 0.3}")
 
     jumped = solved(case(0))
-    assert [jump.transition.name for jump in jumped.trajectory.jumps] == ["slip forward"]
+    assert [jump.edge.name for jump in jumped.trajectory.jumps] == ["slip forward"]
     found, limit = temperatures(jumped), limit_of_ramps(case)
     same({name: found[name] for name in ("T_1", "T_2")}, {name: limit[name] for name in ("T_1", "T_2")}, 1e-9)
 
@@ -403,7 +403,7 @@ def test_a_snap_heats_as_the_interface_would_in_a_little_time(thermal, law):
         given = text(thermal, "w_n: {ramp: {rate: 5 um/s}}", mechanics, potential, initial=started)
         ends.append(solved(given.replace(FRICTION, laws)))
     snapped, moved = ends
-    (jump,) = (jump for jump in snapped.trajectory.jumps if jump.transition.name == law)
+    (jump,) = (jump for jump in snapped.trajectory.jumps if jump.edge.name == law)
     assert jump.released > 1
     same(temperatures(snapped), temperatures(moved), 1e-3 * max(jump.after.y - jump.before.y))
 
@@ -436,7 +436,7 @@ def test_gaps_that_move_together_are_damped_each_by_its_own_support():
     """The traction that presses falls and the slider slips: the one is damped in the base, the other is friction."""
     case = pressure_falls("slider", "pressed", 0).replace("k: 1e12, beta_1: 0", "k: 1e8, beta_1: 0")
     trajectory = solved(case.replace("w_n: -2 um", "w_n: -20 mm").replace("E_n: 1e15", "E_n: 3e8")).trajectory
-    jump = next(jump for jump in trajectory.jumps if jump.transition.name == "load")
+    jump = next(jump for jump in trajectory.jumps if jump.edge.name == "load")
     rises = dict(zip((s.name for s in trajectory.model.system.states), jump.after.y - jump.before.y, strict=True))
     assert 700 * rises["T_2"] == pytest.approx((1.8e6) ** 2 / (2 * 4e8), rel=1e-9)
     assert 1000 * rises["T_1"] == pytest.approx(jump.released - (1.8e6) ** 2 / (2 * 4e8), rel=1e-9)

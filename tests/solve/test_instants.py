@@ -35,7 +35,7 @@ def solved(scene, until, rtol=1e-11, outputs=21):
 
 
 def names(trajectory):
-    return [jump.transition.name for jump in trajectory.jumps]
+    return [jump.edge.name for jump in trajectory.jumps]
 
 
 def test_bodies_touch_and_come_apart_once_at_any_tolerance():
@@ -166,7 +166,7 @@ def test_the_rounding_of_a_bound_destroys_no_entropy(phi, verdict):
     pair, loading = bodies("T", "T", C_1=C / 2, C_2=C / 2), {"g_n": Ramp(rate=1e-6)}
     scene = Scene(pair, interface, loading=loading, T_0=300.0, initial={"T": 300.0 + K_1 / (2 * C), "phi": 0.5})
     model = Model(assemble(scene))
-    index = [item.name for item in model.system.transitions].index("unbonded")
+    index = [item.name for item in model.system.edges].index("unbonded")
     states = [{"phi": phi, "T": 300.0 + K_1 / (2 * C)}[state.name] for state in model.system.states]
     values = np.array([parameter.value for parameter in model.system.parameters], dtype=float)
     point = Point(0.0, np.array(states), np.zeros(len(states)), values)

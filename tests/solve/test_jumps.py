@@ -38,7 +38,7 @@ def solve(potentials=(), *, until, loading, J_c=None, **scene):
 
 
 def jumps(trajectory, name):
-    return [jump for jump in trajectory.jumps if jump.transition.name == name]
+    return [jump for jump in trajectory.jumps if jump.edge.name == name]
 
 
 def test_a_dead_load_does_its_work_in_a_snap():

@@ -37,7 +37,7 @@ def test_so_it_does_in_a_scene_with_transitions():
     loading = {"w_n": push, "v": Harmonic(amplitude=1e-3, frequency=0.5)}
     rubbing, mount = Interface("T", [], [Coulomb(mu=0.3)]), Mounting(k=1e11)
     scene = Scene(bodies("T", "T"), rubbing, (), loading, None, 300.0, {"T": 300.0}, normal=mount)
-    assert assemble(scene).transitions
+    assert assemble(scene).edges
     np.testing.assert_allclose(times(scene), [1.0, 2.0, 3.0], rtol=0, atol=1e-13)
 
 

@@ -80,11 +80,11 @@ def at(solution, name, t):
 
 
 def events(solution):
-    return [(jump.transition.name, jump.t) for jump in solution.trajectory.jumps]
+    return [(jump.edge.name, jump.t) for jump in solution.trajectory.jumps]
 
 
 def released(solution, name="load"):
-    return [jump.released for jump in solution.trajectory.jumps if jump.transition.name == name]
+    return [jump.released for jump in solution.trajectory.jumps if jump.edge.name == name]
 
 
 # -- normal gap
@@ -254,7 +254,7 @@ run: {until: 2 s}
 """
     solution = solved(text)
     assert [name for name, _ in events(solution)] == ["slip forward", "debond", "slip forward"]
-    (jump,) = [jump for jump in solution.trajectory.jumps if jump.transition.name == "debond"]
+    (jump,) = [jump for jump in solution.trajectory.jumps if jump.edge.name == "debond"]
     assert jump.released == pytest.approx(0.4995, rel=1e-11)
     assert jump.verdict == "admissible"
     np.testing.assert_array_equal(jump.after.y[1], 0.0)
@@ -342,7 +342,7 @@ def test_loads_jump_in_a_reactor_network(loading):
     net.rtol, net.atol = 1e-10, 1e-16
     net.advance(6.0)
     ours, theirs = interface.scene.moments.jumps, solution.trajectory.jumps
-    assert [jump.transition.name for jump in ours] == [jump.transition.name for jump in theirs]
+    assert [jump.edge.name for jump in ours] == [jump.edge.name for jump in theirs]
     assert [jump.released for jump in ours] == pytest.approx([jump.released for jump in theirs], abs=1e-6)
     assert interface["u_t"] == pytest.approx(at(solution, "u_t", 6.0), rel=1e-9)
     assert interface.dataset.attrs["energy_error"] < 1e-6

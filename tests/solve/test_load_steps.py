@@ -31,7 +31,7 @@ def held(trajectory, name):
 
 
 def released(trajectory, name):
-    return [jump.released for jump in trajectory.jumps if jump.transition.name == name]
+    return [jump.released for jump in trajectory.jumps if jump.edge.name == name]
 
 
 def test_an_elastic_gap_moves_at_once():
@@ -59,7 +59,7 @@ def test_what_slides_goes_on_or_sticks_and_turns_back(rtol):
     trajectory = solved(Interface("T", frictions=[Coulomb(mu=MU)]), loading, {"tangential": Mounting(k=K)}, rtol=rtol)
     u = np.array([0.0, 1e3 - MU * p, 1.5e3 - MU * p, -2e3 + MU * p]) / K
     np.testing.assert_allclose(held(trajectory, "u_t"), u, rtol=1e-13)
-    assert [jump.transition.name for jump in trajectory.jumps] == ["slip forward", "load", "load", "slip backward"]
+    assert [jump.edge.name for jump in trajectory.jumps] == ["slip forward", "load", "load", "slip backward"]
     moved = np.abs(np.diff(u))
     heat = MU * p * moved + 0.5 * K * moved**2
     np.testing.assert_allclose([jump.released for jump in trajectory.jumps], [*heat[:2], 0.0, heat[2]], rtol=1e-9)

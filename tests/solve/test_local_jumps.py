@@ -54,7 +54,7 @@ def bonds(K_0):
 def test_the_interface_pays_and_then_the_gap_follows(stiffness, stored, K_0, verdict):
     solution = run(stiffness, K_0=K_0)
     first, second = solution.trajectory.jumps
-    assert [first.transition.name, second.transition.name] == ["debond", "relax" if stored else "open"]
+    assert [first.edge.name, second.edge.name] == ["debond", "relax" if stored else "open"]
     assert first.t == second.t
     assert first.released == pytest.approx(stored - bonds(K_0), rel=1e-9)
     assert second.released == pytest.approx(SPRING, rel=1e-9)

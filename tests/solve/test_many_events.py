@@ -47,7 +47,7 @@ def test_a_mass_sticks_and_slips_a_thousand_times():
     """Period and slip of each cycle are the same to rounding, and all work is heat."""
     V, omega, drop = 5e-3, np.sqrt(1e5), (0.4 - 0.2) * 1e3 / 1e5
     trajectory = slider(Coulomb(mu=0.2, mu_s=0.4), V, 500.0, 1e-11)
-    begun = [jump for jump in trajectory.jumps if jump.transition.name == "slip forward"]
+    begun = [jump for jump in trajectory.jumps if jump.edge.name == "slip forward"]
     assert len(trajectory.jumps) > 1000
     period = 2 * drop / V + 2 * (np.pi - np.arctan(omega * drop / V)) / omega
     np.testing.assert_allclose(np.diff([jump.t for jump in begun]), period, rtol=1e-9)

@@ -69,7 +69,7 @@ def test_a_light_damper_touches_and_releases_once():
     loading = {"w_n": Harmonic(amplitude=1e-7, frequency=0.1)}
     trajectory = solve(20.0, [ZONE], initial=initial, loading=loading, normal=mount)
     assert trajectory.status == "finished", trajectory.reason
-    held = [jump.transition.name for jump in trajectory.jumps if jump.since > 1e-3]
+    held = [jump.edge.name for jump in trajectory.jumps if jump.since > 1e-3]
     assert held == ["touch", "release", "touch"]
 
 

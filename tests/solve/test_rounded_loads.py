@@ -32,5 +32,5 @@ def test_a_damped_slider_that_turns_six_times(rtol):
     model = Model(load_text(DAMPED, "damped").system())
     trajectory = model.solve(Run(times=(0.0, 3.0), rtol=rtol))
     assert trajectory.status == "finished", trajectory.reason
-    assert [jump.transition.name for jump in trajectory.jumps].count("stop") == 6
+    assert [jump.edge.name for jump in trajectory.jumps].count("stop") == 6
     assert audit(trajectory).energy_error < max(100 * rtol, 1e-9)

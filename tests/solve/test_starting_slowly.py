@@ -46,6 +46,6 @@ def test_a_body_pressed_from_rest_at_touch_touches_once_and_stays(load, rtol):
     solution = run(load, "-", rtol, "exponential-cohesive-zone: {t_max: 1e5, g_0: 200 nm, E_n: 3e12}")
     begins = 0.2 if load == "rest-and-ramp" else 0.0
     assert solution.status == "finished", solution.reason
-    assert [jump.transition.name for jump in solution.trajectory.jumps] == ["touch"]
+    assert [jump.edge.name for jump in solution.trajectory.jumps] == ["touch"]
     assert solution.trajectory.jumps[0].t == pytest.approx(begins, rel=1e-9)
     assert solution.accuracy.error < 100 * rtol, solution.accuracy.source

@@ -24,7 +24,7 @@ def solved(interface, loading, end, rtol=1e-11, initial=None, **mounts):
 
 
 def names(trajectory):
-    return [jump.transition.name for jump in trajectory.jumps]
+    return [jump.edge.name for jump in trajectory.jumps]
 
 
 def block(amplitude, frequency, end, rtol, mean=0.0, initial=None):
@@ -84,7 +84,7 @@ def test_a_block_that_is_shaken_begins_and_stops_once_in_each_half_period(rtol):
     found = names(trajectory)
     assert found[0] == "stop"
     expected = [x for j in range(len(found)) for x in (("slip backward", "slip forward")[j % 2], "stop")]
-    begun = [jump.t for jump in trajectory.jumps if jump.transition.name != "stop"]
+    begun = [jump.t for jump in trajectory.jumps if jump.edge.name != "stop"]
     first = expected.index(found[1])
     assert found[1:] == expected[first : first + len(found) - 1]
     omega = 6 * np.pi
@@ -136,7 +136,7 @@ def test_what_turns_round_in_the_air_rubs_the_other_way_when_it_lands():
     """On a spring in the air the velocity swings: each contact takes energy, whichever way it slides then."""
     trajectory = bouncing(Mounting(m=3.0, k=1e8), {"v": 2.0}, 0.02)
     assert trajectory.status == "finished"
-    flying = [jump for jump in trajectory.jumps if jump.transition.name == "stop" and jump.before.y[0] > 0]
+    flying = [jump for jump in trajectory.jumps if jump.edge.name == "stop" and jump.before.y[0] > 0]
     assert flying
     assert all(np.sign(jump.before.y[2]) == np.sign(jump.after.y[2]) for jump in flying)
     heat = trajectory.everywhere["T"][len(trajectory.result.times) :]

@@ -11,7 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Law, Load, Potential, Spec, UnderPressure
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, positive, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import NOTHING, Build
 from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
@@ -283,14 +283,14 @@ def _sides_of_touch(build: Build) -> None:
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
         other = {side: symengine.Integer(-value)}
         bears = rests and name == "release"
-        build.transitions.append(
-            Transition(
+        build.edges.append(
+            Edge(
                 name,
                 value * g,
                 reason,
                 other,
-                settles=True,
-                to_pass=bears,
+                equilibrates=True,
+                strict=bears,
                 measure="g_n",
                 when={side: (value,)},
             )

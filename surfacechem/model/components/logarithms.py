@@ -34,7 +34,7 @@ def logarithmic_state(build: Build) -> None:
     if "phi" not in build.bonding or LOGARITHM not in build.scene.initial:
         return
     bond = build.bonding["phi"]
-    if any(bond.symbol in transition.jump for transition in build.transitions):
+    if any(bond.symbol in edge.reset for edge in build.edges):
         message = f"bonds that break at once have no {LOGARITHM}. Give `phi` instead."
         raise InputError(message, path=f"initial.{LOGARITHM}")
     symbol, dot = symengine.symbols(f"{LOGARITHM} d{LOGARITHM}_dt")

@@ -11,7 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.model.components.mounting import ACROSS, ALONG, LENGTH
@@ -109,7 +109,7 @@ def _stage_end(
     during: dict[Expression, tuple[int]],
 ) -> None:
     reason = f"the stage {item.name} ends"
-    build.transitions.append(Transition(f"end of {item.name}", margin, reason, advance, passes=True, when=during))
+    build.edges.append(Edge(f"end of {item.name}", margin, reason, advance, passes=True, when=during))
 
 
 def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
@@ -139,15 +139,15 @@ def _variable(build: Build, item: Stage) -> Expression:
 
 def _at_event(build: Build, item: Stage, stage: Expression, i: int, begun: Expression) -> None:
     """The transition itself moves the programme on."""
-    found = [j for j, other in enumerate(build.transitions) if other.name.startswith(item.event)]
+    found = [j for j, other in enumerate(build.edges) if other.name.startswith(item.event)]
     if not found:
-        known = [other.name for other in build.transitions]
+        known = [other.name for other in build.edges]
         raise InputError(f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}", item.place)
     for j in found:
-        other = build.transitions[j]
+        other = build.edges[j]
         modes = {
             **other.modes,
             stage: where(_during(stage, i), i + 1, other.modes.get(stage, stage)),
             begun: where(_during(stage, i), build.t, other.modes.get(begun, begun)),
         }
-        build.transitions[j] = replace(other, modes=modes)
+        build.edges[j] = replace(other, modes=modes)

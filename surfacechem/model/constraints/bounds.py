@@ -14,7 +14,7 @@ from typing import Any
 import symengine
 
 from surfacechem.expressions import Expression, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import LOGARITHM
 from surfacechem.model.constraints.active_bounds import Decision
@@ -104,7 +104,7 @@ def _hold(build: Build, held: Expression, bound: Bound) -> None:
     margin = where(bound.beyond > 0, bound.gap, 1)
     name, reason, *_ = bound.words
     modes, jump = {held: symengine.Integer(bound.side)}, {symengine.Symbol("phi"): bound.value}
-    build.transitions.append(Transition(name, margin, reason, modes, jump, measure="phi", when={held: (0,)}))
+    build.edges.append(Edge(name, margin, reason, modes, jump, measure="phi", when={held: (0,)}))
 
 
 def _let_go(build: Build, held: Expression, bound: Bound) -> None:
@@ -112,7 +112,7 @@ def _let_go(build: Build, held: Expression, bound: Bound) -> None:
     turned = build.stretch * bound.beyond / density
     *_, name, reason = bound.words
     free = {held: symengine.Integer(0)}
-    build.transitions.append(Transition(name, turned, reason, free, when={held: (bound.side,)}))
+    build.edges.append(Edge(name, turned, reason, free, when={held: (bound.side,)}))
 
 
 def released(build: Build) -> None:
@@ -121,6 +121,6 @@ def released(build: Build) -> None:
     phi = symengine.Symbol("phi")
     if held is None:
         return
-    for j, item in enumerate(build.transitions):
-        if phi in item.jump and held not in item.modes:
-            build.transitions[j] = replace(item, modes={**item.modes, held: symengine.Integer(0)})
+    for j, item in enumerate(build.edges):
+        if phi in item.reset and held not in item.modes:
+            build.edges[j] = replace(item, modes={**item.modes, held: symengine.Integer(0)})

@@ -20,7 +20,7 @@ import symengine
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
 from surfacechem.model import balances
-from surfacechem.model.automaton import FOLD, Equilibrium, Fold, Transition
+from surfacechem.model.automaton import FOLD, Edge, Equilibrium, Fold
 from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
 
@@ -49,13 +49,13 @@ def folds(build: Build) -> None:
     whole = determinant(A)
     falls = tuple(-_along(whole, e, rise) for e, rise in pairs)
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
-    build.transitions.append(
-        Transition(
+    build.edges.append(
+        Edge(
             "snap",
             _bounded(tangent - FOLD),
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
-            settles=True,
-            sinks="snap",
+            equilibrates=True,
+            heat="snap",
             fold=Fold(tangent, falls, relative, warming),
         )
     )

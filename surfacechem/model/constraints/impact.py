@@ -26,7 +26,7 @@ import symengine
 from surfacechem.contracts.terms import Friction, Spec
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import RESTS, Transition
+from surfacechem.model.automaton import RESTS, Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
 from surfacechem.model.sliding.formulations import Kind
@@ -57,8 +57,8 @@ def impacts(build: Build) -> None:
     assert mount is not None
     shut, apart = {G: NONE}, {closed: (0,)}
     if not mount.inertial:
-        closes = Transition("touch", G, "the gap closes", build.motion.heals, shut, settles=True, when=apart)
-        build.transitions.append(closes)
+        closes = Edge("touch", G, "the gap closes", build.motion.heals, shut, equilibrates=True, when=apart)
+        build.edges.append(closes)
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
@@ -66,8 +66,8 @@ def impacts(build: Build) -> None:
     rests, modes = _rests(build, far, speed, pressing)
     rubs = rubbing(build, (1 + far.e) * far.m * speed)
     # What follows at the same moment comes before what would slide as long as the contact is open.
-    build.transitions[:0] = [
-        Transition(
+    build.edges[:0] = [
+        Edge(
             "impact",
             G,
             "the bodies hit each other",
@@ -76,13 +76,13 @@ def impacts(build: Build) -> None:
             returns=where(pressing > 0, 2 * V / pressing, NONE),
             when=apart,
         ),
-        *rubs.transitions,
-        Transition(
+        *rubs.edges,
+        Edge(
             "rest",
             -ONE,
             "the bodies rest on each other",
             {landed: NONE, **build.motion.heals},
-            settles=True,
+            equilibrates=True,
             when={landed: (1,)},
         ),
     ]
@@ -139,7 +139,7 @@ class Rubbing:
 
     begins: Mapping[Expression, Expression] = field(default_factory=dict)
     """Modes that an impact sets."""
-    transitions: Sequence[Transition] = ()
+    edges: Sequence[Edge] = ()
 
 
 def rubbing(build: Build, impulse: Expression) -> Rubbing:
@@ -183,11 +183,9 @@ def _exerted(build: Build) -> Any:
     return build.mode("impulse", 0.0, {0.0: "impulse of the pressure that friction has not answered yet [Pa s]"})
 
 
-def _rub(
-    exerted: Expression, modes: Mapping[Expression, Expression], jump: Mapping[Expression, Expression]
-) -> Transition:
+def _rub(exerted: Expression, modes: Mapping[Expression, Expression], jump: Mapping[Expression, Expression]) -> Edge:
     margin = where(exerted > 0, -1, 1)
-    return Transition("rub", margin, "friction answers the impact", {exerted: NONE, **modes}, jump, sinks="local")
+    return Edge("rub", margin, "friction answers the impact", {exerted: NONE, **modes}, jump, heat="local")
 
 
 def _ratio(build: Build, law: Friction, velocity: str) -> Expression:

@@ -10,7 +10,7 @@ import symengine
 from surfacechem.contracts.terms import Limit
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.constraints.breaking import bonds_left, broken, follows_bonds
@@ -54,7 +54,7 @@ def limits(build: Build) -> None:
     build.motion.heals = {closed: symengine.Integer(1), **again}
     gap = build.variables.get("g_n", "the rigid interface", "interface")
     if "g_n" not in build.motion.gap_rates:
-        build.transitions.append(Transition("touch", gap, "the gap closes", build.motion.heals, when={closed: (0,)}))
+        build.edges.append(Edge("touch", gap, "the gap closes", build.motion.heals, when={closed: (0,)}))
 
 
 def _opening(build: Build, margin: Expression, closed: Expression, when: Mapping[Expression, tuple[int]]) -> None:
@@ -62,9 +62,7 @@ def _opening(build: Build, margin: Expression, closed: Expression, when: Mapping
     modes = {closed: symengine.Integer(0)}
     # A pull that only touches zero does not part bodies that have inertia.
     to_pass = any(state.name == "v_n" for state in build.states)
-    build.transitions.append(
-        Transition("open", margin, "the interface opens", modes, settles=True, to_pass=to_pass, when=when)
-    )
+    build.edges.append(Edge("open", margin, "the interface opens", modes, equilibrates=True, strict=to_pass, when=when))
 
 
 def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
@@ -74,7 +72,7 @@ def _rebond(build: Build, again: dict[Expression, Expression]) -> None:
     (bonded,) = again
     gap = build.variables.get("g_n", "the limit", "interface")
     reason = "the gap closes, so that bonds can hold again"
-    build.transitions.append(Transition("rejoin", gap, reason, again, when={bonded: (0,)}))
+    build.edges.append(Edge("rejoin", gap, reason, again, when={bonded: (0,)}))
 
 
 def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
@@ -95,15 +93,15 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
         _opening(build, -t_n, closed, {bonded: (0,), closed: (1,)})
     breaks = broken(build, law, law.breaks)
     _refuse_idle(build, law, {*modes, *breaks})
-    build.transitions.append(
-        Transition(
+    build.edges.append(
+        Edge(
             "debond",
             strength - t_n,
             OPEN,
             dict.fromkeys(modes, none),
             breaks,
-            settles=True,
-            sinks=law.release,
+            equilibrates=True,
+            heat=law.release,
             violation=law.violation,
             when=when,
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import symengine
 
 from surfacechem.expressions import Expression, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.springs import stored
 
@@ -27,7 +27,7 @@ def load_steps(build: Build) -> None:
     known = {mode.symbol for mode in build.modes}
     modes = _closing(build) | {x: value for x, value in build.motion.jolted.items() if x in known}
     jump = {x: value for x, value in build.motion.jolted.items() if x not in known}
-    build.transitions.append(Transition("load", never, reason, modes, jump, settles=True, times=times))
+    build.edges.append(Edge("load", never, reason, modes, jump, equilibrates=True, times=times))
 
 
 def _histories(build: Build, name: str) -> set[Expression]:
@@ -36,7 +36,7 @@ def _histories(build: Build, name: str) -> set[Expression]:
 
 def _closing(build: Build) -> dict[Expression, Expression]:
     """A rigid interface that the loads press together closes as they jump."""
-    for item in build.transitions:
+    for item in build.edges:
         if item.name == "touch" and not item.measure:
-            return {mode: where(item.guard < 0, value, mode) for mode, value in item.modes.items()}
+            return {mode: where(item.masked < 0, value, mode) for mode, value in item.modes.items()}
     return {}

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import symengine
 
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 
 
 def relaxing(build: Build) -> None:
     """Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do."""
-    local = [j for j, item in enumerate(build.transitions) if item.name == "debond" and item.sinks == "local"]
+    local = [j for j, item in enumerate(build.edges) if item.name == "debond" and item.heat == "local"]
     if not (local and build.equilibria):
         return
     loose = build.mode("loose", 0.0, {0.0: "whether the gaps have yet to follow a local jump"})
     for j in local:
-        item = build.transitions[j]
+        item = build.edges[j]
         modes = {**item.modes, loose: symengine.Integer(1)}
-        build.transitions[j] = replace(item, modes=modes, settles=False)
+        build.edges[j] = replace(item, modes=modes, equilibrates=False)
     always, reason = -symengine.Integer(1), "the gap follows what gave way"
     done = {loose: symengine.Integer(0)}
-    build.transitions.insert(0, Transition("relax", always, reason, done, settles=True, when={loose: (1,)}))
+    build.edges.insert(0, Edge("relax", always, reason, done, equilibrates=True, when={loose: (1,)}))

@@ -9,7 +9,7 @@ import symengine
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import NOTHING, Build
 from surfacechem.model.components.mounting import far_field, held
 from surfacechem.model.system import Margin
@@ -24,7 +24,7 @@ RESOLVED, FINEST = 1 - 1e-9, 1e-9
 SAME = "Give `bond-stiffness` and this law the same E_b."
 
 
-def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Transition]:
+def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:
     """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
     mount = held(build, "n")
     if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
@@ -34,7 +34,7 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
     margin, falls = (k + slope) / (k + absolute(slope)), {mode: (1,)}
     lost, none = -symengine.Integer(1), symengine.Integer(0)
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    return [Transition("tear", margin, reason, {mode: lost}, {phi: none}, settles=True, sinks="snap", when=falls)]
+    return [Edge("tear", margin, reason, {mode: lost}, {phi: none}, equilibrates=True, heat="snap", when=falls)]
 
 
 def softening_mode(build: Build) -> None:
@@ -104,17 +104,17 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
         build.motion.follows[phi] = remains
     fewer = "a jump leaves fewer bonds than there were"
-    build.transitions += [
-        Transition("yield", beyond, fewer, jump={phi: remains}, settles=True, sinks="snap", when=keeps),
+    build.edges += [
+        Edge("yield", beyond, fewer, reset={phi: remains}, equilibrates=True, heat="snap", when=keeps),
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
-        Transition("soften", present, "bonds begin to break as the gap opens", breaks, to_pass=True, when=keeps),
+        Edge("soften", present, "bonds begin to break as the gap opens", breaks, strict=True, when=keeps),
         *_tear(build, mode, phi, left),
-        Transition("part", left, "the last bonds break", lost, {phi: none}, settles=True, sinks="snap", when=loses),
-        Transition("unload", overshoot, "bonds do not reach what the gap leaves", {mode: none}, when=loses),
+        Edge("part", left, "the last bonds break", lost, {phi: none}, equilibrates=True, heat="snap", when=loses),
+        Edge("unload", overshoot, "bonds do not reach what the gap leaves", {mode: none}, when=loses),
     ]
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
-        build.transitions.append(Transition("rejoin", margin, reason, {mode: none}, to_pass=True, when=parted))
+        build.edges.append(Edge("rejoin", margin, reason, {mode: none}, strict=True, when=parted))
     _start(build, phi, left)
     return build.variables.call(law, law.statement, {"overshoot": overshoot})
 
@@ -122,10 +122,10 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
 def apart_from_envelope(build: Build) -> None:
     """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
     mode = build.find_mode("debonding")
-    for j, item in enumerate(build.transitions):
-        if mode is not None and item.settles and mode not in item.modes:
+    for j, item in enumerate(build.edges):
+        if mode is not None and item.equilibrates and mode not in item.modes:
             modes = {**item.modes, mode: where(mode > 0, 0, mode)}
-            build.transitions[j] = replace(item, modes=modes)
+            build.edges[j] = replace(item, modes=modes)
 
 
 def _start(build: Build, phi: Expression, left: Expression) -> None:

@@ -14,7 +14,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Varying, reads
 from surfacechem.expressions import Expression, absolute, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.friction import pressed
 from surfacechem.model.system import Given, State
@@ -173,7 +173,7 @@ def between_creep_and_sliding(build: Build, law: Friction, driving: Expression) 
     sliding = {} if slip is None else {slip: (-1, 1)}
     drive = build.variables.call(law, reference.drive, {**_own(law), "v": v})
     pace = symengine.Symbol(PACE)
-    falls = Transition(
+    falls = Edge(
         "creep",
         where(left > room, left, room),
         "sliding dies away and the interface creeps",
@@ -183,15 +183,15 @@ def between_creep_and_sliding(build: Build, law: Friction, driving: Expression) 
     )
     reason = "creep does not bear what drives it and the interface slides"
     rises = {pace: v / (GRAIN * reference.velocity_unit())}
-    build.transitions += [
+    build.edges += [
         falls,
-        Transition(
+        Edge(
             "slide",
             _borne(build, law, fast) - pull,
             reason,
             {CREEPS: symengine.Integer(0)},
             rises,
-            to_pass=True,
+            strict=True,
             when={CREEPS: (1,), **sliding},
         ),
     ]

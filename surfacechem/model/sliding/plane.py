@@ -28,7 +28,7 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, norm, sqrt, where
-from surfacechem.model.automaton import Transition
+from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import LENGTH, far_field
 from surfacechem.model.constraints.breaking import broken
@@ -215,10 +215,10 @@ def _transitions(build: Build, sides: Sequence[Side], still: Expression) -> None
     jump = {**(broken(build, breaking) if breaking is not None else {}), TURNED: NONE}
     modes, reason = {SLIDES: symengine.Integer(1), **aimed}, "sticking gives way and the interface slides"
     sticks, slides = {SLIDES: (0,)}, {SLIDES: (1,)}
-    begins = Transition("slip", left, reason, modes, jump, rate_independent(kind), "local", to_pass=True, when=sticks)
+    begins = Edge("slip", left, reason, modes, jump, rate_independent(kind), "local", strict=True, when=sticks)
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = {SLIDES: where(left < 0, 1, 0)} | {b: where(left < 0, x, b) for b, x in aimed.items()}
     modes, rest = (onward, {SPEED: NONE}) if kind.inertial else ({SLIDES: NONE}, {})
     reason = "sliding comes to a stop"
-    ends = Transition("stop", still, reason, modes, {TURNED: NONE, **rest}, sinks="local", to_pass=True, when=slides)
-    build.transitions += [begins, ends]
+    ends = Edge("stop", still, reason, modes, {TURNED: NONE, **rest}, heat="local", strict=True, when=slides)
+    build.edges += [begins, ends]

@@ -13,7 +13,7 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import Equilibrium, Transition
+from surfacechem.model.automaton import Edge, Equilibrium
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
 from surfacechem.model.constraints.breaking import broken
@@ -343,16 +343,16 @@ def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression
     settles = bool(jump) or (balanced and not kind.rate_dependent)  # other gaps follow the bonds and their heat
     for s, word in ((1, "forward"), (-1, "backward")):
         reason = f"sticking gives way and the interface slides {word}"
-        build.transitions.append(
-            Transition(
+        build.edges.append(
+            Edge(
                 f"slip {word}",
                 bears - s * needed,
                 reason,
                 {slip: symengine.Integer(s)},
                 jump,
-                settles=settles,
-                sinks="local",
-                to_pass=True,
+                equilibrates=settles,
+                heat="local",
+                strict=True,
                 when={slip: (0,)},
             )
         )
@@ -362,4 +362,4 @@ def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression
     stop = {} if balanced else {symengine.Symbol(PACE) if paced else velocity: NONE}
     onto = {CREEPS: symengine.Integer(1)} if paced else {}
     reason, moving = "sliding comes to a stop", {slip: (-1, 1)}
-    build.transitions.append(Transition("stop", still, reason, {slip: onward, **onto}, stop, to_pass=True, when=moving))
+    build.edges.append(Edge("stop", still, reason, {slip: onward, **onto}, stop, strict=True, when=moving))

@@ -29,7 +29,7 @@ SPACING, TIMES = 10, 15
 
 @lru_cache(maxsize=256)
 def _kinds(margins: tuple[Margin, ...]) -> NDArray[np.int64]:
-    rows = [(margin.terminal, margin.direction, margin.smooth, margin.to_pass) for margin in margins]
+    rows = [(margin.terminal, margin.direction, margin.smooth, margin.strict) for margin in margins]
     return np.array(rows, np.int64).reshape(-1, 4)
 
 
