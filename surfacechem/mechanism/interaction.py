@@ -17,6 +17,7 @@ Source: Cantera's CoverageDependentSurfPhase; Maxwell's relation of a potential 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -241,7 +242,11 @@ class _Reader:
         value, unit = self.node[key], "J/kmol" if key.startswith("enthalp") else "J/kmol/K"
         declared: Any = {**self.source.defaults(self.entry), **(self.node.get("units") or {})}
         units = cantera.UnitSystem(declared)
-        return [float(units.convert_to(x, unit)) / KILO for x in (value if isinstance(value, list) else [value])]
+        found = [float(units.convert_to(x, unit)) / KILO for x in (value if isinstance(value, list) else [value])]
+        if not all(map(math.isfinite, found)):
+            message = f"species {self.entry['name']}: {KEY}: {key} must be finite, got {value}."
+            raise InputError(message, self.source.place(self.node, key))
+        return found
 
     def number(self, key: str) -> float:
         """One value."""

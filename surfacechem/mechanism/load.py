@@ -145,7 +145,7 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
             warnings.simplefilter("always")
             surface = cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
-        raise _translated(str(error), source) from None
+        raise _translated(str(error), source, phase) from None
     said = dict.fromkeys(" ".join(str(item.message).split()) for item in caught)
     return surface, tuple(f"{source.file}: Cantera: {text}" for text in said)
 
@@ -171,15 +171,15 @@ def _is_native(kind: str) -> bool:
     return law is None or law.native
 
 
-def _translated(text: str, source: Source) -> InputError:
-    """Cantera's message without its frame, at the line it names."""
+def _translated(text: str, source: Source, phase: Any) -> InputError:
+    """Cantera's message without its frame, at the line that it names, else at that of the phase."""
     found = re.search(r"[Ee]rror on lines? (\d+)", text)
     noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
     lines = [line.strip() for line in text.splitlines()]
     message = (
         " ".join(line for line in dict.fromkeys(lines) if not noise.search(line)) or "the mechanism cannot be read"
     )
-    return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else 0))
+    return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else source.place(phase).line))
 
 
 def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Species, ...]:
@@ -187,13 +187,16 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
     names = identifiers(surface.species_names)
     result = []
     for item in surface.species():
-        gibbs = lower(item.thermo)
+        entry = entries[item.name]
+        try:
+            gibbs = lower(item.thermo)
+        except InputError as error:  # a number that Cantera's units take out of range
+            raise InputError(f"species {item.name}: thermo: {error.message}", source.place(entry, "thermo")) from None
         if gibbs is None:
             message = f"species {item.name}: thermo of type {type(item.thermo).__name__} is not lowered."
-            raise InputError(message, source.place(entries.get(item.name)))
+            raise InputError(message, source.place(entry))
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
-        entry = entries[item.name]
         own = interactions(source, entry, names)
         elastic = spring(source, entry)
         result.append(Species(item.name, names[item.name], float(item.size), gibbs, elastic, own, fixed))

@@ -37,7 +37,7 @@ DIMENSIONS = {"m": ("length",), "N/m": ("length",), "J": ENERGY, "J/mol": ENERGY
 
 EXAMPLES = {"m": "0.4 nm", "N/m": "1 pN/nm", "J": "10 kJ/mol", "J/mol": "50 kJ/mol"}
 
-NUMBER = r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)"
+NUMBER = r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 
 
 def leading(value: Any) -> float:

@@ -165,6 +165,7 @@ REFUSED = {
         "{model: polynomial, enthalpy-coefficients: [1 kJ/mol]}",
         "are 4 numbers",
     ),
+    "an energy that overflows": ("enthalpy-low: 10 kJ", "enthalpy-low: 1e305 kJ", "enthalpy-low must be finite"),
     "not an energy": ("enthalpy-low: 10 kJ/mol", "enthalpy-low: 10 m", "Incompatible units"),
 }
 
