@@ -56,7 +56,8 @@ def kernel_folder(sources: Sequence[Path]) -> Path:
     digest = hashlib.sha256()
     for text in (version("numba"), version("llvmlite"), sys.version, platform.machine(), _processor()):
         digest.update(text.encode())
-    for source in (Path(__file__), *sources):  # this file, for the form in which code is kept
+    # This file and the one beside it decide in which form code is kept.
+    for source in (Path(__file__), Path(__file__).with_name("objectcode.py"), *sources):
         digest.update(source.read_bytes())
     return cache_root() / f"kernel-{digest.hexdigest()[:16]}"
 

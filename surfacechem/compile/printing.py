@@ -20,6 +20,7 @@ import symengine
 import sympy  # type: ignore[import-untyped]
 from sympy.core.parameters import distribute  # type: ignore[import-untyped]
 from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
+from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
 from surfacechem.expressions import Expression
@@ -66,11 +67,24 @@ def _sympy(expression: Expression) -> Any:
         return symengine.sympify(expression)._sympy_()
 
 
-class _Python(PythonCodePrinter):  # type: ignore[misc]
+class _Printer(Printer):  # type: ignore[misc]
+    """A printer of SymPy's that prints piecewise terms of conditions by themselves, where their symbols stand."""
+
+    _terms: Mapping[str, Any] = {}
+
+    def text(self, expression: Expression) -> str:
+        around = self._terms
+        whole, self._terms = _apart(expression)
+        try:
+            return str(self.doprint(_sympy(whole)))
+        finally:
+            self._terms = around
+
+
+class _Python(_Printer, PythonCodePrinter):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True})
         self.reserved_words: set[str] = {*PythonCodePrinter.reserved_words, "math", "ydot", "parameters"}
-        self._terms: dict[str, Any] = {}
 
     def _print_Float(self, expression: Any) -> str:
         return repr(float(expression))
@@ -78,13 +92,6 @@ class _Python(PythonCodePrinter):  # type: ignore[misc]
     def _print_Symbol(self, expression: Any) -> str:
         term = self._terms.get(str(expression))
         return str(super()._print_Symbol(expression)) if term is None else self.text(term)
-
-    def text(self, expression: Expression) -> str:
-        known = self._terms
-        expression, self._terms = _apart(expression)
-        text = str(self.doprint(_sympy(expression)))
-        self._terms = known
-        return text
 
     def name(self, name: str) -> str:
         return str(self.doprint(sympy.Symbol(name)))
@@ -94,7 +101,9 @@ def python(system: System, title: str = "") -> str:
     """The equations as the source of a Python module."""
     printer = _Python()
     functions = [_function(system, printer, name, text, rows) for name, (text, rows) in _functions(system).items()]
-    return "\n\n".join([_head(system, title), _parameters(system), *_pieces(system), *functions])
+    lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
+    parameters = "\n".join(["PARAMETERS = (", *lines, ")\n"])
+    return "\n\n".join([_head(system, title), parameters, *_pieces(system), *functions])
 
 
 def executable(system: System) -> ModuleType:
@@ -135,11 +144,6 @@ def _head(system: System, title: str) -> str:
     heading = f"{title}: {system.regime}" if title else system.regime
     text = f"{_safe(heading)}.\n\nt is time [s]. y holds\n\n{states}\n\nand ydot their time derivatives."
     return f'"""{text}\n"""\n\nimport math\n'
-
-
-def _parameters(system: System) -> str:
-    lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
-    return "\n".join(["PARAMETERS = (", *lines, ")\n"])
 
 
 def pieces(system: System) -> list[tuple[float, tuple[float, ...]]]:
@@ -207,7 +211,8 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     for row in rows:
         if str(row.expression) != row.name:
             lines += _assignment(printer, row.name, row.expression, row.text)
-    return "\n".join([*lines, *_returned([printer.name(row.name) for row in rows]), ""])
+    returned = ", ".join(printer.name(row.name) for row in rows)
+    return "\n".join([*lines, *_broken("    return [", returned, "]"), ""])
 
 
 def needed(named: Sequence[Named], expressions: Iterable[Expression]) -> list[Named]:
@@ -239,10 +244,6 @@ def _unpacked(names: Sequence[str], source: str) -> list[str]:
     return (
         _broken("    (", left, f") = {source}") if len(left) > WIDTH or len(names) == 1 else [f"    {left} = {source}"]
     )
-
-
-def _returned(names: Sequence[str]) -> list[str]:
-    return _broken("    return [", ", ".join(names), "]")
 
 
 def _assignment(printer: _Python, name: str, expression: Expression, text: str) -> list[str]:
@@ -280,9 +281,7 @@ GREEK = {
 SPACE = r"\,"
 
 
-class _Latex(LatexPrinter):  # type: ignore[misc]
-    _terms: Mapping[str, Any] = {}
-
+class _Latex(_Printer, LatexPrinter):  # type: ignore[misc]
     def _print_Float(self, expression: Any) -> str:
         mantissa, _, power = f"{float(expression)!r}".partition("e")
         number = mantissa.removesuffix(".0")
@@ -293,13 +292,6 @@ class _Latex(LatexPrinter):  # type: ignore[misc]
     def _print_Symbol(self, expression: Any, style: str = "plain") -> str:
         term = self._terms.get(str(expression))
         return symbol(str(expression)) if term is None else rf"\left({self.text(term)}\right)"
-
-    def text(self, expression: Expression) -> str:
-        known = self._terms
-        expression, self._terms = _apart(expression)
-        text = str(self.doprint(_sympy(expression)))
-        self._terms = known
-        return text
 
 
 def symbol(name: str) -> str:

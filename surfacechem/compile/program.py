@@ -200,7 +200,9 @@ def compile_program(
 
     States and equations that form chains stand behind the others, chain after chain.
     """
-    _check_counts(states, derivatives, residual)
+    if not len(states) == len(derivatives) == len(residual):
+        counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
+        raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
     own = [(g, symengine.sympify(g).free_symbols) for g in residual[:core]]
@@ -217,6 +219,8 @@ def compile_program(
         for i, j in part
     ]
     pieces = PIECE if chains else None
+    read = {symbol for margin in margins for symbol in symengine.sympify(margin).free_symbols}
+    outside = {inputs[j] for j in filler.positions} if filler else set()
     return Program(
         n=n,
         n_parameters=len(parameters),
@@ -230,23 +234,8 @@ def compile_program(
         filler=filler,
         chains=tuple(chains),
         groups=tuple(groups),
-        plain_margins=not _symbols(margins) & {*derivatives, *_outside(parameters, filler, 1 + 2 * n)},
+        plain_margins=not read & {*derivatives, *outside},
     )
-
-
-def _check_counts(states: Sequence[Any], derivatives: Sequence[Any], residual: Sequence[Any]) -> None:
-    if not len(states) == len(derivatives) == len(residual):
-        counts = f"{len(states)} states, {len(derivatives)} derivatives and {len(residual)} equations"
-        raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
-
-
-def _outside(parameters: Sequence[Any], filler: Filler | None, first: int) -> set[Any]:
-    """The parameters that come from outside; the first of all is the input at position ``first``."""
-    return {parameters[j - first] for j in filler.positions} if filler else set()
-
-
-def _symbols(expressions: Sequence[Any]) -> set[Any]:
-    return {symbol for expression in expressions for symbol in symengine.sympify(expression).free_symbols}
 
 
 def _linked(core: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:

@@ -1,0 +1,55 @@
+"""When two numbers are the same: the thresholds that every room shares, each with its derivation.
+
+What decides whether a number is zero is one of these times the size of what it is made of, a tolerance of the run
+(rtol, atol), or what the clock resolves. Nothing else is imported here, so that compiled code may freeze the values.
+
+Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, 2nd ed., chapters 1 to 3.
+"""
+
+from sys import float_info
+
+EPS = float_info.epsilon
+"""Spacing of the doubles at 1, 2^-52 = 2.2e-16. One operation errs by at most half of it, time resolves no less."""
+
+ULPS = 2 * EPS
+"""Error of one term of a formula, 4.4e-16: library functions are right to one unit in the last place, not to half."""
+
+DIGITS = 4 * EPS
+"""Numbers that are equal but for the order of a few operations, 8.9e-16: eight of them, at half an EPS each. Also the
+closest bracket that Brent's method accepts.
+"""
+
+NOISE = 16 * EPS
+"""Rounding of a formula, 3.6e-15, relative to its largest term: some thirty operations in sequence, all of them in the
+same direction.
+"""
+
+SOLVED = 64 * EPS
+"""Residual that Newton's method cannot improve, 1.4e-14: NOISE of both sides of an equation, and as much again from the
+last correction.
+"""
+
+ROUNDING = 4096 * EPS
+"""Rounding of what is summed along a run, 9.1e-13: errors add like the root of their number (section 2.8), and a run
+has at most some 1e7 of them.
+"""
+
+SQRT_EPS = EPS**0.5
+"""Step of a one-sided difference, 1.5e-8, where truncation and rounding are equal; also how closely the place of a
+smooth minimum is known, since its value changes with the square of the distance.
+"""
+
+CBRT_EPS = EPS ** (1 / 3)
+"""Step of a central difference, 6.1e-6: its truncation is of second order."""
+
+QUARTER_EPS = EPS**0.25
+"""Step of a second difference, 1.2e-4, which divides the rounding by the square of the step."""
+
+NEGLIGIBLE = 1e-3
+"""Part of a whole that changes no decision: step sizes and iterations are known to a few per cent at best."""
+
+TINY = float_info.min / EPS
+"""Least size of a divisor, 1e-292: what is smaller by a factor EPS is still a normal number."""
+
+PICOMETRE = 1e-12
+"""Length [m] without a meaning for bodies: a hundredth of an atom."""
