@@ -32,7 +32,7 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
         ("row", system.rows.items()),
         ("output", ((item.name, item.expression) for item in system.outputs)),
         ("account", ((account.quantity.name, account.rate) for account in system.ledger)),
-        ("margin", ((margin.name, margin.expression) for margin in system.margins)),
+        ("margin", ((margin.name, margin.masked) for margin in system.margins)),
         ("residual", ((e.state, e.residual) for e in system.equilibria)),
         ("size", ((e.state, e.size) for e in system.equilibria)),
         ("transition", ((edge.name, edge.masked) for edge in system.edges)),

@@ -90,7 +90,7 @@ def equations(name: str) -> dict[str, float]:
     parts = {f"row {row}": expression for row, expression in system.rows.items()}
     parts |= {f"output {item.name}": item.expression for item in system.outputs}
     parts |= {f"account {account.quantity.name}": account.rate for account in system.ledger}
-    parts |= {f"limit {margin.name}": margin.expression for margin in system.margins}
+    parts |= {f"limit {margin.name}": margin.masked for margin in system.margins}
     return {part: float(laws.number(system.expand(value), point)) for part, value in parts.items()}
 
 

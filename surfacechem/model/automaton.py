@@ -26,6 +26,17 @@ RESTS = "run.rebounds_rest_at"
 """Path of the time at which rebounds rest that follow each other faster than time can tell."""
 
 
+When = Mapping[Any, Collection[int]]
+"""Values of modes, by their symbols, in which something is in play; in any value of the others."""
+
+
+def masked(guard: Expression, when: When) -> Expression:
+    """A guard where it is in play, else 1."""
+    for mode, values in when.items():
+        guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
+    return guard
+
+
 @dataclass(frozen=True)
 class Mode:
     """A discrete variable, such as sticking or sliding; it changes along edges only."""
@@ -90,16 +101,13 @@ class Edge:
     """Time in which it may happen again [s], zero where that is open: its guard begins anew at an exact zero."""
     violation: str = "warn"
     """What to do where the jump would destroy entropy: refuse, warn or accept."""
-    when: Mapping[Any, Collection[int]] = field(default_factory=dict)
-    """Values of modes, by their symbols, in which it is in play; in any value of the others."""
+    when: When = field(default_factory=dict)
+    """Modes in which it is in play."""
 
     @property
     def masked(self) -> Expression:
-        """The guard while it is in play, else 1."""
-        guard = self.guard
-        for mode, values in self.when.items():
-            guard = where(symengine.Mul(*((mode - value) ** 2 for value in values)) > 0, 1, guard)
-        return guard
+        """The guard while it is in play, else 1, as one expression to be read or printed."""
+        return masked(self.guard, self.when)
 
 
 @dataclass(frozen=True)

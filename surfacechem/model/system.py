@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pickle import PicklingError
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
-from surfacechem.model.automaton import Edge, Equilibrium, Mode, Sink
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Sink, When, masked
 from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.holding import Holding
 from surfacechem.model.refit import Fit
@@ -155,6 +155,13 @@ class Margin:
     """An expression, and the reason where it is below zero as the margin closes."""
     bound: tuple[str, float] | None = None
     """The state whose bound it is, and the bound."""
+    when: When = field(default_factory=dict)
+    """Modes in which it is in play."""
+
+    @property
+    def masked(self) -> Expression:
+        """The expression while it is in play, else 1, as one expression to be read or printed."""
+        return masked(self.expression, self.when)
 
 
 @dataclass(frozen=True)
@@ -360,7 +367,17 @@ class System:
         """The margins that change in the course of a run; when time alone leads to a peak is known before."""
         evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {mode.symbol for mode in self.modes}
         moving = {True: evolved, False: evolved | {self.t}}
-        return tuple(m for m in self.margins if self.expand(m.expression).free_symbols & moving[m.peak])
+        return tuple(m for m in self.margins if self.expand(m.masked).free_symbols & moving[m.peak])
+
+    @cached_property
+    def _when(self) -> list[list[tuple[int, Collection[int]]]]:
+        columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
+        items: tuple[Margin | Edge, ...] = (*self.moving_margins(), *self.edges)
+        return [[(columns[mode], values) for mode, values in item.when.items()] for item in items]
+
+    def in_play(self, parameters: Array) -> tuple[bool, ...]:
+        """Which guards are in play in the modes among the parameters: the moving margins, then the edges."""
+        return tuple(all(parameters[j] in values for j, values in when) for when in self._when)
 
     @property
     def in_stretches(self) -> bool:

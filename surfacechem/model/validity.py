@@ -24,7 +24,7 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
     point[system.t] = symengine.Integer(0)
     for margin in system.margins:
         if margin.terminal:
-            _check(margin, _at(system.expand(margin.expression), point))
+            _check(margin, _at(system.expand(margin.masked), point))
 
 
 def _at(expression: Expression, point: Mapping[Any, Any]) -> Expression:

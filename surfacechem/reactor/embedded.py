@@ -120,6 +120,8 @@ class EmbeddedScene:
             raise EndError("no state satisfies the equations")
         closed = self._terminal & ~(evaluation.margins()[: len(self._terminal)] >= 0)
         if closed.any():
+            closed &= self.model.system.in_play(evaluation.parameters)[: len(closed)]
+        if closed.any():
             raise EndError(self.model.margins[int(closed.argmax())].reason)
         return evaluation.rates()
 

@@ -60,8 +60,9 @@ class Moments(Hybrid):
     def margins(self) -> Array:
         """Margins of the transitions at the state last put."""
         now = self.evaluation.margins().copy()
-        self._see(now)
-        return now[self.first :]
+        playing = np.array(self.system.in_play(self.evaluation.parameters))
+        self._see(now, playing)
+        return np.where(playing, now, np.inf)[self.first :]
 
     def soonest(self) -> float:
         """Time [s] in which a margin of the state last put would close at its present rate."""

@@ -217,10 +217,10 @@ def lumping_warnings(model: Model, values: Mapping[str, float], end: float) -> l
 def _audited(system: System) -> list[object]:
     return (
         [a.rate for a in system.ledger]
-        + [m.expression for m in system.margins]
+        + [m.masked for m in system.margins]
         + [i.expression for i in system.outputs]
         + [c.resistance for c in system.conductors]
-        + [x for item in system.edges for x in (item.guard, *item.modes.values(), *item.reset.values())]
+        + [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
     )
 
 

@@ -76,7 +76,8 @@ class Rebounds:
     def missed(self, result: Result) -> bool:
         """Whether a stretch has ended beyond what it should have ended at."""
         ended = result.events.index if result.status is Status.EVENT else ()
-        found = self.margins if len(result.margins) else []
+        playing = result.problem.in_play
+        found = [j for j in self.margins if playing is None or playing[j]] if len(result.margins) else []
         return any(result.margins[j] < -UNSEEN and j not in ended for j in found)
 
     def _aloft(self, start: float) -> float:

@@ -111,6 +111,8 @@ class Problem:
     """How large each margin was at most before, where the problem continues another."""
     spacing: float = np.inf
     """Longest time [s] of a step that is left without a look at the equations: what is briefer may be passed over."""
+    in_play: tuple[bool, ...] | None = None
+    """Which margins are in play in the modes that hold throughout; None where all are. The others may be anything."""
     goes_on: bool = False
     """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
 
@@ -226,8 +228,11 @@ class Result:
         if self.status is Status.EVENT:
             margins = self.problem.margins
             return f"{text}: margin {next(int(i) for i in reversed(self.events.index) if margins[i].terminal)}"
-        if not self.success and len(self.margins) and np.all(np.isfinite(self.margins)):
-            nearest = int(np.argmin(np.abs(self.margins)))
+        left = np.abs(self.margins)
+        if self.problem.in_play is not None:
+            left = np.where(self.problem.in_play, left, np.inf)
+        if not self.success and np.isfinite(left).any():
+            nearest = int(np.argmin(left))
             return f"{text}; nearest margin: {nearest} = {self.margins[nearest]:.3g}"
         return text
 

@@ -67,7 +67,7 @@ def cause(
     where = f"t = {result.t:.9g} s"
     parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
     inputs = np.concatenate(([result.t], result.y, result.ydot, parameters))
-    shrunk = closest_margin(program, margins, result)
+    shrunk = closest_margin(system, program, margins, result)
     if shrunk is not None:
         return "stopped", f"{system.reason(shrunk, inputs)} near {where}"
     algebraic = [state for state in system.states if state.algebraic]
@@ -101,33 +101,37 @@ def is_led_back(system: System, program: Program, margin: Margin, result: Result
     return bool(found.valid and (found.ydot[j] >= 0 if limit == 0 else found.ydot[j] <= 0))
 
 
-def closest_margin(program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
+def closest_margin(system: System, program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:
     """The margin that is closed, or all but closed and goes on closing, where a run could not go on."""
     if program.margins is None or not margins:
         return None
     count, end = len(margins), Points(np.array([result.t]), result.y[None], result.ydot[None], result.ledger[None])
     terminal = np.array([margin.terminal for margin in margins])
-    last = _values(program, result, end, side="right")[0, :count]
+    last = _values(system, program, result, end, side="right")[0, :count]
     if np.any(closed := terminal & (last <= 0)):
         return margins[int(np.argmax(closed))]
     if result.steps is None or len(result.steps.t) < 2:
         return None
-    seen, t = _values(program, result, result.steps)[:, :count], result.steps.t
+    seen, t = _values(system, program, result, result.steps)[:, :count], result.steps.t
     before = max(int(np.searchsorted(t, t[-1] * (1 - RESOLVED))) - 1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        shrink = seen[-1] / np.max(np.abs(seen), axis=0)
+        shrink = seen[-1] / np.fmax.reduce(np.abs(seen), axis=0)
         left = seen[-1] / (seen[before] - seen[-1]) * (t[-1] - t[before])
     closing = terminal & (seen[-1] < seen[before]) & ((left < STALLED * t[-1]) | (shrink < GONE))
     nearest = int(np.argmin(np.where(closing, shrink, np.inf)))
     return margins[nearest] if closing[nearest] and shrink[nearest] < STALLED else None
 
 
-def _values(program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left") -> Array:
-    """Margins at all steps, shape (steps, margins); at a breakpoint those of the piece on one side of it."""
+def _values(
+    system: System, program: Program, result: Result, steps: Points, side: Literal["left", "right"] = "left"
+) -> Array:
+    """Margins at all steps, shape (steps, margins), NaN out of play; at a breakpoint those of the piece on one side."""
     assert program.margins is not None
     segment = np.searchsorted(result.problem.segments[1:-1], steps.t, side=side)
     inputs = [steps.t[:, None], steps.y, steps.ydot, result.problem.parameters[segment]]
-    return np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
+    values = np.atleast_2d(program.margins(program.filled(np.concatenate(inputs, axis=1))))
+    playing = np.array([system.in_play(row) for row in result.problem.parameters])[segment]
+    return np.where(playing, values, np.nan)
 
 
 def runaway(states: Sequence[State], result: Result) -> str | None:

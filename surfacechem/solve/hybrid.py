@@ -29,9 +29,6 @@ Array = NDArray[np.float64]
 NOISE = 1e-13
 """Margins below this part of the largest seen count as zero."""
 
-IDLE = 1.0
-"""Value of a margin in modes in which it plays no part."""
-
 REACHED = 1e-14
 """Part of the time of a run within which a stretch has reached its end."""
 
@@ -181,6 +178,7 @@ class Hybrid:
             exchanged=self.exchanged,
             goes_on=end < problem.segments[-1],
             seen=self.rebounds.seen(start.t, sizes(problem, self.system, start, self.largest)),
+            in_play=self.system.in_play(local),
         )
         return self._keep(solve(self.method, part, self.system.sliding), start, times, end)
 
@@ -197,7 +195,7 @@ class Hybrid:
         self.steps += result.counters.steps
         self.written += len(result.times)
         if len(result.margins):
-            self._see(result.margins)
+            self._see(result.margins, self._in_play(start))
         return part
 
     def _transition(self, part: Part, point: Point) -> int | None:
@@ -222,9 +220,10 @@ class Hybrid:
         if self.problem.program.margins is None:
             return point
         while not self._chatters(point.t) or self._calmed(point):
-            now = self._margins(point)
-            due = self._due(now[self.first :], point)
-            if self._ended(now, due is not None):
+            now, playing = self._margins(point), self._in_play(point)
+            self._see(now, playing)
+            due = self._due(now[self.first :], playing[self.first :], point)
+            if self._ended(now, playing, due is not None):
                 return None
             if due is None:
                 self.limits = []
@@ -272,13 +271,14 @@ class Hybrid:
             point = self._consistent(point)
         margins = self.problem.program.margins
         assert margins is not None
-        now = margins(point.inputs())
-        self._see(now)
-        return now
+        return margins(point.inputs())
 
-    def _see(self, margins: Array) -> None:
-        """Keep the largest margins seen; a margin that is out of play in the present modes is one."""
-        self.largest = np.maximum(self.largest, np.where(margins == IDLE, 0.0, np.abs(margins)))
+    def _in_play(self, point: Point) -> NDArray[np.bool_]:
+        return np.array(self.system.in_play(point.parameters), dtype=bool)
+
+    def _see(self, margins: Array, playing: NDArray[np.bool_]) -> None:
+        """Keep the largest margins seen while in play."""
+        self.largest = np.maximum(self.largest, np.where(playing, np.abs(margins), 0.0))
         for alike in self._alike:
             self.largest[alike] = self.largest[alike].max()
 
@@ -294,25 +294,25 @@ class Hybrid:
         found = {state.symbol for state in self.system.states if state.algebraic}
         return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
 
-    def _ended(self, now: Array, due: bool) -> bool:
+    def _ended(self, now: Array, playing: NDArray[np.bool_], due: bool) -> bool:
         """Whether a jump has carried the state to where a law ends; not what modes say that are left at this moment."""
         kinds, margins = self.problem.margins[: self.first], self.system.moving_margins()
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
         least = [0.0 if margin.domain else -NOISE * size for margin, size in zip(margins, self.largest, strict=False)]
-        closed = [i for i, kind in enumerate(kinds) if kind.terminal and now[i] < least[i]]
-        closed += [i for i in self.limits if now[i] <= NOISE * self.largest[i]]
+        closed = [i for i, kind in enumerate(kinds) if kind.terminal and playing[i] and now[i] < least[i]]
+        closed += [i for i in self.limits if playing[i] and now[i] <= NOISE * self.largest[i]]
         closed = [i for i in closed if not (due and self._of_modes[i])]
         if closed and self.jumps:
             reason = self.system.reason(margins[closed[0]], self.jumps[-1].after.inputs())
             self.status, self.reason = Status.EVENT, reason
         return bool(closed and self.jumps)
 
-    def _due(self, now: Array, point: Point) -> int | None:
+    def _due(self, now: Array, playing: NDArray[np.bool_], point: Point) -> int | None:
         """The transition whose margin is closed, or is zero and closing; the drift of the integration is not closed."""
         small = NOISE * sizes(self.problem, self.system, point, self.largest)[self.first :]
         drift = np.maximum(DRIFT * self.problem.rtol * self.largest[self.first :], small)
-        closed = now < -drift
-        near = ~closed & (now <= small) & ~to_pass(self.problem)[self.first :]
+        closed = playing & (now < -drift)
+        near = playing & ~closed & (now <= small) & ~to_pass(self.problem)[self.first :]
         if near.any():
             near &= self.jumper.margin_rates(self._consistent(point)) < 0
             closed |= np.array([one and not self._leads_back(j, point) for j, one in enumerate(near)])

@@ -117,7 +117,7 @@ class Jumper:
 
     @cached_property
     def _moving_margins(self) -> list[Expression]:
-        return [self.system.expand(item.masked) for item in self.system.edges]
+        return [self.system.expand(edge.guard) for edge in self.system.edges]
 
     @cached_property
     def margins_read_rates(self) -> bool:

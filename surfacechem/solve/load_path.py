@@ -166,7 +166,7 @@ class LoadPath:
 
     @cached_property
     def _margins(self) -> Function:
-        return compile_function(self.system.inputs, [self.system.expand(item.masked) for item in self.system.edges])
+        return compile_function(self.system.inputs, [self.system.expand(item.guard) for item in self.system.edges])
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:
         """Go along the way of the loads to where a transition takes place that follows from them."""

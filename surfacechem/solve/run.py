@@ -197,7 +197,7 @@ class Model:
             inputs[2 * n + 1 :],
             system.local(list(system.rows.values())),
             system.local([account.rate for account in system.ledger]),
-            system.local([m.expression for m in self.margins] + [m.masked for m in system.edges]),
+            system.local([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
             filler=self._filler(inputs),
             chains=[Chain(*chain) for chain in system.chains],
             groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
@@ -269,6 +269,7 @@ class Model:
             max_seconds=run.max_seconds,
             record_steps=True,
             spacing=end / run.samples,
+            in_play=system.in_play(parameters[0]),
         )
 
     def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:

@@ -25,7 +25,8 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     guessed = np.array([state.algebraic and state.quantity.unit == "K" for state in system.states])
     if not guessed.any():
         return y
-    checks = [i for i, margin in enumerate(system.moving_margins()) if margin.name.startswith(STABLE)]
+    playing = system.in_play(parameters)
+    checks = [i for i, m in enumerate(system.moving_margins()) if m.name.startswith(STABLE) and playing[i]]
     chosen = _stable(program, checks, y, parameters, guessed) if checks else y
     found = consistent(program, 0.0, chosen, np.zeros_like(y), parameters)
     if found.valid and np.any(found.y[guessed] <= 0):

@@ -13,7 +13,7 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import Edge, Equilibrium
+from surfacechem.model.automaton import Edge, Equilibrium, When
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
 from surfacechem.model.constraints.breaking import broken
@@ -279,8 +279,14 @@ def _carried(build: Build, slides: Expression, stiffness: Expression) -> None:
     """Sliding needs something that carries its friction."""
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
         reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
-        margin = where(slides > 0, where(stiffness > 0, stiffness, -1), 1)
-        build.margins.append(Margin("tangential stiffness", margin, reason))
+        margin = where(stiffness > 0, stiffness, -1)
+        build.margins.append(Margin("tangential stiffness", margin, reason, when=_while_sliding(build, slides)))
+
+
+def _while_sliding(build: Build, slides: Expression) -> When:
+    """Modes in which the interface slides; any, where it cannot stick."""
+    slip = build.find_mode("slip")
+    return {slip: (-1, 1)} if slip is not None and depends(slides, slip) else {}
 
 
 def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expression) -> None:
@@ -305,7 +311,7 @@ def _sliding_row(build: Build, kind: Kind, slides: Expression, driving: Expressi
             "mass or a damper.",
             PLACE,
         )
-    build.margins.append(Margin(f"{STABLE}{v}", where(slides > 0, slope, 1), UNSTABLE))
+    build.margins.append(Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(build, slides)))
 
 
 def _is_damped(kind: Kind) -> bool:

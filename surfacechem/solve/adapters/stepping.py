@@ -272,7 +272,9 @@ class SteppingSolver(Solver):
         return view.margins(t, y, ydot)
 
     def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
-        directions = np.array([margin.direction for margin in view.problem.margins])
+        directions = np.array([float(margin.direction) for margin in view.problem.margins])
+        if view.problem.in_play is not None:  # no direction counts for what is not in play
+            directions[~np.array(view.problem.in_play)] = np.nan
         zeros = crossings(lambda t: self._margins(view, method, t), progress.sides, directions, progress.t, reached)
         if zeros:
             first = min(zeros.values())

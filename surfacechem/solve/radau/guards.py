@@ -44,9 +44,9 @@ from surfacechem.solve.radau.work import (
     set_inputs,
 )
 
-LEAVING, AT_ZERO, BEYOND, RISING, FALLING = 0.0, 2.0, -2.0, 3.0, -3.0
+LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
 """Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it; of
-one that leaves zero in this step.
+one that leaves zero in this step; and of one that is not in play in the modes of the run, on which side it stays.
 """
 
 SHALLOW = 1e-10
@@ -79,6 +79,9 @@ def start_margins(w: Any, kinds: Any) -> None:
     copy(w.margin[M_NOW], w.margin[M_BEFORE])
     for m in range(w.margin.shape[1]):
         value = w.margin[M_NOW, m]
+        if kinds[m, 4] == 0:
+            w.margin[M_SIDE, m] = OUT_OF_PLAY
+            continue
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
         if w.fired[m] != 0:
             w.margin[M_SIDE, m] = LEAVING

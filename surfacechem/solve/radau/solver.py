@@ -28,9 +28,10 @@ SPACING, TIMES = 10, 15
 
 
 @lru_cache(maxsize=256)
-def _kinds(margins: tuple[Margin, ...]) -> NDArray[np.int64]:
-    rows = [(margin.terminal, margin.direction, margin.smooth, margin.strict) for margin in margins]
-    return np.array(rows, np.int64).reshape(-1, 4)
+def _kinds(margins: tuple[Margin, ...], in_play: tuple[bool, ...] | None = None) -> NDArray[np.int64]:
+    playing = in_play or (True,) * len(margins)
+    rows = [(m.terminal, m.direction, m.smooth, m.strict, plays) for m, plays in zip(margins, playing, strict=True)]
+    return np.array(rows, np.int64).reshape(-1, 5)
 
 
 class _Tables:
@@ -53,6 +54,7 @@ class _Tables:
         seen: Array | None = None,
         goes_on: bool = False,
         spacing: Array | float = np.inf,
+        in_play: tuple[bool, ...] | None = None,
     ) -> None:
         runs, n, q = len(y0), program.n, program.n_ledger
         self.stop = np.zeros(1, np.int64)
@@ -75,7 +77,7 @@ class _Tables:
             min(rtol, LOOSEST),
             spacing if isinstance(spacing, float) else float(np.min(spacing)),
             atol,
-            _kinds(margins),
+            _kinds(margins, in_play),
             y0,
             parameters,
             segments,
@@ -134,6 +136,7 @@ def _tables(problems: Sequence[Problem], step_rows: int, event_rows: int) -> _Ta
         first.seen,
         first.goes_on,
         _stacked([problem.spacing for problem in problems]) if segments.ndim == 2 else first.spacing,
+        first.in_play,
     )
 
 
@@ -185,9 +188,9 @@ class Radau(Solver):
         """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
         number of threads; limits in seconds do not count.
         """
-        alike: dict[tuple[int, int], list[int]] = {}
+        alike: dict[tuple[Any, ...], list[int]] = {}
         for i, problem in enumerate(problems):
-            alike.setdefault((len(problem.segments), len(problem.times)), []).append(i)
+            alike.setdefault((len(problem.segments), len(problem.times), problem.in_play), []).append(i)
         chunks = [group[k : k + CHUNK] for group in alike.values() for k in range(0, len(group), CHUNK)]
         self.prepare()
         with ThreadPoolExecutor(threads) as pool:
