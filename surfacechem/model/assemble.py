@@ -12,7 +12,7 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.model.build import Build
 from surfacechem.model.components.chemistry import reactions
 from surfacechem.model.components.conduction import conductors, profiles, slabs
-from surfacechem.model.components.energy import equations
+from surfacechem.model.components.energy import equations, surface_work
 from surfacechem.model.components.force import force, rupture
 from surfacechem.model.components.friction import friction
 from surfacechem.model.components.gap import normal_gap, normal_motion
@@ -30,7 +30,7 @@ from surfacechem.model.constraints.load_steps import load_steps
 from surfacechem.model.constraints.relaxing import relaxing
 from surfacechem.model.constraints.softening import apart_from_envelope, softening_mode
 from surfacechem.model.holding import Holding
-from surfacechem.model.ledger import regime, sinks, totals
+from surfacechem.model.ledger import flow, regime, sinks, state, totals
 from surfacechem.model.sliding.creep import stands_for_velocity
 from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
 from surfacechem.model.system import START, Outside, Role, System
@@ -63,6 +63,8 @@ STAGES = (
     heat_paths,
     mean_influx,
     missed,
+    surface_work,
+    flow,
     equations,
     folds,
     load_steps,
@@ -84,7 +86,8 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
     """
     build = Build(scene, sides)
     for stage in STAGES:
-        stage(build)
+        for power in stage(build) or ():
+            state(build, power)
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)

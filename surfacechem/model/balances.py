@@ -23,6 +23,41 @@ import symengine
 
 from surfacechem.expressions import Expression, depends, derivative, where
 
+OUTSIDE, MECHANICS, INTERFACE, SURROUNDINGS = "outside", "mechanics", "interface", "surroundings"
+"""Places that energy comes from and goes to, beside the bodies and the nodes inside them, by their names: what drives
+the scene, the springs and masses that hold the bodies, the interface with its bonds, and what is around."""
+
+WORK, HEAT, DISSIPATION = "work", "heat", "dissipation"
+"""Kinds of powers: work has no entropy; dissipation is heat where it arrives, whatever it was before."""
+
+
+@dataclass(frozen=True)
+class Power:
+    """Energy that passes from one place to another, per time and reference area [W/m^2].
+
+    Stated once by what makes it: the balances of the nodes, the ledger, the fluxes into the bodies and the entropy
+    production follow from it.
+    """
+
+    kind: str
+    source: str
+    target: str | Mapping[str, Expression]
+    """The place where it arrives, or several with their shares."""
+    rate: Expression
+    label: str = ""
+    """Name of its account, or of what it dissipates; none for what passes between places of the scene only."""
+    text: str = ""
+    channels: Mapping[str, Expression] = field(default_factory=dict)
+    """Its parts, by what carries the heat."""
+    entropy: Expression | None = None
+    """Entropy [W/(m^2 K)] that comes with it from outside, or that is produced on the way; where dissipation says
+    nothing it is produced at the temperature of the interface."""
+
+    @property
+    def amount(self) -> Expression:
+        """Its rate, by name where it dissipates."""
+        return symengine.Symbol(f"D_{self.label}") if self.kind == DISSIPATION else self.rate
+
 
 @dataclass
 class Node:

@@ -16,7 +16,7 @@ from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.model.automaton import Mode
 from surfacechem.model.balances import Node
 from surfacechem.model.draft import Draft
-from surfacechem.model.system import Account, Margin, Named, Range
+from surfacechem.model.system import Margin, Named, Range
 from surfacechem.model.variables import unit_of
 from surfacechem.quantities import Quantity
 
@@ -166,20 +166,6 @@ class Build(Draft):
         symbol = self.name(per_reference, nominal)
         self.name(quantity, symbol / self.stretch)
         return symbol
-
-    def supply(self, name: str, text: str, power: Expression, T: Expression | None) -> None:
-        """Book power that comes from outside; as heat at temperature T unless that is None."""
-        self.ledger.append(Account(Quantity(name, "J/m^2", text), power, "energy supply"))
-        if T is not None:
-            entropy = Quantity(f"{name}_entropy", "J/(m^2 K)", f"entropy supplied with {text}")
-            self.ledger.append(Account(entropy, power / T, "entropy supply"))
-
-    def production(self, name: str, text: str, rate: Expression) -> None:
-        """Book entropy that a law produces per time and reference area."""
-        sigma = Quantity(f"sigma_{name}", "W/(m^2 K)", f"entropy production of {text}")
-        symbol = self.name(sigma, rate)
-        integral = Quantity(f"entropy_{name}", "J/(m^2 K)", f"entropy produced by {text}")
-        self.ledger.append(Account(integral, symbol, "entropy production", name))
 
     def law_ranges(self, law: Law) -> None:
         """Ranges of variables that a run watches for a law."""

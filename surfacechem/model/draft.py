@@ -11,7 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Friction, Load
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode
-from surfacechem.model.balances import Node, Rows
+from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.conductors import Profile
 from surfacechem.model.refit import Fit
 from surfacechem.model.system import Account, Capped, Caution, Margin, Named, Pace, Pair, Range, State
@@ -101,20 +101,12 @@ class Draft:
     about: dict[Any, Expression] = field(default_factory=dict)
     """Initial values of the bonding variables, about which capacities are written."""
     bound_frictions: dict[Friction, Friction] = field(default_factory=dict)
-    frictions: set[str] = field(default_factory=set)
-    """Labels of the friction laws, whose power comes from outside."""
-    dissipation: dict[str, Expression] = field(default_factory=dict)
-    """Power that each interface law turns into heat [W/m^2], by the law's label."""
-    into_body: dict[str, list[Expression]] = field(init=False)
-    """Heat that reaches each body other than through the interface [W/m^2]."""
-    from_interface: dict[str, dict[str, Expression]] = field(init=False)
-    """Heat that each body receives from the interface and the other body by stated laws, by channel [W/m^2]."""
+    powers: list[Power] = field(default_factory=list)
+    """All that passes energy on, from which the ledger and the balances of energy follow."""
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
     rates: dict[Any, Expression] = field(default_factory=dict)
     """Time derivatives of what the interface's free energy depends on beside temperature."""
-    into_interface: list[Expression] = field(default_factory=list)
-    """Power and heat that flow into the interface [W/m^2]."""
     breakpoints: set[float] = field(default_factory=set)
     cycles: list[str] = field(default_factory=list)
     """Paths of the frequencies of histories that repeat themselves."""
@@ -135,15 +127,13 @@ class Draft:
     used_names: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        """Names that are taken, and the bodies that heat flows into."""
+        """Names that are taken."""
         custom = [body.temperature for body in self.scene.bodies if isinstance(body.temperature, str)]
         capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
         self.parameters = Parameters(
             [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
         )
         self.variables = Variables(self.parameters)
-        self.into_body = {body.name: [] for body in self.scene.bodies}
-        self.from_interface = {body.name: {} for body in self.scene.bodies}
 
     @property
     def interface(self) -> Interface:

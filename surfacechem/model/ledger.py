@@ -1,20 +1,97 @@
-"""Totals that the ledger must explain, the fluxes into the bodies, and the regime in words."""
+"""What follows from the powers that the parts of a scene state: accounts, flows into the nodes, and heat fluxes.
+
+Beside them stand the totals that the ledger must explain, who takes the heat of a jump, and the regime in words.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
-from surfacechem.model.automaton import INTERFACE, Sink
-from surfacechem.model.balances import Node
+from surfacechem.model.automaton import Sink
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.heat import takers
-from surfacechem.model.components.sources import GAPS, GEOMETRY, by_channel, by_source, heat_of_reaction
 from surfacechem.model.system import Account
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
+
+GAPS = ("g_n", "g_t", "u_t", "u_t2")
+GEOMETRY = (*GAPS, "J_c")
+"""Variables of the free energy that move the surfaces rather than their bonds."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What passes from one place to another [W/m^2]; where the interface stores no heat it passes on to the bodies."""
+
+    source: str
+    target: str
+    rate: Expression
+    channels: Mapping[str, Expression] = field(default_factory=dict)
+
+
+def passages(build: Build) -> Iterator[Passage]:
+    """Where the powers of a scene arrive."""
+    for power in build.powers:
+        targets = power.target if isinstance(power.target, Mapping) else {power.target: symengine.Integer(1)}
+        if INTERFACE in targets and INTERFACE not in build.node_of and power.kind != WORK:
+            channel = {MECHANICS: "friction", INTERFACE: "reaction", OUTSIDE: "external"}[power.source]
+            heats = {end: share * power.amount for end, share in build.shares().items()}
+            yield from (Passage(INTERFACE, end, heat, {channel: heat}) for end, heat in heats.items() if heat != 0)
+        else:
+            for place, share in targets.items():
+                yield Passage(power.source, place, share * power.amount, power.channels)
+
+
+def state(build: Build, power: Power) -> None:
+    """Keep a power, and state its accounts; what dissipates has its own when all of that is known."""
+    build.powers.append(power)
+    if power.kind != DISSIPATION:
+        _account(build, power)
+
+
+def flow(build: Build) -> None:
+    """Name what is dissipated, and let all powers flow into the nodes."""
+    for power in build.powers:
+        if power.kind == DISSIPATION:
+            _account(build, power)
+    inside = {node.name: node for slab in build.slabs.values() for node in slab.nodes[1:]}
+    nodes = {**inside, **build.nodes, **build.node_of}
+    for passage in passages(build):
+        source, target = nodes.get(passage.source), nodes.get(passage.target)
+        if source is target:  # what bonds release stays where they are
+            continue
+        if target is not None:
+            target.inflow.append(passage.rate)
+        if source is not None:
+            source.inflow.append(-passage.rate)
+
+
+def _account(build: Build, power: Power) -> None:
+    """State the accounts of a power: what it supplies, or what it dissipates, and the entropy that it produces."""
+    label, produced = power.label, power.entropy
+    text = power.text or label.replace("_", " ")
+    if power.kind == DISSIPATION:
+        symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power.rate)
+        turned = Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}")
+        build.ledger.append(Account(turned, symbol, "dissipation", label))
+        produced = symbol / build.variables.get("T_c", "the dissipation") if produced is None else produced
+    elif power.source == OUTSIDE:
+        build.ledger.append(Account(Quantity(label, "J/m^2", text), power.rate, "energy supply"))
+        if power.entropy is not None:
+            entropy = Quantity(f"{label}_entropy", "J/(m^2 K)", f"entropy supplied with {text}")
+            build.ledger.append(Account(entropy, power.entropy, "entropy supply"))
+        return
+    if produced is not None:
+        sigma = build.name(Quantity(f"sigma_{label}", "W/(m^2 K)", f"entropy production of {text}"), produced)
+        integral = Quantity(f"entropy_{label}", "J/(m^2 K)", f"entropy produced by {text}")
+        build.ledger.append(Account(integral, sigma, "entropy production", label))
 
 
 def totals(build: Build) -> None:
@@ -47,7 +124,7 @@ def _enthalpy(build: Build) -> None:
     if not bonds or any(law.taken is not None for law in build.interface.reactions):
         return
     text = "heat of reaction at constant temperature and gap, positive where exothermic"
-    build.name(Quantity("q_reaction", "W/m^2", text), heat_of_reaction(build))
+    build.name(Quantity("q_reaction", "W/m^2", text), _heat_of_reaction(build))
     if build.variables.has("N_c"):
         borne = sum((symengine.Symbol(g) * derivative(build.psi, symengine.Symbol(g)) for g in GAPS), 0)
         site = build.variables.get("N_c", "the contact enthalpy")
@@ -79,7 +156,8 @@ def _suffix(build: Build, member: str) -> str:
 
 
 def _fluxes(build: Build) -> None:
-    fluxes = [_flux(build, k, body) for k, body in enumerate(build.scene.bodies, start=1)]
+    flows = list(passages(build))
+    fluxes = [_flux(build, k, body, flows) for k, body in enumerate(build.scene.bodies, start=1)]
     known = [flux for flux in fluxes if flux is not None]
     if all(flux == 0 for flux in known):
         return
@@ -94,30 +172,97 @@ def _fluxes(build: Build) -> None:
         build.name(Quantity("q_t", "W/m^2", text, tag="e:qt_def"), (q_1 - q_2) / 2)
 
 
-def _flux(build: Build, k: int, body: Body) -> Expression | None:
+def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> Expression | None:
     """Heat into a body from the interface: stated by its laws, or recovered from a balance where it has none.
 
     Two bodies that share a prescribed temperature leave open which of them the heat goes into.
     """
     node = build.node_of[body.name]
     sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
-    stated = symengine.Add(*build.from_interface[body.name].values())
-    flux = stated if sharing else by_channel(build, k, body)
+    channels, others = _received(build, body, flows)
+    if len(channels) > 1 and not sharing:
+        channels = {name: _part(build, k, body, name, heat) for name, heat in channels.items()}
+    flux = symengine.Add(*channels.values())
     if sharing and node.prescribed:
-        if sharing != ["interface"]:
+        if sharing != [INTERFACE]:
             return None
-        flux = flux + sum(build.into_interface) - balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
+        moved = balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
+        flux = flux + sum(_arriving(INTERFACE, flows)) - moved
     elif body.name in node.energies:
         rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
-        recovered = rate - symengine.Add(*build.into_body[body.name])
+        recovered = rate - symengine.Add(*others)
         flux = recovered if sharing else flux
         if not node.prescribed:
             _book_heat(build, k, body, recovered)
             if sharing and not build.slabs:
-                by_source(build, k, body, flux)
+                _by_source(build, k, body, flux)
             return flux
     _book_heat(build, k, body, flux)
     return flux
+
+
+def _received(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str, Expression], list[Expression]]:
+    """Heat into a body from the interface and the other body, by what carries it, and what it gets from elsewhere."""
+    near = {INTERFACE, *(other.name for other in build.scene.bodies)}
+    channels: dict[str, Expression] = {}
+    elsewhere = []
+    for flow in flows:
+        sign, other = (1, flow.source) if flow.target == body.name else (-1, flow.target)
+        if body.name not in (flow.source, flow.target):
+            continue
+        if other not in near:
+            elsewhere.append(sign * flow.rate)
+            continue
+        for channel, heat in flow.channels.items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
+    return channels, elsewhere
+
+
+def _arriving(place: str, flows: list[Passage]) -> Iterator[Expression]:
+    """Power and heat that arrive at a place, less what leaves it."""
+    for flow in flows:
+        if flow.source != flow.target and place in (flow.source, flow.target):
+            yield flow.rate if flow.target == place else -flow.rate
+
+
+def _part(build: Build, k: int, body: Body, name: str, heat: Expression) -> Expression:
+    text = f"heat flux from the interface into {body.name} by {name}"
+    return build.areal(Quantity(f"q_{k}_{name}", "W/m^2", text), heat)
+
+
+def _by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
+    """Name what makes the heat of a body that shares its temperature: its part, by capacity, of each source.
+
+    The rest is exchanged with what has another temperature, supplied from outside, or thermo-elastic.
+    """
+    node = build.node_of[body.name]
+    known = any(item.name == f"C_{node.name}" for item in build.named)
+    whole = symengine.Symbol(f"C_{node.name}") if known else balances.conditioned(node.capacity(), build.about)
+    share = -node.T * balances.second(node.energies[body.name], node.T) / whole
+    rubbed = (
+        p.amount for p in build.powers if p.kind == DISSIPATION and (p.source, p.target) == (MECHANICS, INTERFACE)
+    )
+    made = {"friction": symengine.Add(*rubbed), "reaction": _heat_of_reaction(build)}
+    parts = {name: share * heat for name, heat in made.items() if heat != 0}
+    exchanges = bool(
+        build.scene.heat
+        or any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
+        or any(str(x) in GEOMETRY for x in build.rates)
+        or build.motion.far_fields
+    )
+    if not parts or len(parts) + exchanges < 2:
+        return
+    named = [_part(build, k, body, name, heat) for name, heat in parts.items()]
+    if exchanges:
+        _part(build, k, body, "exchange", flux - symengine.Add(*named))
+
+
+def _heat_of_reaction(build: Build) -> Expression:
+    """Heat of all reactions: minus the change of the internal energy with the bonds."""
+    node = build.node_of.get(INTERFACE)
+    U = balances.internal_energy(build.psi, node.T) if node else build.psi
+    bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
+    return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
 
 
 def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:

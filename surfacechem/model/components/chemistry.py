@@ -7,13 +7,14 @@ A reaction that takes :math:`-\nu_j` molecules of the species j of an adjacent p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import symengine
 
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
+from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.force import RESOLUTION, SHARED
 from surfacechem.model.components.mounting import law_reads
@@ -30,7 +31,7 @@ MARGIN = 4
 """How much faster than bonds count as ruptured they may still break."""
 
 
-def reactions(build: Build) -> None:
+def reactions(build: Build) -> Iterator[Power]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
     change = {name: symengine.Integer(0) for name in build.bonding}
@@ -50,6 +51,7 @@ def reactions(build: Build) -> None:
     free = _free(build, forming)
     rates |= {label: softening(build, law, forming, free) for label, law in laws.items() if label not in others}
     named: dict[str, Expression] = {}
+    dissipated: dict[str, Expression] = {}
     for label, law in laws.items():
         nu, affinity = law.stoichiometry(), affinities[label]
         quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
@@ -57,20 +59,22 @@ def reactions(build: Build) -> None:
         rate = named[label] = build.name(quantity, formed)
         # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
         owner = together.get(label, label)
-        build.dissipation[owner] = build.dissipation.get(owner, 0) - build.stretch * rate * affinity
+        dissipated[owner] = dissipated.get(owner, 0) - build.stretch * rate * affinity
         for x, n in nu.items():
             change[x] += n * rate
         _across_an_open_gap(build, law, rate)
         own_departure(build, label, law, affinity)
-    supplied(build, laws, named)
-    book_work(build, pulled, named, load)
+    for owner, power in dissipated.items():
+        yield Power(DISSIPATION, INTERFACE, INTERFACE, power, owner)
+    yield from supplied(build, laws, named)
+    yield from book_work(build, pulled, named, load)
     for pair in pairs:
         departure(build, pair, loaded)
     for name, bond in build.bonding.items():
         build.rows.sites(name, change[name], bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
-    _prescribed_bonding(build)
+    yield from _prescribed_bonding(build)
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
@@ -165,14 +169,14 @@ def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expressi
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
-def _prescribed_bonding(build: Build) -> None:
+def _prescribed_bonding(build: Build) -> Iterator[Power]:
     phi = symengine.Symbol("phi")
     if "phi" in build.bonding or not depends(build.psi, phi):
         return
     M = _potential_per_area(build, "phi", phi)
     rate = build.rate_of("phi")
     if rate != 0:
-        build.dissipation["prescribed_bonding"] = -M * rate
+        yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
 
 
 NEIGHBOURS = "neighbours"
@@ -183,7 +187,7 @@ def affinity_taken(build: Build, law: RateLaw) -> Expression:
     return build.variables.call(law, law.taken[1]) if law.taken else symengine.Integer(0)
 
 
-def supplied(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> None:
+def supplied(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> Iterator[Power]:
     """Book the enthalpy and the entropy that reactions take from neighbours; the interface gets the enthalpy."""
     heat, entropy = [], []
     for label, law in laws.items():
@@ -196,9 +200,5 @@ def supplied(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expr
     text = "enthalpy of what reactions take from neighbours"
     power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
     T = build.variables.get("T_c", "the neighbours")
-    name = f"H_{NEIGHBOURS}"
-    build.ledger.append(Account(Quantity(name, "J/m^2", text), power, "energy supply"))
-    with_it = Quantity(f"{name}_entropy", "J/(m^2 K)", "entropy of what reactions take from neighbours")
-    build.ledger.append(Account(with_it, symengine.Add(*entropy) / T, "entropy supply"))
-    build.into_interface.append(power)
-    build.node_of["interface"].inflow.append(power)
+    with_it = symengine.Add(*entropy) / T
+    yield Power(HEAT, OUTSIDE, INTERFACE, power, f"H_{NEIGHBOURS}", text, entropy=with_it)

@@ -16,7 +16,7 @@ from surfacechem.contracts.terms import Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.model import balances
-from surfacechem.model.balances import Node
+from surfacechem.model.balances import HEAT, Node, Power
 from surfacechem.model.build import BOTH, Build
 from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.system import State
@@ -45,7 +45,7 @@ class Slab:
         return f"profile_{self.number}"
 
 
-def slabs(build: Build) -> None:
+def slabs(build: Build) -> Iterator[Power]:
     """Divide the bodies that conduct, and let heat flow along them."""
     for number, body in enumerate(build.scene.bodies, start=1):
         if body.conduction is None:
@@ -54,7 +54,7 @@ def slabs(build: Build) -> None:
         build.resistances[body.name] = bound.thickness / bound.conductivity
         if body.conduction.cells:
             slab = build.slabs[body.name] = _divided(build, number, body, body.conduction)
-            _conduct(build, slab, bound)
+            yield from _conduct(build, slab, bound)
 
 
 def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction:
@@ -120,7 +120,7 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
     return node
 
 
-def _conduct(build: Build, slab: Slab, bound: Conduction) -> None:
+def _conduct(build: Build, slab: Slab, bound: Conduction) -> Iterator[Power]:
     """Fluxes from node to node, and through the far side."""
     name = slab.body.name
     conductivity = _conductivity(build, slab, bound.conductivity)
@@ -132,14 +132,13 @@ def _conduct(build: Build, slab: Slab, bound: Conduction) -> None:
     if slab.law.h_far is not None:
         links.append((slab.nodes[-1], _far_node(build, slab.number, slab.body, slab.law)))
         conductances.append(bound.h_far)
-    produced = []
-    for (a, b), conductance in zip(links, conductances, strict=True):
-        flux = conductance * (a.T - b.T)
-        a.inflow.append(-flux)
-        b.inflow.append(flux)
-        produced.append(flux * (a.T - b.T) / (a.T * b.T))
-    build.into_body[name].append(slab.nodes[0].inflow[-1])
-    build.production(f"conduction_{slab.number}", f"heat conduction in {name}", symengine.Add(*produced))
+    fluxes = [h * (a.T - b.T) for (a, b), h in zip(links, conductances, strict=True)]
+    produced = (flux * (a.T - b.T) / (a.T * b.T) for (a, b), flux in zip(links, fluxes, strict=True))
+    places = [name, *(b.name for _, b in links)]
+    flows = [Power(HEAT, a, b, flux) for a, b, flux in zip(places, places[1:], fluxes, strict=False)]
+    label, text = f"conduction_{slab.number}", f"heat conduction in {name}"
+    yield replace(flows[0], label=label, text=text, entropy=symengine.Add(*produced))
+    yield from flows[1:]
 
 
 def _reference(law: Conduction) -> float:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import symengine
 
@@ -11,10 +10,11 @@ from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
-from surfacechem.model.balances import Node
+from surfacechem.model.balances import HEAT, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
 from surfacechem.model.build import Build
 from surfacechem.model.constraints.folds import determinant
-from surfacechem.model.system import STABLE, Account, Margin, State
+from surfacechem.model.ledger import GAPS
+from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
 _NEWTON = 20
@@ -29,10 +29,29 @@ CAPACITY_REMEDY = (
 )
 
 
-def equations(build: Build) -> None:
-    """The work of the gaps, dissipation, energy balances, states and margins of the temperatures."""
-    rates = build.rates = _rates(build)
-    _dissipation(build)
+def surface_work(build: Build) -> Iterator[Power]:
+    """Rates of what the free energy depends on beside temperature, and the work that tractions do on the interface."""
+    build.rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
+    for name, label, text in (
+        *((gap, f"W_{gap}", f"work done on the gap {gap}") for gap in GAPS),
+        ("J_c", "W_J", "work done in stretching the surface"),
+    ):
+        x = symengine.Symbol(name)
+        if not depends(build.psi, x):
+            continue
+        moved = name in build.motion.gap_rates
+        build.rates[x] = build.motion.gap_rates[name] if moved else build.rate_of(name)
+        power = balances.power(build.psi, x, build.rates[x])
+        if power != 0:
+            yield Power(WORK, MECHANICS if moved else OUTSIDE, INTERFACE, power, label, text)
+    phi = symengine.Symbol("phi")
+    if phi not in build.rates and depends(build.psi, phi):
+        build.rates[phi] = build.rate_of("phi")
+
+
+def equations(build: Build) -> Iterator[Power]:
+    """Energy balances, states and margins of the temperatures."""
+    rates = build.rates
     free = [node for node in build.nodes.values() if not node.prescribed]
     for node in free:
         _temperature_state(build, node)
@@ -43,7 +62,7 @@ def equations(build: Build) -> None:
     for node in build.nodes.values():
         if node.prescribed:
             build.margins.append(_warm(node))
-            _recovered_heat(build, node, rates)
+            yield from _recovered_heat(build, node)
     if not (build.states or build.slabs):
         message = "there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve."
         raise InputError(message, Place(path="bodies"))
@@ -53,61 +72,6 @@ def _centre(build: Build, free: Mapping[str, Expression]) -> str:
     """The node whose balance is the sum of all: the interface's, or where it has none the first."""
     interface = build.node_of.get("interface")
     return interface.name if interface and interface.name in free else next(iter(free), "")
-
-
-def _rates(build: Build) -> dict[Any, Expression]:
-    """Time derivatives of what the free energy depends on beside temperature."""
-    rates = {bond.symbol: bond.dot for bond in build.bonding.values()} | _gaps(build) | _stretching(build)
-    phi = symengine.Symbol("phi")
-    if phi not in rates and depends(build.psi, phi):
-        rates[phi] = build.rate_of("phi")
-    return rates
-
-
-def _gaps(build: Build) -> dict[Any, Expression]:
-    """Rates of the gaps that the potential depends on; books the work of the tractions."""
-    rates: dict[Any, Expression] = {}
-    for gap in ("g_n", "g_t", "u_t", "u_t2"):
-        symbol = symengine.Symbol(gap)
-        if not depends(build.psi, symbol):
-            continue
-        rates[symbol] = build.motion.gap_rates[gap] if gap in build.motion.gap_rates else build.rate_of(gap)
-        power = balances.power(build.psi, symbol, rates[symbol])
-        if power != 0:
-            if gap not in build.motion.gap_rates:
-                build.supply(f"W_{gap}", f"work done on the gap {gap}", power, None)
-            _give_power(build, power)
-    return rates
-
-
-def _stretching(build: Build) -> dict[Any, Expression]:
-    """Rate of the area stretch where the potential depends on it; books the work of stretching the surface."""
-    J_c = symengine.Symbol("J_c")
-    if not depends(build.psi, J_c):
-        return {}
-    rate = build.rate_of("J_c")
-    power = balances.power(build.psi, J_c, rate)
-    if power != 0:
-        build.supply("W_J", "work done in stretching the surface", power, None)
-        _give_power(build, power)
-    return {J_c: rate}
-
-
-def _give_power(build: Build, power: Expression) -> None:
-    build.into_interface.append(power)
-    if "interface" in build.node_of:
-        build.node_of["interface"].inflow.append(power)
-
-
-def _dissipation(build: Build) -> None:
-    for label, power in build.dissipation.items():
-        text = label.replace("_", " ")
-        symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power)
-        turned = Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}")
-        build.ledger.append(Account(turned, symbol, "dissipation", label))
-        build.production(label, text, symbol / build.variables.get("T_c", "the dissipation"))
-        if label in build.frictions:
-            _give_power(build, symbol)
 
 
 def _temperature_state(build: Build, node: Node) -> None:
@@ -217,11 +181,12 @@ def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
     return slope
 
 
-def _recovered_heat(build: Build, node: Node, rates: Mapping[Any, Expression]) -> None:
+def _recovered_heat(build: Build, node: Node) -> Iterator[Power]:
     """The heat that must be supplied from outside to keep a prescribed temperature."""
     if node.energies:
         build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
-    supply = balances.node_row(node, rates, build.about)
+    supply = balances.node_row(node, build.rates, build.about)
     if supply != 0:
-        symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", f"heat supplied to keep {node.name}"), supply)
-        build.supply(f"H_{node.name}", f"heat supplied to keep {node.name}", symbol, node.T)
+        text = f"heat supplied to keep {node.name}"
+        symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", text), supply)
+        yield Power(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)

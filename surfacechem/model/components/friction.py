@@ -6,13 +6,14 @@ Such a variable, as the age of a contact, is evolved as its logarithm.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 import symengine
 
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative, exp, where
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG, Direction
 from surfacechem.model.sliding.formulations import displacement, in_parallel
@@ -21,7 +22,7 @@ from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
 
-def friction(build: Build) -> None:
+def friction(build: Build) -> Iterator[Power]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     rubs, total = build.motion.rubs, symengine.Integer(0)
     for law in build.interface.frictions:
@@ -39,11 +40,11 @@ def friction(build: Build) -> None:
             power += rubs * nominal * build.variables.get(d.velocity, law)
             total += rubs * nominal
             resist(build, d, nominal)
-        build.frictions.add(label)
-        build.dissipation[label] = power
+        yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)
         if not build.motion.slips:
             build.motion.works[law] = f"W_{label}"
-            build.supply(build.motion.works[law], f"work done against {law.title}", power, None)
+            text = f"work done against {law.title}"
+            yield Power(WORK, OUTSIDE, MECHANICS, power, build.motion.works[law], text)
             _reversal(build, resisted)
         else:
             stick_limit(build, law, bound, met)

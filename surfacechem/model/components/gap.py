@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import symengine
@@ -10,6 +11,7 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import Equilibrium
+from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
 from surfacechem.model.constraints.breaking import bonds_left
@@ -140,7 +142,7 @@ def _pressure(build: Build) -> Expression:
     return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
 
 
-def normal_motion(build: Build) -> None:
+def normal_motion(build: Build) -> Iterator[Power]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
     mount = held(build, "n")
     if mount is None:
@@ -149,7 +151,7 @@ def normal_motion(build: Build) -> None:
     far = far_field(build, mount)
     if "g_n" not in build.motion.gap_rates:
         rate = build.total_derivative(g)
-        far.book(build, g, rate)
+        yield from far.book(build, g, rate)
         return
     rate = build.motion.gap_rates["g_n"]
     t_n = derivative(build.psi, g)
@@ -158,7 +160,7 @@ def normal_motion(build: Build) -> None:
     if build.find_mode("closed") is None:
         closing(build, g)
     dot = symengine.Symbol("dg_n_dt")
-    far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
+    yield from far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
     if mount.inertial:
         build.rows.kinematics("g_n", rate)
         force = far.force(g, rate) - t_n - far.c_g * rate

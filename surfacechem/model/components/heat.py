@@ -11,39 +11,32 @@ though one of the two alone may run uphill: into the hotter body, from an interf
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import symengine
 
 from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
-from surfacechem.model.balances import Node
+from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
 from surfacechem.model.build import BOTH, NOTHING, Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 
 
-def heat_paths(build: Build) -> None:
+def heat_paths(build: Build) -> Iterator[Power]:
     """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
     for law in build.scene.heat:
         if law.between[0] == law.between[1]:
             raise InputError(f"a heat path needs two different ends, not {law.between[0]} twice.", _ends(law))
     for paths in _by_ends(build):
-        _between(build, paths)
+        yield from _between(build, paths)
     for law in (law for law in build.scene.heat if _made_across(law)):
-        _through_film(build, law)
+        yield from _through_film(build, law)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
-            _external_heat(build, member, Q)
-    if build.interface.temperature is None:
-        _shares_margin(build)
-        for label, power in build.dissipation.items():
-            _share(build, power, "friction" if label in build.frictions else "reaction")
-
-
-def _shares_margin(build: Build) -> None:
-    if build.interface.loss:
+            yield _external_heat(build, member, Q)
+    if build.interface.temperature is None and build.interface.loss:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
         build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
@@ -64,7 +57,7 @@ def takers(build: Build) -> list[tuple[Node, Expression]]:
         (build.node_of[end], _area(build, pair) * h)
         for pair, channels in build.conductances.items()
         if "interface" in pair
-        for end in (build.into_body if pair == BOTH else set(pair) - {"interface"})
+        for end in ((body.name for body in build.scene.bodies) if pair == BOTH else set(pair) - {"interface"})
         for h in channels
     ]
     whole = symengine.Add(*(h for _, h in ways))
@@ -75,22 +68,6 @@ def takers(build: Build) -> list[tuple[Node, Expression]]:
 def _area(build: Build, ends: Collection[str]) -> Expression:
     """Area of a path over the reference area: heat leaves to the surroundings through the latter."""
     return symengine.Integer(1) if "surroundings" in ends else build.stretch
-
-
-def _share(build: Build, heat: Expression, channel: str) -> None:
-    for end, share in build.shares().items():
-        if share * heat != 0:
-            build.node_of[end].inflow.append(share * heat)
-            receive(build, end, share * heat, channel)
-
-
-def receive(build: Build, end: str, heat: Expression, channel: str) -> None:
-    """Remember the heat that a body gets from the interface or the other body, by what carries it."""
-    if end in build.from_interface:
-        received = build.from_interface[end]
-        received[channel] = received.get(channel, symengine.Integer(0)) + heat
-    elif end == "interface":
-        build.into_interface.append(heat)
 
 
 def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
@@ -142,7 +119,7 @@ def _made_across(law: HeatTransfer) -> bool:
     return law.closure == "medium" and hasattr(law, "resistances")
 
 
-def _through_film(build: Build, law: HeatTransfer) -> None:
+def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
     r"""Heat that a film at the mean temperature T_c gives its walls.
 
     Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
@@ -162,20 +139,19 @@ def _through_film(build: Build, law: HeatTransfer) -> None:
     build.law_margins(law, {})
     scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
     beside = -2 * r / scale * (ends[1].T - ends[0].T)
-    production = symengine.Integer(0)
+    flows, produced = [], symengine.Integer(0)
     for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
         h = 6 * (r + 2 * wall) / scale
         build.conductances["interface", end] = [*build.conductances.get(("interface", end), []), h]
         text = f"heat flux from the film into {end}"
         flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
-        node.inflow.append(q)
-        centre.inflow.append(-q)
-        receive(build, end, q, law.channel)
-        receive(build, "interface", -q, law.channel)
-        production += q * (centre.T - node.T) / (centre.T * node.T)
+        flows.append(Power(HEAT, INTERFACE, end, q, channels={law.channel: q}))
+        produced += q * (centre.T - node.T) / (centre.T * node.T)
     # Booked as one: heat that a wall takes from a film colder than itself has come through it from the other wall.
-    build.production(build.unique("film"), "heat flow through the film", production)
+    first = replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
+    yield first
+    yield from flows[1:]
 
 
 def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
@@ -193,7 +169,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
             yield _Path(ends, double)
 
 
-def _between(build: Build, paths: list[_Path]) -> None:
+def _between(build: Build, paths: list[_Path]) -> Iterator[Power]:
     """All paths between two ends: a flux of each channel where there are several, and their sum."""
     a, b = paths[0].ends
     from_node, to_node = end_node(build, a), end_node(build, b)
@@ -206,11 +182,8 @@ def _between(build: Build, paths: list[_Path]) -> None:
     difference = from_node.T - to_node.T
     flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
     total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
-    from_node.inflow.append(-total)
-    to_node.inflow.append(total)
-    production = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
-    build.production(flux.name, f"heat flow from {a} to {b}", production)
-    _received(build, (a, b), parts)
+    produced = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
+    yield Power(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
 
 
 def named_flux(
@@ -223,16 +196,6 @@ def named_flux(
         parts = {channel: build.name(names[channel], part) for channel, part in parts.items()}
     total = build.name(flux, symengine.Add(*parts.values()))
     return total, dict(parts) if len(parts) > 1 else {next(iter(parts)): total}
-
-
-def _received(build: Build, ends: tuple[str, str], parts: Mapping[str, Expression]) -> None:
-    """Book fluxes from the first end to the second; with the surroundings, a body's heat is not the interface's."""
-    for channel, flux in parts.items():
-        for end, heat in zip(ends, (-flux, flux), strict=True):
-            if "surroundings" in ends and end in build.into_body:
-                build.into_body[end].append(heat)
-            else:
-                receive(build, end, heat, channel)
 
 
 def _path_name(build: Build, a: str, b: str) -> str:
@@ -260,22 +223,14 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
-def _external_heat(build: Build, member: str, name: str) -> None:
+def _external_heat(build: Build, member: str, name: str) -> Power:
     Q = build.variables.get(name, "the energy balance")
     text = f"external heat into {member}"
-    if member in build.node_of:
-        build.node_of[member].inflow.append(Q)
-        build.supply(f"H_{name[2:]}", text, Q, build.node_of[member].T)
-    else:
-        build.supply(f"H_{name[2:]}", text, Q, build.variables.get("T_c", "the external heat"))
-        _share(build, Q, "external")
-    if member in build.into_body:
-        build.into_body[member].append(Q)
-    else:
-        build.into_interface.append(Q)
+    T = build.node_of[member].T if member in build.node_of else build.variables.get("T_c", "the external heat")
+    return Power(HEAT, OUTSIDE, member, Q, f"H_{name[2:]}", text, entropy=Q / T)
 
 
-def mean_influx(build: Build) -> None:
+def mean_influx(build: Build) -> Iterator[Power]:
     """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] of the paths with the closure `mean`."""
     channels: dict[str, Expression] = {}
     for law in (law for law in build.scene.heat if law.closure == "mean"):
@@ -285,26 +240,22 @@ def mean_influx(build: Build) -> None:
         for channel, h in conductances(build, law).items():
             channels[channel] = channels.get(channel, symengine.Integer(0)) + h
     if channels:
-        _into_both(build, channels)
+        yield from _into_both(build, channels)
 
 
-def _into_both(build: Build, channels: dict[str, Expression]) -> None:
+def _into_both(build: Build, channels: dict[str, Expression]) -> Iterator[Power]:
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
     build.conductances[BOTH] = list(channels.values())
     difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)
     flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
     total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
-    for name in bodies:
-        build.node_of[name].inflow.append(total)
-    centre.inflow.append(-2 * total)
-    for channel, heat in parts.items():
-        for end, share in ((bodies[0], heat), (bodies[1], heat), ("interface", -2 * heat)):
-            receive(build, end, share, channel)
     sum_h = symengine.Add(*channels.values())
     _warn_of_uphill(build, bodies)
-    production = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
-    build.production(flux.name, "heat flow from interface to each body", production)
+    produced = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
+    text = "heat flow from interface to each body"
+    yield Power(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)
+    yield Power(HEAT, INTERFACE, bodies[1], total, channels=parts)
 
 
 def _warn_of_uphill(build: Build, bodies: list[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import symengine
@@ -10,10 +11,10 @@ import symengine
 from surfacechem.contracts.terms import Law, Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
-from surfacechem.model.balances import Node
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
 from surfacechem.model.build import Build
 from surfacechem.model.springs import stored
-from surfacechem.model.system import Account, Pace
+from surfacechem.model.system import Pace
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
 
@@ -176,11 +177,24 @@ class FarField:
         """The same over the volume of the bodies."""
         return [(node, share * part) for body, share in self.shares(build) for node, part in build.volume(body)]
 
+    def _damper(self, build: Build, power: Expression) -> Power:
+        """What the damper in the bodies dissipates, over their volume."""
+        label, text = f"bulk_damper_{self.axis}", f"the damper of the bodies, {AXES[self.axis]}"
+        volumes = [(body, share, build.volume(body)) for body, share in self.shares(build)]
+        targets = {
+            body if i == 0 else node.name: share * part
+            for body, share, nodes in volumes
+            for i, (node, part) in enumerate(nodes)
+        }
+        damped = symengine.Symbol(f"D_{label}")
+        produced = symengine.Add(*(share * damped / node.T for node, share in self.takers(build)))
+        return Power(DISSIPATION, MECHANICS, targets, power, label, text, entropy=produced)
+
     def yielding(self, g: Expression, traction: Expression) -> Expression:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
-    def book(self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None) -> None:
+    def book(self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None) -> Iterator[Power]:
         """Energies of the bodies, work of the far field, heat of the dampers.
 
         Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
@@ -200,33 +214,18 @@ class FarField:
         bulk = self.w_dot - rate
         power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
-            build.supply(f"W_{self.axis}", f"work of the far field on the {text}", power, None)
+            what = f"work of the far field on the {text}"
+            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{self.axis}", what)
             build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
         if self.F != 0:
             build.motion.given[f"W_{self.axis}"] = self.F * g
         if self.c_b != 0:
-            _bulk_damper(build, self, self.c_b * bulk * (self.w_dot - moves))
+            damped = self.c_b * bulk * (self.w_dot - moves)
+            yield self._damper(build, damped)
         if self.c_g != 0:
             label = build.unique(f"contact_damper_{self.axis}")
-            build.dissipation[label] = self.c_g * rate * moves
-            build.frictions.add(label)
-
-
-def _bulk_damper(build: Build, far: FarField, power: Expression) -> None:
-    label = f"bulk_damper_{far.axis}"
-    text = f"the damper of the bodies, {AXES[far.axis]}"
-    symbol = build.name(Quantity(f"D_{label}", "W/m^2", f"dissipation of {text}"), power)
-    build.ledger.append(
-        Account(Quantity(f"heat_{label}", "J/m^2", f"energy dissipated by {text}"), symbol, "dissipation", label)
-    )
-    produced = []
-    for node, share in far.takers(build):
-        node.inflow.append(share * symbol)
-        produced.append(share * symbol / node.T)
-    for body, share in far.shares(build):
-        contact = build.volume(body)[0][1]
-        build.into_body[body].append(share * contact * symbol)
-    build.production(label, text, symengine.Add(*produced))
+            rubbed = self.c_g * rate * moves
+            yield Power(DISSIPATION, MECHANICS, INTERFACE, rubbed, label)
 
 
 def far_field(build: Build, mount: Held) -> FarField:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import Load, RateLaw, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative
+from surfacechem.model.balances import INTERFACE, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import driven
@@ -110,7 +111,7 @@ def _refuse_idle_length(law: RateLaw) -> None:
 
 def book_work(
     build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression], load: Mapping[str, Expression]
-) -> None:
+) -> Iterator[Power]:
     """What reactions take from the load comes in as work."""
     taken = [
         -build.stretch * rates[label] * n * load[name]
@@ -119,11 +120,8 @@ def book_work(
         if name in load
     ]
     if taken:
-        power = symengine.Add(*taken)
-        build.supply("W_f", "work of the prescribed force on bonds", power, None)
-        build.into_interface.append(power)
-        if "interface" in build.node_of:
-            build.node_of["interface"].inflow.append(power)
+        text = "work of the prescribed force on bonds"
+        yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*taken), "W_f", text)
 
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:

@@ -20,7 +20,7 @@ velocity.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -29,6 +29,7 @@ import symengine
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends, derivative, norm, sqrt, where
 from surfacechem.model.automaton import Edge
+from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import LENGTH, far_field
 from surfacechem.model.constraints.breaking import broken
@@ -146,14 +147,14 @@ def _began(v: str, values: Mapping[str, float]) -> float:
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
-def motion(build: Build, kinds: Sequence[Kind]) -> None:
+def motion(build: Build, kinds: Sequence[Kind]) -> Iterator[Power]:
     """Balances along and across the direction of sliding, and the transitions between sticking and sliding."""
     sides = [side_of(build, kind) for kind in kinds]
     for side in sides:
         name = side.kind.d.displacement
         build.rows.kinematics(name, side.rate)
         assert side.kind.mount is not None
-        far_field(build, side.kind.mount).book(build, side.u, side.rate)
+        yield from far_field(build, side.kind.mount).book(build, side.u, side.rate)
         name_traction(build, side.kind.d, SLIDES, side.t_a + side.resisted, side.t_a + side.needed)
     _transitions(build, sides, _balance(build, sides))
 

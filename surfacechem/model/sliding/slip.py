@@ -6,6 +6,7 @@ by something that depends on its rate, or rate-independent, in which case the tr
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -14,6 +15,7 @@ import symengine
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
 from surfacechem.model.automaton import Edge, Equilibrium, When
+from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import KEYS, LENGTH, Direction, FarField, Held, far_field
 from surfacechem.model.constraints.breaking import broken
@@ -145,7 +147,7 @@ def _sliding_velocity(build: Build, kind: Kind) -> Expression:
     return build.name(VARIABLES[kind.d.velocity], slip**2 * rate)
 
 
-def motion(build: Build, kind: Kind) -> None:
+def motion(build: Build, kind: Kind) -> Iterator[Power]:
     """Balance of the tractions in one direction, and the transitions between sticking and sliding."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
@@ -164,10 +166,11 @@ def motion(build: Build, kind: Kind) -> None:
     slides = build.variables.get("direction", "sliding") ** 2 if kind.sticks else symengine.Integer(kind.slides)
     if far is not None:
         derived = rate == symengine.Symbol("v_t") and not kind.inertial
-        far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
+        yield from far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
         _balance(build, kind, far, slides, t_f, carried, t_a)
     else:
-        build.supply("W_t", "work of the far field on the tangential displacement", (carried + t_a) * rate, None)
+        text = "work of the far field on the tangential displacement"
+        yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
     if t_e is not None:
         _elastic_rows(build, kind, slides, t_f, t_e, v)
     name_traction(build, d, slides, t_a + carried, t_a + (carried if kind.elastic else needed))

@@ -6,10 +6,11 @@ the plane, which both share.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from surfacechem.expressions import Expression, norm, sign, where
+from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG
 from surfacechem.model.sliding import plane, slip
@@ -60,10 +61,10 @@ def _along_displacement(build: Build) -> Expression:
     return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
 
 
-def tangential_motion(build: Build) -> None:
+def tangential_motion(build: Build) -> Iterator[Power]:
     """Balance of the tangential tractions, and the transitions between sticking and sliding."""
     if _in_the_plane(build.motion.slips):
-        plane.motion(build, build.motion.slips)
+        yield from plane.motion(build, build.motion.slips)
         return
     for kind in build.motion.slips:
-        slip.motion(build, kind)
+        yield from slip.motion(build, kind)
