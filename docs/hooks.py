@@ -254,7 +254,7 @@ def made_mechanisms() -> str:
 
 def made_rate_types() -> str:
     """Every rate type of a mechanism with its own keys, formula and source."""
-    from surfacechem.mechanism.kinds import PREFIX, kinds
+    from surfacechem.mechanism.rate_types import PREFIX, kinds
 
     rows = []
     for kind, law in sorted(kinds().items()):

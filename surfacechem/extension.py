@@ -20,15 +20,14 @@ import cantera
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.mechanism.affinity import AffinityReaction
 from surfacechem.mechanism.keys import REACTION
-from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import sides
 from surfacechem.mechanism.thermo import KILO
 from surfacechem.mechanism.values import converted
-from surfacechem.quantities import VARIABLES
+from surfacechem.quantities import BOLTZMANN, VARIABLES
 
 __all__ = ["LoadedInterface"]
 
@@ -219,7 +218,7 @@ class AffinityRate(LoadedRate):
         law = self.bound
         assert isinstance(law, AffinityReaction)
         x = sum(nu * data.potentials[name] for name, nu in law.change.items())
-        ratio = law.drive(x) / math.expm1(min(x, LARGEST)) if x else 1.0
+        ratio = -law.net(1.0, x * BOLTZMANN * data.T, data.T) / math.expm1(min(x, LARGEST)) if x else 1.0
         for name, order in law.orders.items():
             ratio /= max(data.coverages[name], FLOOR) ** order
         return float(super().eval(data) * ratio)

@@ -13,9 +13,8 @@ from surfacechem.contracts.terms import reads
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.bonds import LoadedReaction
-from surfacechem.mechanism.kinds import kind_of
 from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rate_types import LoadedReaction, kind_of
 
 KMOL = 1000 * AVOGADRO
 SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))

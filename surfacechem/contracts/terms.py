@@ -211,8 +211,14 @@ class RateFactor(Law):
 
     contract = "rate factor"
     formula = "log_factor"
-
+    rate_type: ClassVar[str]
+    """Name in a mechanism of an Arrhenius rate that it multiplies."""
     log_factor: ClassVar[Callable[..., Expression]]
+
+    @property
+    def work_distance(self) -> Expression | None:
+        """Distance [m] along the force per bond whose work is the whole factor; None where it is more than that."""
+        return None
 
 
 class HeatTransfer(Law):

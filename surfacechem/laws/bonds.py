@@ -42,7 +42,14 @@ class BellFactor(RateFactor):
     2.897188
     """
 
+    rate_type = "Bell"
+
     x_beta: float = parameter("m", "distance to the transition state")
+
+    @property
+    def work_distance(self) -> Expression | None:
+        """All of it."""
+        return self.x_beta
 
     def log_factor(self, f: Expression, T_c: Expression) -> Expression:
         """Logarithm of the factor."""
@@ -61,6 +68,8 @@ class DemboFactor(RateFactor):
     >>> round(DemboFactor(stiffness=2e-3, transition_stiffness=1e-3).log_factor(f=4e-12, T_c=300.0), 6)
     0.482865
     """
+
+    rate_type = "Dembo"
 
     stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
@@ -82,6 +91,8 @@ class DemboFormationFactor(RateFactor):
     >>> round(DemboFormationFactor(stiffness=2e-3, transition_stiffness=1e-3).log_factor(f=4e-12, T_c=300.0), 6)
     -0.482865
     """
+
+    rate_type = "Dembo-formation"
 
     stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
@@ -110,6 +121,8 @@ class TwoPathwayFactor(RateFactor):
     [4.6151, 0.884, 2.4143]
     """
 
+    rate_type = "two-pathway"
+
     x_slip: float = parameter("m", "distance to the barrier of the slip pathway", at_least=0)
     x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
     catch_ratio: float = parameter("1", "rate of the catch pathway over that of the slip pathway, at no force", above=0)
@@ -134,6 +147,8 @@ class DudkoFactor(RateFactor):
     >>> round(law.log_factor(f=50e-12, T_c=300.0), 6)
     4.243938
     """
+
+    rate_type = "Dudko-Hummer-Szabo"
 
     x_beta: float = parameter("m", "distance to the transition state at no force", above=0)
     barrier: float = parameter("J", "free energy of activation at no force", above=0)
@@ -167,6 +182,8 @@ class GapFactor(RateFactor):
     >>> round(GapFactor(stiffness=1e-3, rest_length=2e-8).log_factor(g_n=2.4e-8, T_c=300.0), 6)
     -1.931459
     """
+
+    rate_type = "gap-attachment"
 
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
     rest_length: float = parameter("m", "gap at which the tether is not stretched", default=0.0)

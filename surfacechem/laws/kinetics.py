@@ -155,6 +155,13 @@ class KamalSourour(RateLaw):
 
     def rate(self, phi: Expression, n_c: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        thermal = GAS_CONSTANT * T_c
-        k_1, k_2 = scaled_exp(self.A_1, -self.E_1 / thermal), scaled_exp(self.A_2, -self.E_2 / thermal)
-        return n_c * (k_1 + k_2 * power(phi, self.m)) * power(1 - phi, self.n)
+        k_1 = scaled_exp(self.A_1, -self.E_1 / (GAS_CONSTANT * T_c))
+        return n_c * (k_1 + autocatalysis(self.A_2, self.E_2, self.m, phi, T_c)) * power(1 - phi, self.n)
+
+
+def autocatalysis(
+    A: Expression, E: Expression, m: Expression, phi: Expression, T_c: Expression, shift: Expression = 0
+) -> Expression:
+    """Rate constant A e^(-E / R_g T) phi^m [1/s] that is due to what has formed, times exp(shift)."""
+    # As a power it is nothing where nothing has formed: what waits for its own product does not begin by itself.
+    return scaled_exp(A, shift - E / (GAS_CONSTANT * T_c)) * power(phi, m)

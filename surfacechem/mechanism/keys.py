@@ -8,7 +8,7 @@ from typing import Any
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism import values
 from surfacechem.mechanism.interaction import MODEL, check_dependence
-from surfacechem.mechanism.kinds import kind_of, kinds, names
+from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius, SurfaceReaction
 from surfacechem.mechanism.remedies import (
     CHARGED,

@@ -18,9 +18,9 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
 from surfacechem.mechanism.interaction import interactions
 from surfacechem.mechanism.keys import check, has_neighbours
-from surfacechem.mechanism.kinds import kind_of, names
 from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
 from surfacechem.mechanism.neighbours import Neighbour, hold, remarks
+from surfacechem.mechanism.rate_types import kind_of, names
 from surfacechem.mechanism.rates import plain
 from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import LIMITS, Source, sides

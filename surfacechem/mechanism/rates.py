@@ -1,7 +1,7 @@
-"""Rates of surface reactions: mass action whose reverse follows from the thermo, and one class per rate type.
+"""Rates of surface reactions: mass action whose reverse follows from the thermo, and Cantera's Arrhenius coefficient.
 
-To add a rate type, subclass :class:`SurfaceReaction`, give it Cantera's name of the type as ``kind`` and state its
-``coefficient``; for one that multiplies an Arrhenius coefficient see :mod:`surfacechem.mechanism.bonds`.
+The other rate types are in :mod:`surfacechem.mechanism.rate_types`. A factor of load in :mod:`surfacechem.laws.bonds`
+is one by its ``rate_type``; any other is a subclass with Cantera's name of the type as ``kind`` and a ``coefficient``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from surfacechem.mechanism.kinds import kind_of
+from surfacechem.mechanism.rate_types import kind_of
 from surfacechem.mechanism.source import sides
 
 LEAVE = "With `solver: cantera` under `run` Cantera evaluates it."

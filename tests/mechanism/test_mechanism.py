@@ -22,8 +22,8 @@ from mechanisms import (
     values,
 )
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.kinds import kinds
 from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rate_types import kinds
 from surfacechem.mechanism.rates import InterfaceArrhenius
 
 TOLERANCE = 1e-12

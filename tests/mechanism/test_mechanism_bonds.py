@@ -17,9 +17,8 @@ from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttac
 from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.bonds import LoadedReaction
-from surfacechem.mechanism.kinds import names
 from surfacechem.mechanism.mixture import AVOGADRO
+from surfacechem.mechanism.rate_types import LoadedReaction, names
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit

@@ -16,8 +16,7 @@ from surfacechem.documents.shipped import mechanisms
 from surfacechem.errors import InputError, Place
 from surfacechem.format import load_text
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.affinity import AffinityReaction
-from surfacechem.mechanism.kinds import kinds
+from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 
 FREE = ("description", "note")
 """Text that is not read."""
