@@ -94,13 +94,17 @@ class Tree:
 
     def text(self, what: str) -> str:
         """A text that is not empty."""
-        if not isinstance(self.value, str) or not self.value.strip():
+        if self.value is None or (isinstance(self.value, str) and not self.value.strip()):
+            raise self.error(f"{what} is empty; give a text, or leave the key out.")
+        if not isinstance(self.value, str):
             raise self.error(f"{what} must be a text, not {self.shown}.")
         return self.value
 
     def choice(self, what: str, known: Iterable[str]) -> str:
         """One of some names."""
         options = list(known)
+        if self.value is None or isinstance(self.value, dict | list):
+            raise self.error(f"the {what} must be a name, not {self.shown}.{suggestion('', options)}")
         if not isinstance(self.value, str) or self.value not in options:
             raise self.error(f"no {what} {self.shown}.{suggestion(str(self.value), options)}")
         return self.value

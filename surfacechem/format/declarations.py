@@ -170,8 +170,8 @@ class Text(Content):
         return tree.text(name).strip()
 
     def schema(self) -> Schema:
-        """A string."""
-        return {"type": "string"}
+        """A string that is not empty."""
+        return {"type": "string", "pattern": r"\S"}
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ class ListOf(Content):
             raise tree.error(f"{name} needs {self.count} entries, got {len(entries)}.")
         if isinstance(self.content, OneLaw) and len(entries) > MOST:
             raise entries[MOST].error(f"more than {MOST} laws in a list.")
-        return tuple(self.content.read(entry, name, context) for entry in entries)
+        return tuple(self.content.read(entry, f"an entry of {name}", context) for entry in entries)
 
     def schema(self) -> Schema:
         """An array; one that may be empty may be left out."""
@@ -241,9 +241,11 @@ class OneLaw(Content):
 
     @property
     def example(self) -> str:
-        """A law of this contract as it stands in a list."""
+        """A law of this contract as it stands in a list, with what it needs, or its first parameter."""
         first = next(iter(laws.laws(self.contract).values()))
-        return f"- {first.name()}: {{{', '.join(f'{name}: ...' for name in law_keys(first))}}}"
+        needed = [name for name, declared in law_keys(first).items() if declared.required]
+        needed = needed or [name for name, _ in first.specs()][:1]
+        return f"- {first.name()}: {{{', '.join(f'{name}: ...' for name in needed)}}}"
 
     def read(self, tree: Tree, name: str, context: Context) -> Any:
         """The law, which knows its place."""
@@ -360,6 +362,8 @@ class Entries(Content):
     units: Mapping[str, str] = field(default_factory=dict)
     """Units of names that are no variables of the case."""
     what: str = "keys"
+    by_scene: bool = False
+    """Whether the scene refuses what is not known, as it can tell which names it has."""
     at_most: int | None = None
     """How many there may be; then there is at least one."""
     wanted: str = ""
@@ -368,20 +372,19 @@ class Entries(Content):
 
     def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
         """The values by name."""
-        got = f"{len(tree.value)} entries" if isinstance(tree.value, dict) else tree.shown
-        if self.wanted and not (isinstance(tree.value, dict) and 1 <= len(tree.value) <= (self.at_most or math.inf)):
-            raise tree.error(f"{self.wanted}, not {got}.")
+        count = len(tree.value) if isinstance(tree.value, dict) else 0 if tree.value is None else 1
+        if self.wanted and not (isinstance(tree.value, dict) and 1 <= count <= (self.at_most or math.inf)):
+            got = "; none is given" if not count else f"; {count} are given" if count > 1 else f", not {tree.shown}"
+            raise tree.error(f"{self.wanted}{got}.")
         known = [*self.each, *self.names(context)] if self.names else None if self.others else [*self.each]
-        units = {**self.units, **context.units}
-        return {
-            key: self._content(key).read(child, key, replace(context, x=units.get(key, "1")))
-            for key, child in tree.mapping(known, self.what).items()
-        }
-
-    def _content(self, name: str) -> Content:
-        content = self.each[name].content if name in self.each else self.others
-        assert content is not None
-        return content
+        units, found = {**self.units, **context.units}, {}
+        for key, child in tree.mapping(None if self.by_scene else known, self.what).items():
+            content = self.each[key].content if key in self.each else self.others
+            if known is not None and key not in known:  # refused by the scene, which knows better what it has
+                content = Unread()
+            assert content is not None
+            found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
+        return found
 
     def schema(self) -> Schema:
         """An object with these names."""
@@ -418,13 +421,25 @@ class Shapes(Content):
         shape = self.mapping if isinstance(tree.value, dict) else self.items if isinstance(tree.value, list) else None
         content = shape or self.value or self.items
         assert content is not None
-        if self.wanted and isinstance(content, OneOf) and tree.value not in content.names():
-            raise tree.error(self.wanted)
+        if self.wanted and isinstance(content, OneOf) and not (isinstance(tree.value, str) and tree.value):
+            raise tree.error(f"{self.wanted}, not {tree.shown}.")
         return content.read(tree, name, context)
 
     def schema(self) -> Schema:
         """Any of the shapes."""
         return {"anyOf": [content.schema() for content in self._contents]}
+
+
+class Unread(Content):
+    """A name that no case has; its value has no meaning."""
+
+    def read(self, tree: Tree, name: str, context: Context) -> float:
+        """Not a number."""
+        return math.nan
+
+    def schema(self) -> Schema:
+        """Nothing may stand there."""
+        return {"not": {}}
 
 
 @dataclass(frozen=True)
@@ -470,14 +485,13 @@ class Key:
         """Unit of a number; empty where it is none."""
         return self.content.spec.unit if isinstance(self.content, Number) else ""
 
-    @property
-    def meaning(self) -> str:
-        """The meaning, with the unit of a number."""
-        return f"{self.text} [{self.unit}]" if self.unit else self.text
+    def meaning(self, x: str = "x") -> str:
+        """The meaning, with the unit of a number, in which "[x]" stands for that of another variable."""
+        return f"{self.text} [{resolved_unit(self.unit, x)}]" if self.unit else self.text
 
     def schema(self) -> Schema:
         """JSON Schema of the value, with meaning and default."""
-        found = {**self.content.schema(), "description": self.meaning}
+        found = {**self.content.schema(), "description": self.meaning()}
         return {**found, "default": self.default} if isinstance(self.default, str | float | int) else found
 
 
@@ -595,7 +609,8 @@ def _values(declared: Mapping[str, Key], tree: Tree, context: Context, called: s
     given = tree.mapping(declared)
     for name, item in declared.items():
         if item.required and name not in given:
-            raise tree.error(f"{called or tree.place.path.rpartition('.')[2]} needs `{name}`: {item.meaning}.")
+            subject = called or tree.place.path.rpartition(".")[2]
+            raise tree.error(f"{subject} needs `{name}`: {item.meaning(context.x)}.")
     return {name: item.content.read(given[name], name, context) for name, item in declared.items() if name in given}
 
 

@@ -307,7 +307,9 @@ def _stage(name: str, section: StageSection) -> Stage:
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
-    """Initial values by variable; whether each evolves, the assembly decides."""
+    """Initial values by variable, not a number for names that no variable has; whether each evolves, and what its names
+    may be, the assembly decides.
+    """
     values = dict(case.initial or {})
     given = values.pop("coverages", None)
     if mechanism is not None and given is not None:

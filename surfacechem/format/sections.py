@@ -70,6 +70,8 @@ def _variables(names: Sequence[str], content: Content) -> dict[str, Key]:
 class CellAccuracy(Section):
     """accuracy by which a run chooses the number of cells"""
 
+    called = "a choice of cells"
+
     accuracy: float = quantity("1", "relative accuracy of temperatures", REQUIRED, above=0, at_most=0.1)
 
 
@@ -99,7 +101,7 @@ class ConductionSection(Section):
         Shapes(
             OneOf("far side", lambda: (INSULATED,)),
             Nested(FarSide),
-            wanted="the far side is `insulated`, {temperature: 25 degC}, or {temperature: 25 degC, h: 10 W/m^2/K}.",
+            wanted="the far side is `insulated`, {temperature: 25 degC}, or {temperature: 25 degC, h: 10 W/m^2/K}",
         ),
         "far side",
         INSULATED,
@@ -222,6 +224,8 @@ class InterfaceSection(Section):
 class SurroundingsSection(Section):
     """a third heat bath, `{temperature: ...}`"""
 
+    called = "the section surroundings"
+
     temperature: Load = key(Prescribed("K", above_zero=True), "temperature of the surroundings", REQUIRED)
 
 
@@ -294,6 +298,7 @@ INITIAL = Entries(
     lambda case: case.temperatures,
     NODE.pattern,
     what="variables",
+    by_scene=True,
     words="values by variable",
 )
 
@@ -353,7 +358,12 @@ def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
         yield from ((item.name, item.metadata["spec"]) for item in dataclasses.fields(references.get(name)))  # type: ignore[arg-type]
 
 
-REFERENCE = Shapes(OneOf("exact solution", references.names), Nested(ReferenceSection))
+REFERENCE = Shapes(
+    OneOf("exact solution", references.names),
+    Nested(ReferenceSection),
+    wanted="an exact solution is given by its name, for example `reference: exothermic-bonding`, or as "
+    "`{name: ..., parameters}`",
+)
 """An exact solution, by name or with its parameters."""
 
 
@@ -368,6 +378,8 @@ class RangeSection(Section):
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the values", LINEAR)
 
 
+OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
+
 SWEPT = Shapes(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
 """Values of a swept parameter, in its unit."""
 
@@ -375,8 +387,7 @@ SWEPT_BY_PATH = Entries(
     others=Later(SWEPT),
     pattern=lambda: rf"({'|'.join(keys(Document))})(\.[^.]+)*",
     at_most=MOST_AXES,
-    wanted="a sweep needs `over`: one or two parameters, for example "
-    "`over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}`",
+    wanted=f"a sweep needs `over`: one or two parameters, for example `{OVER}`",
 )
 
 UNTIL = Entries(
@@ -395,7 +406,9 @@ class SweepSection(Section):
     called = "a sweep"
 
     over: Mapping[str, Tree] = key(
-        SWEPT_BY_PATH, "values of one or two parameters by path: a list, or `{from, to, points, spacing}`", REQUIRED
+        SWEPT_BY_PATH,
+        f"values of one or two parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
+        REQUIRED,
     )
     until: Mapping[str, float] | None = key(
         UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"

@@ -175,7 +175,10 @@ def _refuse_idle_initial_values(build: Build) -> None:
             message = f"{name} is prescribed under `loading`, so it has no initial value; remove one of them."
             raise InputError(message, path=f"initial.{name}")
         if build.variables.has(name):
+            symbol = build.variables.get(name, "the initial value")
+            same = next((state.name for state in build.states if state.symbol == symbol), None)
             message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
+            message = f"{name} is {same} in this case; give `{same}` instead." if same else message
             raise InputError(message, path=f"initial.{name}")
         if name in ("phi", "ln_phi"):
             message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."

@@ -153,7 +153,10 @@ class Build(Draft):
     def initial(self, name: str) -> float:
         """Initial value of a state; InputError where the case gives none."""
         if name not in self.scene.initial:
-            raise InputError(f"{name} evolves but has no initial value. Add `{name}:` under `initial`.", path="initial")
+            unknown = [other for other, value in self.scene.initial.items() if math.isnan(value)]
+            misspelt = f"; '{unknown[0]}' there is no variable" if unknown else ""
+            message = f"{name} evolves but has no initial value. Add `{name}:` under `initial`{misspelt}."
+            raise InputError(message, path="initial")
         return self.scene.initial[name]
 
     def areal(self, quantity: Quantity, nominal: Expression) -> Expression:

@@ -180,14 +180,14 @@ def _check(solution: Solution, run: Trajectory) -> None:
     """Refuse a solution that does not satisfy the scene's equations."""
     if len(run.result.times) < 2:
         return  # the run ended at its start
+    system, problem, program = run.model.system, run.result.problem, run.model.program
     probes, since = _probes(run)
     y, ydot, rounding = _along(solution, run, probes, since)
     _check_given(solution(probes), run, run.model.evaluate(run.result, probes, y, ydot), probes)
-    problem, program = run.result.problem, run.model.program
     segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
     inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
     misses = program.residual(inputs)
-    by_rate = program.derivatives(inputs)[1]
+    by_state, by_rate = program.derivatives(inputs)
     terms = by_rate * ydot[:, None, :]
     known = (np.abs(by_rate) * rounding[:, None, :]).sum(axis=2)
     misses -= np.clip(misses, -known, known)
@@ -195,9 +195,20 @@ def _check(solution: Solution, run: Trajectory) -> None:
     # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)
     parts = np.abs(misses) / np.where(largest > 0, largest, 1.0)
+    # A balance without rates has no size of its own, as its terms cancel. It says where the algebraic states are, so
+    # that it is missed by as much as they are off: the correction of Newton's method, in parts of them.
+    still, algebraic = ~by_rate.any(axis=(0, 2)), np.array([state.algebraic for state in system.states])
+    if still.any():
+        reach = np.abs(y[:, algebraic]).max(axis=0)
+        reach = np.where(reach > 0, reach, [state.scale for state in system.states if state.algebraic])
+        for part, miss, slopes in zip(
+            parts, misses[:, still], by_state[:, still][:, :, algebraic] * reach, strict=True
+        ):
+            if np.all(np.isfinite(miss)) and np.all(np.isfinite(slopes)):
+                part[still] = np.abs(np.linalg.lstsq(slopes, -miss)[0]).max()
     if parts.max() > MISMATCH:
         j, row = np.unravel_index(parts.argmax(), parts.shape)
-        equation = list(run.model.system.rows)[row]
+        equation = list(system.rows)[row]
         raise InputError(f"at t = {probes[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
 
 

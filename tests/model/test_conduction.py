@@ -322,7 +322,7 @@ def test_an_initial_temperature_of_a_body_is_that_of_all_its_cells():
         ("far: {temperature: 330 K}", "far: warm", "the far side is `insulated`"),
         ("far: {temperature: 330 K}", "far: {h: 3}", "the far side needs `temperature`"),
         ("C: 4 kJ/m^2/K, ", "", "conducts heat but stores none"),
-        ("T_1: 400 K", "T_1: 400 K, profile_3: 300 K", "unknown key 'profile_3'. Did you mean 'profile_1'?"),
+        ("T_1: 400 K", "T_1: 400 K, profile_3: 300 K", "'profile_3'. Did you mean 'profile_1'?"),
         ("T_1: 400 K", "T_1: 400 K, profile_1: -1 K", "profile_1"),
         ("[lower, upper]", "[lower, surroundings]", "would end at its contact"),
         ("0.2 W/m/K", "{value: 0.2, times: [linear: {of: T_2, slope: 1}]}", "varies with its own temperature only"),

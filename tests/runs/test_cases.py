@@ -13,11 +13,12 @@ from case_runs import load, solved
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.format import names
+from surfacechem.format import load_text, names
 from surfacechem.model.assemble import assemble
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import largest_errors
 from surfacechem.results.error_estimates import against_exact, against_tighter, floor
+from surfacechem.runs.simulation import Simulation
 
 STOPPED = {
     "cooling-to-zero": "the temperature T reached zero",
@@ -144,6 +145,29 @@ def test_an_exact_solution_of_another_scene_is_not_used():
     assert "it misses the equation of T by" in other.source
     third = surfacechem.run("exothermic", ["reference=sliding"]).accuracy
     assert "it says nothing of phi" in third.source
+
+
+SHEARED_FILM = """
+T_0: 300 K
+bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
+interface:
+  temperature: T_c
+  medium: {thickness: 5 um, conductivity: 0.13 W/m/K, viscosity: 0.01 Pa s}
+  friction: [film-shear]
+heat: [film: {between: [lower, upper], closure: medium}]
+loading: {v: 30 m/s, p: {ramp: {rate: 1 MPa/s}}}
+initial: {T_c: 300 K}
+run: {until: 1 ms, outputs: 21}
+reference: couette-flow
+"""
+
+
+def test_an_exact_solution_is_held_against_balances_without_rates():
+    accuracy = Simulation(load_text(SHEARED_FILM)).run().accuracy
+    assert accuracy.source == "exact solution couette-flow"
+    assert accuracy.error < 1e-12
+    rubbing = SHEARED_FILM.replace("[film-shear]", "[film-shear, coulomb: {mu: 0.1}]")
+    assert "it misses the equation of T_c by" in Simulation(load_text(rubbing)).run().accuracy.source
 
 
 @pytest.mark.parametrize(
