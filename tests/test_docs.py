@@ -15,7 +15,6 @@ import pytest
 import surfacechem
 from surfacechem.documents.document import parse
 from surfacechem.format import names
-from surfacechem.model.assemble import assemble
 from surfacechem.solve.radau import stepper
 
 pytestmark = pytest.mark.around
@@ -155,7 +154,7 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
 
 
 def test_the_page_on_events_names_every_transition():
-    """Those that the assembly spells out, those of the shipped cases, and those at the bounds of the bonding state."""
+    """Those that the assembly spells out, and those of the shipped cases."""
     calls = (node for path in (ROOT / "surfacechem" / "model").rglob("*.py") for node in ast.walk(parsed(path)))
     spelt = {
         call.args[0].value
@@ -165,7 +164,6 @@ def test_the_page_on_events_names_every_transition():
     }
     assert {"soften", "tear", "rejoin", "open"} <= spelt
     systems = [surfacechem.load(name).system for name in names()]
-    systems.append(assemble(surfacechem.load("exothermic").case.scene, frozenset((-1, 1))))
     happen = {item.name for system in systems for item in system.edges}
     assert {"loosen", "debond", "snap"} <= happen
     page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")

@@ -151,6 +151,9 @@ class RateLaw(Law):
     contract = "bonding"
     formula = "rate"
 
+    keeps_range: ClassVar[bool] = False
+    """Whether its form keeps phi between zero and one, or below phi_max where it reads the partners n_1 and n_2; what
+    any other law carries to a bound is held there."""
     rate: ClassVar[Callable[..., Expression]]
 
     def stoichiometry(self) -> Mapping[str, int | float]:

@@ -201,6 +201,8 @@ class GapFactor(RateFactor):
 class StatedBothWays(RateLaw):
     """Bonds that form and break at coefficients of their own; subclasses state these."""
 
+    keeps_range = True
+
     @abstractmethod
     def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
         """Of formation and of rupture: the rate at no force [1/s] and the logarithm of the factor of the force."""
@@ -381,6 +383,8 @@ class GapAttachment(RateLaw):
     >>> GapAttachment(k_on=10.0, stiffness=1e-3, rest_length=2e-8).rate(phi=0.5, n_c=1.0, g_n=2e-8, T_c=300.0)
     5.0
     """
+
+    keeps_range = True
 
     k_on: float = parameter("1/s", "rate of formation at the rest length", at_least=0)
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)

@@ -81,6 +81,8 @@ class Arrhenius(RateLaw):
     1e+18
     """
 
+    keeps_range = True
+
     A: float = parameter("1/s", "pre-exponential factor", at_least=0)
     E_a: float = parameter("J/mol", "activation energy", default=0.0)
     b: float = parameter("1", "temperature exponent", default=0.0)
@@ -104,6 +106,8 @@ class MassAction(RateLaw):
     1e+16
     """
 
+    keeps_range = True
+
     k_on: float = parameter("1/s", "rate of formation", at_least=0)
     k_off: float = parameter("1/s", "rate of rupture", at_least=0)
 
@@ -125,6 +129,8 @@ class Bimolecular(RateLaw):
     2500000000000000.0
     """
 
+    keeps_range = True
+
     k_f: float = parameter("m^2/s", "rate coefficient of formation", at_least=0)
     k_r: float = parameter("1/s", "rate of rupture", at_least=0)
 
@@ -145,6 +151,8 @@ class KamalSourour(RateLaw):
     >>> KamalSourour(A_1=1.0, A_2=4.0, m=0.5, n=2.0).rate(phi=0.25, n_c=1e16, T_c=300.0)
     1.6875e+16
     """
+
+    keeps_range = True
 
     A_1: float = parameter("1/s", "pre-exponential factor without bonds", at_least=0)
     A_2: float = parameter("1/s", "pre-exponential factor of autocatalysis", at_least=0)

@@ -22,14 +22,13 @@ from surfacechem.model.components.logarithms import logarithmic_state
 from surfacechem.model.components.medium import medium
 from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
 from surfacechem.model.components.temperatures import temperatures
-from surfacechem.model.constraints.bounds import released
+from surfacechem.model.constraints.bound import released
 from surfacechem.model.constraints.folds import folds
 from surfacechem.model.constraints.impact import impacts, missed
 from surfacechem.model.constraints.limits import bonded_mode, limits
 from surfacechem.model.constraints.load_steps import load_steps
 from surfacechem.model.constraints.relaxing import relaxing
 from surfacechem.model.constraints.softening import apart_from_envelope, softening_mode
-from surfacechem.model.holding import Holding
 from surfacechem.model.ledger import flow, regime, sinks, state, totals
 from surfacechem.model.sliding.creep import stands_for_velocity
 from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
@@ -78,13 +77,9 @@ STAGES = (
 )
 
 
-def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
-    """The system of a scene; InputError where a variable that is read has no role, or two.
-
-    ``sides`` are the bounds at which the bonding state is held, -1 for zero and 1 for the upper one; without them those
-    that the values of the scene need.
-    """
-    build = Build(scene, sides)
+def assemble(scene: Scene) -> System:
+    """The system of a scene; InputError where a variable that is read has no role, or two."""
+    build = Build(scene)
     for stage in STAGES:
         for power in stage(build) or ():
             state(build, power)
@@ -131,17 +126,8 @@ def assemble(scene: Scene, sides: frozenset[int] | None = None) -> System:
             *(f"loading: {name} is prescribed but nothing reads it." for name in unread),
         ),
         outside=_outside(build),
-        holding=_holding(build),
-        origin=partial(assemble, scene, sides),
+        origin=partial(assemble, scene),
     )
-
-
-def _holding(build: Build) -> Holding | None:
-    decision = build.decision
-    if decision is None:
-        return None
-    sides = decision.usual if build.sides is None else build.sides
-    return Holding(sides, decision.paths, decision.needed, partial(assemble, build.scene))
 
 
 def _is_there(build: Build, role: Role) -> bool:

@@ -76,10 +76,6 @@ class Draft:
     """The system under construction."""
 
     scene: Scene
-    sides: frozenset[int] | None = None
-    """Bounds at which the bonding state is held: -1 is zero, 1 the upper one; those that it needs where None."""
-    decision: Any = None
-    """What tells which bounds are needed, where the bonding state evolves."""
     parameters: Parameters = field(init=False)
     variables: Variables = field(init=False)
     t: Any = field(default_factory=lambda: symengine.Symbol("t"))

@@ -17,7 +17,6 @@ from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Sink, When, masked
 from surfacechem.model.conductors import Conductor, Profile
-from surfacechem.model.holding import Holding
 from surfacechem.model.refit import Fit
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Engine
@@ -272,8 +271,6 @@ class System:
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None
-    holding: Holding | None = None
-    """How the bonding state is held at its bounds, where a law could carry it there."""
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
     """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change
     unless they are assembled with another value."""

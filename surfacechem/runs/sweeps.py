@@ -73,9 +73,6 @@ def prepared(system: System, plan: Plan) -> System:
     if plan.until is None:
         return system
     origin = partial(prepared, system, plan)
-    if (holding := system.holding) is not None:
-        again = replace(holding, again=lambda sides: prepared(holding.again(sides), plan))
-        system = replace(system, holding=again)
     spectrum.history(system, plan.until[0])
     if spectrum.breaks_bonds(system):
         return replace(spectrum.with_rupture(system, plan.until[0]), origin=origin)
@@ -100,8 +97,6 @@ def solve(
     """
     run = model.chosen(run)
     values = [model.values({**(changes or {}), **point}) for point in plan.points]
-    if (suited := model.suited(values)) is not model:
-        model, values = suited, [suited.adopted(point) for point in values]
     pairs = list(zip(settings(model.system, plan, run, values), values, strict=True))
     return Sweep(model, plan, run, model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=nudged))
 

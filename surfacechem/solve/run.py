@@ -186,8 +186,6 @@ class Model:
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         self.system = system
-        self._others: dict[frozenset[int], Model] = {system.holding.sides: self} if system.holding else {}
-        """Models of the same scene by the bounds at which its bonding state is held."""
         self.margins = system.moving_margins()
         """The margins that can close on the way; the rest is checked at the start only."""
         self.program: Program = compile_program(
@@ -293,24 +291,7 @@ class Model:
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""
-        values = self.values(changes)
-        model = self.suited([values])
-        return model.solve_values(run, values if model is self else model.adopted(values))
-
-    def suited(self, points: Sequence[Mapping[str, float]]) -> Model:
-        """The model of the same scene with the bounds of the bonding state that values need; as a rule this one."""
-        holding = self.system.holding
-        if holding is None:
-            return self
-        sides = holding.needed_by(points)
-        if sides not in self._others:
-            self._others[sides] = Model(holding.again(sides))
-            self._others[sides]._others = self._others
-        return self._others[sides]
-
-    def adopted(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Values of a model with other bounds as those of this one."""
-        return {path: values.get(path, own) for path, own in self.values().items()}
+        return self.solve_values(run, self.values(changes))
 
     def resolve(self, trajectory: Trajectory, rtol: float) -> Trajectory:
         """The same run at another tolerance, looked at elsewhere and more often.

@@ -19,7 +19,7 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.force import RESOLUTION, SHARED
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.components.pulled import book_work, by_affinity, dead_load
-from surfacechem.model.constraints.bounds import free_to_react
+from surfacechem.model.constraints.bound import free_to_react
 from surfacechem.model.constraints.closing import TOUCHING
 from surfacechem.model.constraints.softening import softening, within_reach
 from surfacechem.model.draft import Bond

@@ -1,0 +1,106 @@
+r"""Bounds of the bonding state: :math:`0 \le \phi \le \phi_{max}`, a differential inclusion.
+
+.. math:: N_c\,\dot\phi \in J_c R - \mathcal{N}_{[0, \phi_{max}]}(\phi)
+
+with the normal cone :math:`\mathcal{N}` of the interval: where a law would carry phi beyond, it is held there until the
+law turns round. Holding does no work and takes no energy, since bonds that are not there cannot break and sites that
+are taken bond no partner. A law that declares ``keeps_range`` needs none of this.
+
+Source: unilateral bounds of the bonding fraction, Sauer, Duong & Mandadapu (2021), section 3.1; projected dynamics as
+in Acary & Brogliato (2008), Numerical Methods for Nonsmooth Dynamical Systems, doi 10.1007/978-3-540-75392-6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import symengine
+
+from surfacechem.contracts.terms import reads
+from surfacechem.expressions import Expression, where
+from surfacechem.model.automaton import Edge
+from surfacechem.model.build import Build
+from surfacechem.model.components.logarithms import LOGARITHM
+from surfacechem.quantities import Quantity
+
+INSIDE = 1e-15
+"""Distance from a bound, in parts of the range, at which a law that has no rate at the bound itself is asked there.
+
+An equilibrium that lies nearer, as that of bonds with mixing entropy under a large load does, is one at the bound.
+"""
+
+SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
+
+PHI, LIMIT = symengine.symbols("phi phi_max")
+HELD_AT = {-1.0: "held at zero", 0.0: "between its bounds", 1.0: "held at its upper bound"}
+BOUNDS = (
+    (-1, symengine.Integer(0), INSIDE * LIMIT, "unbonded", "no bond is left", "rebond", "bonds form again"),
+    (1, LIMIT, (1 - INSIDE) * LIMIT, "complete", "bonding is complete", "loosen", "bonds begin to break"),
+)
+"""Side and value of each bound, the value next to it, names and reasons of the edges to the bound and away from it."""
+
+
+def free_to_react(build: Build, rate: Expression) -> Expression:
+    """One while the bonding state is free, zero while it is held at a bound; ``rate`` is what would change it."""
+    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+    if top is None or LOGARITHM in build.scene.initial:
+        return symengine.Integer(1)
+    laws = [law for law in build.interface.reactions if not hasattr(law, "envelope")]
+    if all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws):
+        return symengine.Integer(1)
+    outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
+    sides = [side for side, beyond in outward.items() if beyond != 0]
+    if not sides:
+        return symengine.Integer(1)
+    held = build.mode("held", 0.0, {value: text for value, text in HELD_AT.items() if value == 0 or value in sides})
+    for side, at, _, name, reason, back, why in BOUNDS:
+        if side in sides:
+            # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
+            left = where(outward[side] > 0, side * (at - PHI), 1)
+            turned = build.stretch * outward[side] / build.bonding["phi"].density
+            modes, free = {held: symengine.Integer(side)}, {held: symengine.Integer(0)}
+            build.edges += [
+                Edge(name, left, reason, modes, {PHI: at}, measure="phi", when={held: (0,)}),
+                Edge(back, turned, why, free, when={held: (side,)}),
+            ]
+    return 1 - held**2
+
+
+def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
+    """The rate at a bound; next to it where it has a pole or a logarithm of nothing there; as it is if that fails."""
+    whole = build.expanded(rate)
+    for phi in (at, inside):
+        there = whole.subs({PHI: phi})
+        vanishing = any(logarithm.args[0].subs({PHI: phi}) == 0 for logarithm in whole.atoms(symengine.log))
+        if not vanishing and not there.atoms(*SINGULAR):
+            break
+    else:
+        return rate
+    if there == 0:
+        return symengine.Integer(0)
+    put: dict[Any, Expression] = {PHI: phi}
+    needed = _read(build, rate)
+    for item in [item for item in build.named if item.name in needed]:
+        value = symengine.sympify(item.expression).subs(put)
+        if value != item.expression:
+            quantity = replace(item.quantity, name=f"{item.name}_{name}")
+            put[symengine.Symbol(item.name)] = build.name(quantity, value, output=False)
+    return build.name(Quantity(f"R_{name}", "1/(m^2 s)", "net rate at the bound"), rate.subs(put), output=False)
+
+
+def _read(build: Build, expression: Expression) -> set[str]:
+    """Names of the quantities that an expression reads, also through others."""
+    found = {str(symbol) for symbol in expression.free_symbols}
+    for item in reversed(build.named):
+        if item.name in found:
+            found |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
+    return found
+
+
+def released(build: Build) -> None:
+    """Edges that break bonds at once free the bonding state from a bound that held it."""
+    held = build.find_mode("held")
+    for j, item in enumerate(build.edges):
+        if held is not None and PHI in item.reset and held not in item.modes:
+            build.edges[j] = replace(item, modes={**item.modes, held: symengine.Integer(0)})
