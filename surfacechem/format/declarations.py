@@ -421,8 +421,11 @@ class Shapes(Content):
         shape = self.mapping if isinstance(tree.value, dict) else self.items if isinstance(tree.value, list) else None
         content = shape or self.value or self.items
         assert content is not None
-        if self.wanted and isinstance(content, OneOf) and not (isinstance(tree.value, str) and tree.value):
-            raise tree.error(f"{self.wanted}, not {tree.shown}.")
+        if self.wanted and isinstance(content, OneOf):
+            names = list(content.names())
+            # Among several names the nearest is a better hint than the shapes.
+            if tree.value not in names and (len(names) == 1 or not isinstance(tree.value, str)):
+                raise tree.error(f"{self.wanted}, not {tree.shown}.")
         return content.read(tree, name, context)
 
     def schema(self) -> Schema:
