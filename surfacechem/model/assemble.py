@@ -169,4 +169,5 @@ def _refuse_idle_initial_values(build: Build) -> None:
         if name in ("phi", "ln_phi"):
             message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
             raise InputError(message, path=f"initial.{name}")
-        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, states)}", path=f"initial.{name}")
+        known = {*states, *(slab.profile for slab in build.slabs.values())}
+        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, known)}", path=f"initial.{name}")
