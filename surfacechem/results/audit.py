@@ -297,12 +297,18 @@ class _Books:
         part[1 : 1 + 2 * n] = known
         least = np.zeros(rows.shape[1])
         least[1 : 1 + n] = SLACK * result.problem.atol
-        now = model.output_function(model.program.filled(rows.copy()))[:, columns]
+        filler, filled = model.program.filler, model.program.filled(rows.copy())
+        read = filler.reads(rows) if filler else None
+        now = model.output_function(filled)[:, columns]
         found = EPSILON * np.abs(now)
         for j in range(rows.shape[1]):
-            moved = rows.copy()
+            if filler and j in filler.positions:
+                continue
+            moved = filled.copy()
             moved[:, j] += part[j] * np.abs(rows[:, j]) + least[j]
-            then = model.output_function(model.program.filled(moved))[:, columns]
+            if filler and not np.array_equal(filler.reads(moved), read):  # asking what is outside is slow
+                moved = filler(moved)
+            then = model.output_function(moved)[:, columns]
             found += np.nan_to_num(np.abs(then - now))
         rates = np.zeros(count + 1)
         rates[ends] = found.sum(axis=1)
