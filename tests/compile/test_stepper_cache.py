@@ -99,11 +99,6 @@ def finish(process: subprocess.Popen[str]) -> tuple[str, str]:
     return out.strip(), err
 
 
-def test_second_process_loads(start, tmp_path: Path) -> None:
-    assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
-    assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
-
-
 def test_two_processes_at_once(start, tmp_path: Path) -> None:
     both = [start(tmp_path / "cache") for _ in range(2)]
     assert all(finish(process)[0].endswith("filled True") for process in both)
@@ -124,15 +119,15 @@ def test_a_filled_cache_stays_filled_while_another_process_writes_to_it(start, t
     assert is_filled(folder)
 
 
-@pytest.mark.parametrize("last", range(len(STEPS) + 1))
-def test_what_a_killed_process_leaves_is_in_nobodys_way(start, tmp_path: Path, last: int) -> None:
-    killed = start(tmp_path / "cache", BY_STEPS)
-    for step in pauses(killed):
-        if step == last:
-            killed.kill()
-            break
-    killed.communicate()
-    assert killed.returncode < 0
+def test_what_killed_processes_leave_is_in_nobodys_way(start, tmp_path: Path) -> None:
+    for last in range(len(STEPS) + 1):
+        killed = start(tmp_path / "cache", BY_STEPS)
+        for step in pauses(killed):
+            if step == last:
+                killed.kill()
+                break
+        killed.communicate()
+        assert killed.returncode < 0
     assert finish(start(tmp_path / "cache"))[0] == "hits 0 filled True"
     assert finish(start(tmp_path / "cache"))[0] == "hits 1 filled True"
 
@@ -211,21 +206,40 @@ def test_what_is_no_code_is_not_loaded(tmp_path: Path, content: bytes) -> None:
     assert objectcode.load(tmp_path / "folder") is None
 
 
-def test_a_command_runs_where_the_cache_is_damaged(kept: Path, tmp_path: Path) -> None:
-    """Code that is cut off is not called but made anew; the run is that of every other day."""
+@pytest.fixture
+def cut_off(kept: Path, tmp_path: Path) -> Path:
+    """A cache whose code for brief processes is cut off."""
     folder = tmp_path / "cache" / kept.name
     shutil.copytree(kept, folder)
     with (folder / objectcode.FILE).open("r+b") as file:
         file.truncate(1000)
+    return folder
+
+
+def test_code_that_is_cut_off_is_not_called_but_made_anew(cut_off: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    monkeypatch.setenv("SURFACECHEM_CACHE", str(cut_off.parent))
+    monkeypatch.setattr(stepper._Loaded, "kernel", None)
+    monkeypatch.setattr(stepper, "_compiled", lambda: made.append(stepper._folder()) or len)
+    stepper.load_briefly()
+    assert stepper._Loaded.kernel is None
+    assert not stepper.is_compiled()
+    assert stepper.run_batch() is len
+    assert made == [cut_off]
+
+
+@pytest.mark.slow
+def test_a_command_runs_where_the_cache_is_damaged(cut_off: Path, tmp_path: Path) -> None:
+    """The run is that of every other day."""
     done = subprocess.run(
         [sys.executable, "-c", COMMAND, str(tmp_path / "run.nc")],
-        env={**os.environ, "SURFACECHEM_CACHE": str(folder.parent), "PYTHONPATH": os.pathsep.join(sys.path)},
+        env={**os.environ, "SURFACECHEM_CACHE": str(cut_off.parent), "PYTHONPATH": os.pathsep.join(sys.path)},
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    assert is_sound_object(folder / objectcode.FILE)
+    assert is_sound_object(cut_off / objectcode.FILE)
 
 
 def is_sound_object(path: Path) -> bool:
@@ -233,20 +247,24 @@ def is_sound_object(path: Path) -> bool:
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="permissions of POSIX")
-@pytest.mark.parametrize("which", ["root", "folder", "file", "link"])
-def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path, which: str) -> None:
+def test_a_cache_that_another_user_can_write_to_is_refused(start, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     assert finish(start(cache))[0] == "hits 0 filled True"
     (folder,) = cache.iterdir()
-    if which == "link":
-        folder.rename(tmp_path / "elsewhere")
-        folder.symlink_to(tmp_path / "elsewhere")
-    else:
-        path = {"root": cache, "folder": folder, "file": folder / kernelcache.FILE}[which]
-        path.chmod(path.stat().st_mode | 0o020)
-    out, err = finish(start(cache))
-    assert out == "hits 0 filled False"
-    assert err.count("can be written by other users") == 1
+
+    def assert_refused() -> None:
+        out, err = finish(start(cache))
+        assert out == "hits 0 filled False"
+        assert err.count("can be written by other users") == 1
+
+    for path in (cache, folder, folder / kernelcache.FILE):
+        usual = path.stat().st_mode
+        path.chmod(usual | 0o020)
+        assert_refused()
+        path.chmod(usual)
+    folder.rename(tmp_path / "elsewhere")
+    folder.symlink_to(tmp_path / "elsewhere")
+    assert_refused()
 
 
 def test_what_is_kept_is_writable_to_oneself_alone(start, tmp_path: Path) -> None:

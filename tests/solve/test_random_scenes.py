@@ -116,47 +116,20 @@ def entropy_is_produced(solution: Solution, scene: Scene) -> None:
         assert any("destroys entropy" in warning for warning in solution.warnings)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6))
 def test_random_scenes(seed):
     if check(seed).startswith(REFUSED):
         reject()
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [
-        1019,
-        1021,
-        1029,
-        2011,
-        2015,
-        4016,
-        4032,
-        7012,
-        8028,
-        10000,
-        11002,
-        11028,
-        14017,
-        14019,
-        18006,
-        18030,
-        20005,
-        20037,
-        22010,
-        22021,
-        22030,
-        25001,
-        25022,
-        26030,
-        27003,
-        29005,
-        32022,
-        34015,
-        38031,
-    ],
-)
+UNTRUE = [
+    *(1019, 1021, 1029, 2011, 2015, 4016, 4032, 7012, 8028, 10000, 11002, 11028, 14017, 14019, 18006, 18030, 20005),
+    *(20037, 22010, 22021, 22030, 25001, 25022, 26030, 27003, 29005, 32022, 34015, 38031),
+]
+
+
+@pytest.mark.parametrize("seed", UNTRUE)
 def test_scenes_that_once_ended_untruly(seed):
     check(seed)
 
