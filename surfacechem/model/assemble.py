@@ -113,6 +113,7 @@ def assemble(scene: Scene) -> System:
         breakpoints=tuple(sorted(build.breakpoints)),
         cycles=tuple(build.cycles),
         modes=tuple(build.modes),
+        registers=tuple(build.registers),
         edges=tuple(build.edges),
         equilibria=tuple(build.equilibria),
         sinks=taking,

@@ -55,6 +55,17 @@ class Mode:
 
 
 @dataclass(frozen=True)
+class Register:
+    """A number that only edges write: a time, a direction or an impulse that what follows has to remember."""
+
+    name: str
+    symbol: Any
+    text: str
+    given: Callable[[Mapping[str, float]], float] | None = None
+    """The value at the start as it follows from what a case gives, by path, where it does."""
+
+
+@dataclass(frozen=True)
 class Fold:
     """The loss of the equilibrium of the quasi-static gaps."""
 
@@ -72,8 +83,9 @@ class Fold:
 class Edge:
     """A guard that must stay positive while the modes are those of ``when``; at its zero, modes and state jump.
 
-    ``modes`` and ``reset`` give new values as expressions of the old state. Then the gaps find their next equilibrium,
-    where the edge ``equilibrates``, and the energy that this releases is ``heat`` of the bodies or of the interface.
+    ``modes`` gives new values of modes and registers, ``reset`` those of states, as expressions of the old ones. Then
+    the gaps find their next equilibrium, where the edge ``equilibrates``, and the energy that this releases is ``heat``
+    of the bodies or of the interface.
     """
 
     name: str

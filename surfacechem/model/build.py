@@ -13,7 +13,7 @@ from surfacechem.contracts import grids
 from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
-from surfacechem.model.automaton import Mode
+from surfacechem.model.automaton import Mode, Register
 from surfacechem.model.balances import Node
 from surfacechem.model.draft import Draft
 from surfacechem.model.system import Margin, Named, Range
@@ -122,6 +122,14 @@ class Build(Draft):
         spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in words.items()))
         symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
         self.modes.append(Mode(name, symbol, initial, words, start, given, waits or {}))
+        return symbol
+
+    def register(
+        self, name: str, text: str, initial: float = 0.0, given: Callable[[Mapping[str, float]], float] | None = None
+    ) -> Any:
+        """A number that edges write; its symbol is a parameter that nothing else changes."""
+        symbol = self.constant(name, f"register.{name}", Spec("1", text), initial, internal=True)
+        self.registers.append(Register(name, symbol, text, given))
         return symbol
 
     def find_mode(self, name: str) -> Any:

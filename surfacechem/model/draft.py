@@ -10,7 +10,7 @@ import symengine
 
 from surfacechem.contracts.terms import Friction, Load
 from surfacechem.expressions import Expression
-from surfacechem.model.automaton import Edge, Equilibrium, Mode
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register
 from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.conductors import Profile
 from surfacechem.model.refit import Fit
@@ -109,6 +109,7 @@ class Draft:
     ranges: list[Range] = field(default_factory=list)
     capped: list[Capped] = field(default_factory=list)
     modes: list[Mode] = field(default_factory=list)
+    registers: list[Register] = field(default_factory=list)
     edges: list[Edge] = field(default_factory=list)
     equilibria: list[Equilibrium] = field(default_factory=list)
     motion: Motion = field(default_factory=Motion)

@@ -111,9 +111,8 @@ def totals(build: Build) -> None:
     _fluxes(build)
     _enthalpy(build)
     for mode in build.modes:
-        if len(mode.words) > 1:
-            words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
-            build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
+        words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
+        build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
     if build.interface.bonds:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
-from surfacechem.model.automaton import Edge, Equilibrium, Mode, Sink, When, masked
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
 from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.refit import Fit
 from surfacechem.quantities import Quantity
@@ -251,6 +251,7 @@ class System:
     cycles: tuple[str, ...] = ()
     """Frequencies, by path, of loads under which the state may rest: their work still has to be followed."""
     modes: tuple[Mode, ...] = ()
+    registers: tuple[Register, ...] = ()
     edges: tuple[Edge, ...] = ()
     equilibria: tuple[Equilibrium, ...] = ()
     sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
@@ -360,9 +361,14 @@ class System:
         """Which states are velocities without inertia, shape (states,)."""
         return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
 
+    @property
+    def memory(self) -> tuple[Mode | Register, ...]:
+        """Modes and registers, which change along edges only."""
+        return (*self.modes, *self.registers)
+
     def moving_margins(self) -> tuple[Margin, ...]:
         """The margins that change in the course of a run; when time alone leads to a peak is known before."""
-        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {mode.symbol for mode in self.modes}
+        evolved = {x for state in self.states for x in (state.symbol, state.dot)} | {x.symbol for x in self.memory}
         moving = {True: evolved, False: evolved | {self.t}}
         return tuple(m for m in self.margins if self.expand(m.masked).free_symbols & moving[m.peak])
 
@@ -388,7 +394,7 @@ class System:
         Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
         """
         moving = {state.symbol for state in self.states if state.quantity.unit != "K"}
-        moving |= {self.t, *(mode.symbol for mode in self.modes)}
+        moving |= {self.t, *(item.symbol for item in self.memory)}
         members = symengine.sympify(self.find("E_total").expression).free_symbols
         moved = [member for member in members if self.expand(member).free_symbols & moving]
         return symengine.Add(*moved, *(-work for work in self.given.values()))

@@ -251,11 +251,7 @@ def _profile_row(system: System, profile: Profile) -> tuple[str, ...]:
 
 
 def _mode_rows(system: System) -> list[tuple[str, str]]:
-    return [
-        (mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
-        for mode in system.modes
-        if len(mode.words) > 1
-    ]
+    return [(mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())) for mode in system.modes]
 
 
 def _law_rows(scene: Scene) -> list[tuple[str, str]]:

@@ -93,8 +93,8 @@ class Jumper:
         self.system = system
         self.states = [state.name for state in system.states]
         self.equilibria = Equilibria(system, program)
-        mode_symbols = {mode.symbol for mode in system.modes}
-        kept = [p.symbol in mode_symbols or p.path == RESTS for p in system.parameters]
+        memory = {item.symbol for item in system.memory}
+        kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
     @cached_property

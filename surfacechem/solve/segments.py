@@ -62,7 +62,7 @@ def nudge(system: System, parameters: Array) -> None:
 
 
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
-    """Modes that follow from the initial state."""
+    """Modes and registers that follow from the initial state."""
     symbols = [p.symbol for p in system.parameters]
     initial = {state.symbol: state.from_given(values) for state in system.states}
     initial |= dict(zip(symbols, parameters[0].tolist(), strict=True)) | {system.t: 0}
@@ -70,8 +70,9 @@ def start_modes(system: System, parameters: Array, values: Mapping[str, float]) 
         if mode.start is not None:
             start = float(system.expand(mode.start).subs(initial))
             parameters[:, symbols.index(mode.symbol)] = start
-        if mode.given is not None:
-            parameters[:, symbols.index(mode.symbol)] = mode.given(values)
+    for item in system.memory:
+        if item.given is not None:
+            parameters[:, symbols.index(item.symbol)] = item.given(values)
 
 
 COMPARISONS = (symengine.StrictLessThan, symengine.LessThan)

@@ -84,7 +84,7 @@ def stage_ends(build: Build) -> None:
     if not stages:
         return
     stage = next(mode.symbol for mode in build.modes if mode.name == "stage")
-    begun = build.mode("stage_begun", 0.0, {0.0: "time at which the stage began"})
+    begun = build.register("stage_begun", "time at which the stage began")
     for i, item in enumerate(stages):
         advance = {stage: symengine.Integer(i + 1), begun: build.t}
         if item.duration is not None:

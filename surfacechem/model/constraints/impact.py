@@ -62,7 +62,7 @@ def impacts(build: Build) -> None:
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
-    landed = build.mode("landed", 0.0, {0.0: "whether the bodies have met and do not rebound"})
+    landed = build.register("landed", "whether the bodies have met and do not rebound")
     rests, modes = _rests(build, far, speed, pressing)
     rubs = rubbing(build, (1 + far.e) * far.m * speed)
     # What follows at the same moment comes before what would slide as long as the contact is open.
@@ -95,7 +95,7 @@ def _rests(
     if far.e == 0:
         return ONE, {}
     tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
-    fastest = build.mode("fastest", 0.0, {0.0: "speed of the fastest impact [m/s]"})
+    fastest = build.register("fastest", "speed of the fastest impact [m/s]")
     swift = where(speed > fastest, speed, fastest)
     rebound = far.e * speed
     nothing = NOTHING * tolerance
@@ -108,7 +108,7 @@ def _rests(
 
 def missed(build: Build) -> None:
     """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
-    if build.find_mode("landed") is None:
+    if not any(register.name == "landed" for register in build.registers):
         return
     found = [law.name() for law in build.interface.reactions if law_reads(law, "p") or law_reads(law, "t_n")]
     for (a, b), channels in build.conductances.items():
@@ -171,7 +171,7 @@ def _driven(build: Build, laws: Sequence[Friction], impulse: Expression) -> Rubb
     exerted, powers, works = _exerted(build), NONE, {}
     for law in laws:
         account = build.motion.works[law]
-        done = build.mode(f"{account}_of_impacts", 0.0, {0.0: f"work of impacts against {law.title} [J/m^2]"})
+        done = build.register(f"{account}_of_impacts", f"work of impacts against {law.title} [J/m^2]")
         power = build.motion.rubs * _at_infinity(build, law, _power(build, law))
         build.motion.given[account] = done
         works[done] = done + power * exerted
@@ -180,7 +180,7 @@ def _driven(build: Build, laws: Sequence[Friction], impulse: Expression) -> Rubb
 
 
 def _exerted(build: Build) -> Any:
-    return build.mode("impulse", 0.0, {0.0: "impulse of the pressure that friction has not answered yet [Pa s]"})
+    return build.register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
 
 
 def _rub(exerted: Expression, modes: Mapping[Expression, Expression], jump: Mapping[Expression, Expression]) -> Edge:

@@ -15,7 +15,7 @@ def relaxing(build: Build) -> None:
     local = [j for j, item in enumerate(build.edges) if item.name == "debond" and item.heat == "local"]
     if not (local and build.equilibria):
         return
-    loose = build.mode("loose", 0.0, {0.0: "whether the gaps have yet to follow a local jump"})
+    loose = build.register("loose", "whether the gaps have yet to follow a local jump")
     for j in local:
         item = build.edges[j]
         modes = {**item.modes, loose: symengine.Integer(1)}

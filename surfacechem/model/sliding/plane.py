@@ -120,9 +120,9 @@ def _same(expression: Expression) -> Expression:
 
 def _began_along(build: Build) -> None:
     """The direction in which sliding began."""
-    text = {0.0: "component of the direction in which sliding began"}
+    text = "component of the direction in which sliding began"
     for axis, initial, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True):
-        build.mode(str(axis), initial, text, given=partial(_began, v))
+        build.register(str(axis), text, initial, partial(_began, v))
 
 
 def _given_as_velocities(build: Build) -> None:
