@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -37,6 +38,18 @@ def assignments(texts: Sequence[str]) -> dict[str, object]:
     {'f': '3 pN', 'g': [1, 2]}
     """
     return {path: tree.plain() for path, tree in _pairs(texts)}
+
+
+def written(overrides: Sequence[str] | Mapping[str, object]) -> list[str]:
+    """Given values as texts "path=value" that give the same values again.
+
+    >>> written({"f": 3e-12, "reference": None, "loading.v": {"level": "3 nm/s"}})
+    ['f=3e-12', 'reference=null', 'loading.v={"level": "3 nm/s"}']
+    """
+    if not isinstance(overrides, Mapping):
+        return list(overrides)
+    # Texts are read as YAML, of which JSON is a part.
+    return [f"{p}={value if isinstance(value, str) else json.dumps(value)}" for p, value in overrides.items()]
 
 
 def parameter_path(path: str, known: Container[str]) -> str:

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
+from surfacechem.documents.overrides import written
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
@@ -113,19 +114,18 @@ def precision(
     check_solvers(solvers, "solvers")
     check_tolerances(tolerances, "tolerances")
     check_range(repeat, 1 <= repeat <= MOST_REPEAT, f">= 1 and <= {MOST_REPEAT}", "repeat")
-    subjects = _subjects([cases] if isinstance(cases, str | Path) else cases, overrides, variables)
+    cases = [cases] if isinstance(cases, str | Path) else cases
+    subjects = _subjects(cases, overrides, variables)
     tolerances = sorted(set(map(float, tolerances)), reverse=True)
     solvers, variables = tuple(dict.fromkeys(solvers)), tuple(dict.fromkeys(variables))
     compared = [_compared(one, variables, solvers, tolerances, repeat) for one in subjects]
-    names = [case.name for case in compared]
-    options = ["--solvers", ",".join(solvers), "--tolerances", ",".join(f"{rtol:g}" for rtol in tolerances)]
+    options = ["--solvers", ",".join(solvers), "--tolerances", ",".join(map(repr, tolerances))]
     options += ["--repeat", str(repeat), *(["--variables", ",".join(variables)] if variables else [])]
-    changes = [f"{path}={value}" for path, value in overrides.items()] if isinstance(overrides, Mapping) else overrides
     status = "finished" if all(case.truth for case in compared) else "failed"
     return Study(
         kind="precision",
-        title=f"Error against run time: {', '.join(names)}",
-        arguments=[*names, *options, *(word for text in changes for word in ("--set", text))],
+        title=f"Error against run time: {', '.join(case.name for case in compared)}",
+        arguments=[*map(str, cases), *options, *(word for text in written(overrides) for word in ("--set", text))],
         axes={
             "tolerance": tolerances,
             "case": compared,

@@ -143,7 +143,7 @@ def stability(
         rows.append(Row(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
     options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
-    options += ["--rtol", f"{rtol:g}"] if rtol != RTOL else []
+    options += ["--rtol", repr(float(rtol))] if rtol != RTOL else []
     options += ["--quick"] if quick else []
     options += ["--search", str(rounds)] if rounds != ROUNDS else []
     return Study(

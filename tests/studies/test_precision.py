@@ -1,6 +1,7 @@
 """Error against run time: errors fall with the tolerance, references know how uncertain they are, nothing is hidden."""
 
 import re
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -322,15 +323,29 @@ def test_the_report_contains_everything(written):
     assert not re.search(r'(src|href)="(?!#)', text)
 
 
-def test_the_command_in_the_report_makes_the_study_again(written, tmp_path, monkeypatch):
-    import shlex
-
-    study, _ = written
-    monkeypatch.chdir(tmp_path)
+def again(study, folder, monkeypatch):
+    """The dataset that the command of a study makes."""
+    monkeypatch.chdir(folder)
     done = CliRunner().invoke(app, shlex.split(study.command)[1:])
     assert done.exit_code == 0, done.output
-    with xarray.open_dataset("precision.nc") as again:
-        np.testing.assert_array_equal(again["error_max"], study.dataset["error_max"])
+    with xarray.open_dataset("precision.nc") as data:
+        return data.load()
+
+
+def test_the_command_in_the_report_makes_the_study_again(written, tmp_path, monkeypatch):
+    study, _ = written
+    np.testing.assert_array_equal(again(study, tmp_path, monkeypatch)["error_max"], study.dataset["error_max"])
+
+
+def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch):
+    """A case by its path, a tolerance of many digits, nothing instead of a reference, a nested value."""
+    path = tmp_path / "a case.yaml"
+    path.write_text(surfacechem.load("exothermic").case.text)
+    changes = {"reference": None, "loading": {"p": "3 Pa"}, "run.until": 1.0, "run.rtol": "1e-7"}
+    study = surfacechem.precision(path, ["radau"], [1.23456789e-7], repeat=1, overrides=changes)
+    found = again(study, tmp_path, monkeypatch)
+    for name in ("tolerance", "error_max", "reference"):
+        np.testing.assert_array_equal(found[name], study.dataset[name])
 
 
 # -- input -------------------------------------------------------------------------------------------------------------
