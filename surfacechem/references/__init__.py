@@ -8,6 +8,7 @@ from __future__ import annotations
 import pkgutil
 from functools import cache
 from importlib import import_module
+from inspect import isabstract
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.references.base import Reference
@@ -52,4 +53,4 @@ def _members(family: str) -> dict[str, type[Reference]]:
     """The exact solutions of a file by name."""
     module = import_module(f"{__name__}.{family}")
     kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and kind.__module__ == module.__name__]
-    return {kind.name: kind for kind in kinds if issubclass(kind, Reference) and "name" in vars(kind)}
+    return {kind.name: kind for kind in kinds if issubclass(kind, Reference) and not isabstract(kind)}

@@ -74,10 +74,11 @@ class PerfectContact(Reference):
     @property
     def C(self) -> float:
         """Total heat capacity at T_0."""
-        return float(self._exact_C)
+        return float(self.exact_capacity)
 
     @property
-    def _exact_C(self) -> Fraction:
+    def exact_capacity(self) -> Fraction:
+        """Total heat capacity at T_0 without rounding."""
         return Fraction(self.C_1) + Fraction(self.C_2) + Fraction(self.C_c)
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from fractions import Fraction
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._inversion import increasing_root, short_integral
-from surfacechem.references._special_functions import scaled_Ei
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import increasing_root, scaled_Ei, short_integral
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class AdiabaticArrhenius(Reference):
@@ -35,8 +32,6 @@ class AdiabaticArrhenius(Reference):
     '342.50000000'
     """
 
-    name: ClassVar[str] = "adiabatic-arrhenius"
-
     A: float = parameter("1/s", "pre-exponential factor", above=0)
     E_a: float = parameter("J/mol", "activation energy", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
@@ -48,18 +43,18 @@ class AdiabaticArrhenius(Reference):
         return {**own, "T_i": scene.temperature, "delta_T": scene.adiabatic_rise}
 
     @property
+    def initial_rate(self) -> float:
+        """Rate constant [1/s] at the initial temperature; the exponent's rounding would cost s_i roundings of t."""
+        exponent = self._initial_exponent
+        exact = Fraction(self.E_a) / (Fraction(str(GAS_CONSTANT)) * Fraction(self.T_i))
+        half = math.exp(-0.5 * exponent)
+        return half * self.A * half * (1.0 - float(exact - Fraction(exponent)))
+
+    @property
     def _initial_exponent(self) -> float:
         return self.E_a / (GAS_CONSTANT * self.T_i)
 
-    @property
-    def initial_rate(self) -> float:
-        """Rate constant [1/s] at the initial temperature; the exponent's rounding would cost s_i roundings of t."""
-        exact = Fraction(self.E_a) / (Fraction(str(GAS_CONSTANT)) * Fraction(self.T_i))
-        lost = float(exact - Fraction(self._initial_exponent))
-        half = math.exp(-0.5 * self._initial_exponent)
-        return half * self.A * half * (1.0 - lost)
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         scaled, span = self.initial_rate * t, self._initial_exponent * self.delta_T / (self.T_i + self.delta_T)
         phi = -np.expm1(-increasing_root(self._scaled_time, scaled, scaled, scaled * np.exp(span)))
         return {"phi": phi, "T": self.T_i + self.delta_T * phi}
@@ -71,13 +66,14 @@ class AdiabaticArrhenius(Reference):
     def _scaled_time(self, unreacted: Array) -> tuple[Array, Array]:
         r""":math:`Ae^{-s_i}t` as a function of :math:`-\ln(1-\phi)`, and its slope :math:`e^{s-s_i}`."""
         left, final, s_i = self.delta_T * np.exp(-unreacted), self.T_i + self.delta_T, self._initial_exponent
+
+        def slope(unreacted: Array) -> Array:
+            rise = -self.delta_T * np.expm1(-unreacted)
+            return np.asarray(np.exp(-s_i * rise / (self.T_i + rise)))
+
         T = self.T_i - self.delta_T * np.expm1(-unreacted)
         at_start = scaled_Ei(np.array([s_i * self.delta_T / final])) - scaled_Ei(np.array([s_i]))
         now = scaled_Ei(s_i * self.T_i / T * left / final) - scaled_Ei(s_i * self.T_i / T)
         early = unreacted * max(1.0, self.delta_T / self.T_i * max(1.0, s_i)) < 0.25  # there the integrals cancel
-        slope = self._slope(unreacted)
-        return np.where(early, short_integral(self._slope, unreacted), at_start - slope * now), slope
-
-    def _slope(self, unreacted: Array) -> Array:
-        rise = -self.delta_T * np.expm1(-unreacted)
-        return np.asarray(np.exp(-self._initial_exponent * rise / (self.T_i + rise)))
+        steepness = slope(unreacted)
+        return np.where(early, short_integral(slope, unreacted), at_start - steepness * now), steepness

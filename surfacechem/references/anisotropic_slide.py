@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._numerics import ROUNDING
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 NEWTON = 100
 """Steps to the velocity at a time; each but the first few doubles the digits."""
-
-DIGITS = 4e-16
 
 
 class AnisotropicSlide(UniformBody):
@@ -38,8 +34,6 @@ class AnisotropicSlide(UniformBody):
     (0.001245312941584, 0.0)
     """
 
-    name: ClassVar[str] = "anisotropic-slide"
-
     m: float = parameter("kg/m^2", "mass", above=0)
     mu_1: float = parameter("1", "friction coefficient along v", above=0)
     mu_2: float = parameter("1", "friction coefficient along v_2, at least mu_1", above=0)
@@ -57,57 +51,41 @@ class AnisotropicSlide(UniformBody):
             **super().from_scene(scene),
         }
 
-    @cached_property
-    def ratio(self) -> float:
-        """Friction coefficient across over that along."""
-        return self.mu_2 / self.mu_1
-
     @property
     def stop_time(self) -> float:
         """Time [s] from which on the mass rests."""
-        return float(self._integral(1.0, np.array(1.0)) * self.v_i / self.deceleration)
-
-    @property
-    def deceleration(self) -> float:
-        """Deceleration along the first axis [m/s^2]."""
-        return self.mu_1 * self.p / self.m
+        return float(self._integral(1.0, np.array(1.0)) * self.v_i * self.m / (self.mu_1 * self.p))
 
     def _integral(self, k: float, x: Array) -> Array:
         """I_k of the velocity relative to the initial one."""
         from scipy.special import hyp2f1
 
-        z, e = (self.v_2_i / self.v_i) ** 2, 2 * (self.ratio - 1)
+        z, e = (self.v_2_i / self.v_i) ** 2, 2 * (self.mu_2 / self.mu_1 - 1)
         if e == 0:
             return np.asarray(x**k / k * math.sqrt(1 + z))
         return np.asarray(x**k / k * hyp2f1(-0.5, k / e, 1 + k / e, -z * x**e))
 
-    def _velocity(self, t: Array) -> Array:
-        """Velocity along the first axis relative to the initial one, by Newton's method from above."""
-        z, left = (self.v_2_i / self.v_i) ** 2, np.maximum(self.stop_time - t, 0) * self.deceleration / self.v_i
-        x = np.ones_like(left)
+    def quantities(self, t: Array) -> Quantities:
+        ratio, slope, deceleration = self.mu_2 / self.mu_1, self.v_2_i / self.v_i, self.mu_1 * self.p / self.m
+        # Velocity along the first axis relative to the initial one, by Newton's method from above.
+        left, x = np.maximum(self.stop_time - t, 0) * deceleration / self.v_i, np.ones_like(t)
         for _ in range(NEWTON):
-            slope = np.sqrt(1 + z * x ** (2 * (self.ratio - 1)))
-            change = (self._integral(1.0, x) - left) / slope
+            change = (self._integral(1.0, x) - left) / np.sqrt(1 + slope**2 * x ** (2 * (ratio - 1)))
             x = np.where(left > 0, np.maximum(x - change, 0), 0)
-            if np.all(np.abs(change) <= DIGITS * x):
+            if np.all(np.abs(change) <= ROUNDING * x):
                 break
-        return x
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        x, whole = self._velocity(t), np.array(1.0)
-        v, v_2 = self.v_i * x, self.v_2_i * x**self.ratio
-        path, across = (self._integral(k, whole) - self._integral(k, x) for k in (2.0, 1.0 + self.ratio))
-        speed, start = np.hypot(v, v_2), math.hypot(self.v_i, self.v_2_i)
-        heat = 0.5 * self.m * (start**2 - speed**2)
-        slope = self.v_2_i / self.v_i
-        turn = np.arctan(slope * x ** (self.ratio - 1)) - math.atan(slope)
+        v, v_2 = self.v_i * x, self.v_2_i * x**ratio
+        path, across = (self._integral(k, np.array(1.0)) - self._integral(k, x) for k in (2.0, 1.0 + ratio))
+        speed = np.hypot(v, v_2)
+        heat = 0.5 * self.m * (math.hypot(self.v_i, self.v_2_i) ** 2 - speed**2)
+        turn = np.arctan(slope * x ** (ratio - 1)) - math.atan(slope)
         return {
             "v": v,
             "v_2": v_2,
             "speed": speed,
             "turn": np.where(x > 0, turn, 0.0),
-            "u_t": path * self.v_i**2 / self.deceleration,
-            "u_t2": across * self.v_i * self.v_2_i / self.deceleration,
+            "u_t": path * self.v_i**2 / deceleration,
+            "u_t2": across * self.v_i * self.v_2_i / deceleration,
             "heat": heat,
             "T": self.heated(heat),
         }

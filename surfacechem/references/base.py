@@ -1,12 +1,13 @@
 r"""Exact solutions: parameters in SI, and exact values of named quantities at any time.
 
-A reference is one frozen dataclass, or a family of them that share a formula, in a file of its own. The file carries
-the name that the family has in common, so that asking for one reference imports one file; to add one, add its file.
+A reference is one frozen dataclass; its name is that of the class. Its file carries a part of the name, such as what a
+family has in common, so that asking for one reference imports one file; to add one, add its file.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -19,11 +20,14 @@ from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.scene_view import SceneView
 
-__all__ = ["Array", "Parameters", "Reference", "SceneView"]
+__all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView"]
 
 Array: TypeAlias = NDArray[np.float64]
 Parameters: TypeAlias = Mapping[str, float | None]
 """Parameters of an exact solution by name; None, or nothing, where a scene does not tell one."""
+
+Quantities: TypeAlias = Mapping[str, Array | float]
+"""Exact values by the names of the dataset; what does not change in time may be one number."""
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
@@ -31,12 +35,14 @@ class Reference(ABC):
     """An exact solution. Subclasses become frozen, keyword-only dataclasses and state `quantities`."""
 
     name: ClassVar[str]
+    """Name of the class in kebab-case."""
     continuous: ClassVar[bool] = False
     """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
+        cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
         dataclass(frozen=True, kw_only=True)(cls)
 
     def __post_init__(self) -> None:
@@ -65,18 +71,15 @@ class Reference(ABC):
         with np.errstate(all="ignore"):
             values = self.quantities(times.reshape(-1))
         exact = {key: np.array(np.broadcast_to(value, times.size)) for key, value in values.items()}
-        self._check_values(times.reshape(-1), exact)
-        return {key: value.reshape(times.shape) for key, value in exact.items()}
-
-    def _check_values(self, t: Array, exact: Mapping[str, Array]) -> None:
         for key, value in exact.items():
-            if np.isnan(value).any():
-                raise InputError(f"{self.name}: {key} has no real value at t = {t[np.isnan(value)][0]} s.")
+            for moment in times.reshape(-1)[np.isnan(value)][:1]:
+                raise InputError(f"{self.name}: {key} has no real value at t = {moment} s.")
+        return {key: value.reshape(times.shape) for key, value in exact.items()}
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
         """Temperatures of body 1 or 2 at distances from the contact [m], shape (times, places), if it is continuous."""
         raise NotImplementedError(f"{self.name} knows no temperatures inside bodies.")
 
     @abstractmethod
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        """The exact solution at a vector of times; what does not change in time may be one number."""
+    def quantities(self, t: Array) -> Quantities:
+        """The exact solution at a vector of times."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references._special_functions import scaled_expint
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import scaled_expint
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class BellBond(Reference):
@@ -50,8 +48,6 @@ class BellConstantForce(BellBond):
     '0.082084998624, 0.382466 s'
     """
 
-    name: ClassVar[str] = "bell-constant-force"
-
     f: float = parameter("N", "force per bond")
 
     @classmethod
@@ -68,7 +64,7 @@ class BellConstantForce(BellBond):
         """Time [s] in which half of the bonds break; zero below 1e-323 s."""
         return math.log(2.0) * math.exp(-max(self.log_rate, -700.0))
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         broken = np.exp(np.log(t) + self.log_rate)
         return {"phi": self.phi_i * np.exp(-broken), "ln_phi": math.log(self.phi_i) - broken}
 
@@ -90,8 +86,6 @@ class BellRamp(BellBond):
     >>> " ".join(f"{1e12 * force:.6f} pN" for force in (bond.mode, bond.mean, bond.median))
     '47.324836 pN 41.886280 pN 43.683190 pN'
     """
-
-    name: ClassVar[str] = "bell-ramp"
 
     rate: float = parameter("N/s", "loading rate", above=0)
 
@@ -124,7 +118,7 @@ class BellRamp(BellBond):
         scaled = f / self.force_scale
         return math.log(self.k_off / self.rate) + scaled - self.severity * np.expm1(scaled)
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         f = self.rate * t
         broken = self.severity * np.expm1(f / self.force_scale)
         return {"phi": self.phi_i * np.exp(-broken), "ln_phi": math.log(self.phi_i) - broken, "f": f}

@@ -1,9 +1,8 @@
-"""Bonding in perfect thermal contact: the general solution, and the exothermic and endothermic ones of the paper."""
+"""Bonding: relaxing with its heat, between unequal surfaces, and ignited by friction."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping
+import math
 from fractions import Fraction
 from typing import ClassVar
 
@@ -11,85 +10,13 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
+from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._bodies import EnergyModel, PerfectContact, QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._numerics import first_difference, scaled_expint, short_integral
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
-class RelaxingBonds(PerfectContact):
-    r"""Bond energy :math:`\frac12K(T)x`, :math:`x=(1-\phi)^2`, whose :math:`x` decays as :math:`e^{-2t/\tau}`.
-
-    Everything is written with :math:`y=x_0-x\ge0`, which is known to rounding however small t is. A subclass states the
-    temperature and the total capacity; fluxes, energy and entropies follow.
-    """
-
-    model: ClassVar[EnergyModel]
-
-    T_i: float = parameter("K", "initial temperature", above=0)
-    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
-    K_0: float = parameter("J/m^2", "temperature-independent part of the bond energy density", default=0.0)
-    K_1: float = parameter("J/m^2", "linear (entropic) part of the bond energy density", default=0.0)
-    K_2: float = parameter("J/m^2", "quadratic part of the bond energy density", default=0.0)
-    tau: float = parameter("s", "relaxation time of bonding", above=0)
-    D: float = parameter("W/m^2", "friction power, traction times sliding velocity", default=0.0, at_least=0)
-
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        bonds = {name: scene.potential(name) for name in ("K_0", "K_1", "K_2")}
-        start = {"T_i": scene.temperature, "phi_i": scene.initial("phi"), "tau": scene.relaxation_time}
-        return {**super().from_scene(scene), **bonds, **start, "D": scene.friction_power()}
-
-    def __post_init__(self) -> None:
-        """Refuse what has no positive heat capacity to begin with."""
-        super().__post_init__()
-        if self.free_capacity <= 0.0:
-            raise InputError(
-                f"{self.name}: the total heat capacity must be positive, but K_2 (1 - phi_i)^2 takes away "
-                f"{1.0 - self.free_capacity:.17g} of it. Lower K_2 or raise phi_i."
-            )
-
-    @property
-    def free_capacity(self) -> float:
-        """Share of the initial capacity that the unformed bonds leave, from exact arithmetic (it may be 2^-52)."""
-        return float(1 - Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2 / self._bond_capacity_scale)
-
-    @property
-    @abstractmethod
-    def _bond_capacity_scale(self) -> Fraction:
-        """The value of K_2 x at which the initial capacity vanishes."""
-
-    @abstractmethod
-    def temperature(self, t: Array) -> tuple[Array, Array]:
-        """Temperature and its rise above the initial one."""
-
-    @abstractmethod
-    def heating_share(self, T: Array, t: Array) -> Array:
-        """Heating of a body over total heat set free, per capacity of that body."""
-
-    def unbonded_squared(self, t: Array) -> tuple[Array, Array]:
-        """The square x of the unbonded fraction, and how much of it is gone."""
-        initial = (1.0 - self.phi_i) ** 2
-        return initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        x, _ = self.unbonded_squared(t)
-        T, rise = self.temperature(t)
-        excess, relative = self.T_i - self.T_0 + rise, T / self.T_0
-        bond_energy = self.K_0 - self.K_2 * relative**2
-        share = self.heating_share(T, t) * (x / self.tau * bond_energy + self.D)
-        bond_entropy = -0.5 * x * (self.K_1 + 2.0 * self.K_2 * relative) / self.T_0
-        stiffness = self.K_0 + self.K_1 * relative + self.K_2 * relative**2
-        return {
-            "phi": self.phi_i - (1.0 - self.phi_i) * np.expm1(-t / self.tau),
-            "T": T,
-            "q_1": self.C_1 * share,
-            "q_2": self.C_2 * share,
-            "U_c": self.model.energy(excess, self.C_c, self.T_0) + 0.5 * x * bond_energy,
-            "S_total": self.model.entropy(excess, self.C, self.T_0) + bond_entropy,
-            "sigma_chem": x * stiffness / (self.tau * T),
-        }
-
-
-class Bonding(RelaxingBonds):
+class Bonding(PerfectContact):
     r"""Bonding with a constant relaxation time and friction power, perfect thermal contact, quadratic energies.
 
     With :math:`K=K_0+K_1T/T_0+K_2T^2/T_0^2`, :math:`x=(1-\phi)^2`, :math:`C=C_1+C_2+C_c`, :math:`\kappa_j=K_j/(T_0C)`
@@ -116,32 +43,72 @@ class Bonding(RelaxingBonds):
     '295.841884102745'
     """
 
-    name: ClassVar[str] = "bonding"
     model: ClassVar[EnergyModel] = QuadraticEnergy()
 
+    T_i: float = parameter("K", "initial temperature", above=0)
+    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+    K_0: float = parameter("J/m^2", "temperature-independent part of the bond energy density", default=0.0)
+    K_1: float = parameter("J/m^2", "linear (entropic) part of the bond energy density", default=0.0)
+    K_2: float = parameter("J/m^2", "quadratic part of the bond energy density", default=0.0)
+    tau: float = parameter("s", "relaxation time of bonding", above=0)
+    D: float = parameter("W/m^2", "friction power, traction times sliding velocity", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        bonds = {name: scene.potential(name) for name in ("K_0", "K_1", "K_2")}
+        start = {"T_i": scene.temperature, "phi_i": scene.initial("phi"), "tau": scene.relaxation_time}
+        return {**super().from_scene(scene), **bonds, **start, "D": scene.friction_power()}
+
+    def __post_init__(self) -> None:
+        """Refuse what has no positive heat capacity to begin with."""
+        super().__post_init__()
+        if self.free_capacity <= 0.0:
+            raise InputError(
+                f"{self.name}: the total heat capacity must be positive, but K_2 (1 - phi_i)^2 takes away "
+                f"{1.0 - self.free_capacity:.17g} of it. Lower K_2 or raise phi_i."
+            )
+
     @property
-    def _bond_capacity_scale(self) -> Fraction:
-        return Fraction(self.T_0) * self._exact_C
+    def free_capacity(self) -> float:
+        r"""Share of the initial capacity that the unformed bonds leave, :math:`1-\kappa_2x_0`.
 
-    def _kappa(self, K: float) -> float:
-        return K / (self.T_0 * self.C)
+        It may be 2^-52, so it comes from exact arithmetic.
+        """
+        taken = Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2
+        return float(1 - taken / (Fraction(self.T_0) * self.exact_capacity))
 
-    def _capacity_factor(self, t: Array) -> Array:
-        r""":math:`1-\kappa_2x` as a sum of positive numbers."""
-        x, y = self.unbonded_squared(t)
-        kappa_2 = self._kappa(self.K_2)
-        return self.free_capacity + kappa_2 * y if kappa_2 > 0.0 else 1.0 - kappa_2 * x
+    def unbonded_squared(self, t: Array) -> tuple[Array, Array]:
+        """The square x of the unbonded fraction, and how much of it is gone, to rounding however short the time."""
+        initial = (1.0 - self.phi_i) ** 2
+        return initial * np.exp(-2.0 * t / self.tau), -initial * np.expm1(-2.0 * t / self.tau)
 
-    def temperature(self, t: Array) -> tuple[Array, Array]:
-        _, y = self.unbonded_squared(t)
-        sliding = 2.0 * self.T_0 * self.D * t / self.C
-        released = self.T_0**2 * self._kappa(self.K_0) * y + sliding
-        factor = self._capacity_factor(t)
+    def heated(self, t: Array) -> tuple[Array, Array, Array]:
+        """Temperature, its rise above the initial one, and the capacity by which heat set free is shared."""
+        x, gone = self.unbonded_squared(t)
+        kappa_0, kappa_2 = (K / (self.T_0 * self.C) for K in (self.K_0, self.K_2))
+        # 1 - kappa_2 x as a sum of positive numbers
+        factor = self.free_capacity + kappa_2 * gone if kappa_2 > 0.0 else 1.0 - kappa_2 * x
+        released = self.T_0**2 * kappa_0 * gone + 2.0 * self.T_0 * self.D * t / self.C
         T = np.sqrt((self.T_i**2 * self.free_capacity + released) / factor)
-        return T, (released - self.T_i**2 * self._kappa(self.K_2) * y) / factor / (T + self.T_i)
+        return T, (released - self.T_i**2 * kappa_2 * gone) / factor / (T + self.T_i), self.C * factor
 
-    def heating_share(self, T: Array, t: Array) -> Array:
-        return 1.0 / (self.C * self._capacity_factor(t))
+    def quantities(self, t: Array) -> Quantities:
+        x, _ = self.unbonded_squared(t)
+        T, rise, capacity = self.heated(t)
+        excess, relative = self.T_i - self.T_0 + rise, T / self.T_0
+        bond_energy = self.K_0 - self.K_2 * relative**2
+        share = (x / self.tau * bond_energy + self.D) / capacity
+        bond_entropy = -0.5 * x * (self.K_1 + 2.0 * self.K_2 * relative) / self.T_0
+        stiffness = self.K_0 + self.K_1 * relative + self.K_2 * relative**2
+        return {
+            "phi": self.phi_i - (1.0 - self.phi_i) * np.expm1(-t / self.tau),
+            "T": T,
+            "q_1": self.C_1 * share,
+            "q_2": self.C_2 * share,
+            "U_c": self.model.energy(excess, self.C_c, self.T_0) + 0.5 * x * bond_energy,
+            "S_total": self.model.entropy(excess, self.C, self.T_0) + bond_entropy,
+            "sigma_chem": x * stiffness / (self.tau * T),
+        }
 
 
 class ExothermicBonding(PerfectContact):
@@ -158,8 +125,6 @@ class ExothermicBonding(PerfectContact):
     '314.642005143357'
     """
 
-    name: ClassVar[str] = "exothermic-bonding"
-
     K_0: float = parameter("J/m^2", "bond energy density", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
@@ -167,7 +132,7 @@ class ExothermicBonding(PerfectContact):
     def from_scene(cls, scene: SceneView) -> Parameters:
         return {**super().from_scene(scene), "K_0": scene.potential("K_0"), "tau": scene.relaxation_time}
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         kappa = self.K_0 / (self.T_0 * self.C)
         released = self.K_0 / self.tau * np.exp(-2.0 * t / self.tau)
         return {
@@ -195,8 +160,6 @@ class EndothermicBonding(PerfectContact):
     '143.130196231040'
     """
 
-    name: ClassVar[str] = "endothermic-bonding"
-
     K_2: float = parameter("J/m^2", "bond energy density at T_0", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
@@ -213,9 +176,9 @@ class EndothermicBonding(PerfectContact):
     @property
     def free_capacity(self) -> float:
         r""":math:`1-\kappa` from exact arithmetic."""
-        return float(1 - Fraction(self.K_2) / (Fraction(self.T_0) * self._exact_C))
+        return float(1 - Fraction(self.K_2) / (Fraction(self.T_0) * self.exact_capacity))
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         kappa = self.K_2 / (self.T_0 * self.C)
         ratio = self.free_capacity / (self.free_capacity - kappa * np.expm1(-2.0 * t / self.tau))
         absorbed = self.K_2 / self.tau * np.exp(-2.0 * t / self.tau) * ratio**2 / self.free_capacity
@@ -224,4 +187,102 @@ class EndothermicBonding(PerfectContact):
             "T": self.T_0 * np.sqrt(ratio),
             "q_1": -self.C_1 / self.C * absorbed,
             "q_2": -self.C_2 / self.C * absorbed,
+        }
+
+
+class BimolecularBonding(Reference):
+    r"""Partners of both surfaces that find each other, and bonds that break, constant temperature.
+
+    .. math:: \dot\phi=k_fn_c\Big(\frac{n_1}{n_c}-\phi\Big)\Big(\frac{n_2}{n_c}-\phi\Big)-k_r\phi,\qquad
+        \frac{\phi-\phi_{eq}}{\phi-\phi_2}=\frac{\phi_i-\phi_{eq}}{\phi_i-\phi_2}e^{-k_fn_c(\phi_2-\phi_{eq})t}
+
+    :math:`\phi_{eq}<\phi_2` are the zeros of the rate. Both are found, and the solution is written, without
+    cancellation, also where they coincide: equal densities and no rupture, :math:`1-\phi=1/(1+k_fn_ct)`. Any t >= 0.
+
+    Source: second-order kinetics with reversal, integrated; e.g. Lauffenburger & Linderman (1993), Receptors.
+
+    >>> sites = BimolecularBonding(k_f=1e-16, k_r=0.5, n_1=1e16, n_2=2e16, n_c=1e16)
+    >>> f"{sites.equilibrium:.10f} {sites.solution(1.0)['phi']:.10f}"
+    '0.7192235936 0.6490609274'
+    """
+
+    k_f: float = parameter("m^2/s", "rate coefficient of formation", above=0)
+    k_r: float = parameter("1/s", "rate of rupture", default=0.0, at_least=0)
+    n_1: float = parameter("1/m^2", "density of sites on body 1", above=0)
+    n_2: float = parameter("1/m^2", "density of sites on body 2", above=0)
+    n_c: float = parameter("1/m^2", "density of reference sites", above=0)
+    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        N_c, N_1, N_2 = (scene.constant(name) for name in ("N_c", "N_1", "N_2"))
+        sites = {"n_c": N_c, "n_1": N_c if N_1 is None else N_1, "n_2": N_c if N_2 is None else N_2}
+        return {**sites, **{name: scene.reaction(name) for name in ("k_f", "k_r")}, "phi_i": scene.initial("phi")}
+
+    @property
+    def equilibrium(self) -> float:
+        """Bonding state in equilibrium, the smaller zero of the rate."""
+        p, q, loss, distance = self._scaled()
+        return 2.0 * p * q / (p + q + loss + distance)
+
+    def _scaled(self) -> tuple[float, float, float, float]:
+        """Both densities and the rupture rate in units of the reference sites, and the distance of the zeros."""
+        p, q, loss = self.n_1 / self.n_c, self.n_2 / self.n_c, self.k_r / (self.k_f * self.n_c)
+        return p, q, loss, math.sqrt((p - q) ** 2 + loss * (loss + 2.0 * (p + q)))
+
+    def quantities(self, t: Array) -> Quantities:
+        start, scaled, distance = self.equilibrium - self.phi_i, self.k_f * self.n_c * t, self._scaled()[-1]
+        mean = first_difference(np.zeros_like(scaled), -distance * scaled)  # (1 - exp(-x)) / x
+        gone = mean * (start * scaled + distance * scaled) / (1.0 + start * scaled * mean)
+        return {"phi": self.phi_i + start * gone}
+
+
+class FrictionIgnitedBonding(Reference):
+    r"""First-order Arrhenius bonding without heat of its own while friction heats a constant capacity.
+
+    .. math:: T=T_i+\frac DCt,\qquad
+        \ln\frac{1-\phi}{1-\phi_i}=-\frac{AC}D\big[TE_2(s)-T_iE_2(s_i)\big],\quad s=\frac{E_a}{R_gT}
+
+    where :math:`TE_2(s)=Te^{-s}-\frac{E_a}{R_g}E_1(s)`. Any t >= 0; ln_unbonded is exact where :math:`\phi` rounds to
+    one.
+
+    Source: Abramowitz & Stegun (1964), 5.1 (exponential integrals); the temperature integral of non-isothermal
+    kinetics at a constant heating rate.
+
+    >>> weld = FrictionIgnitedBonding(A=1e14, E_a=1.2e5, T_i=300.0, C=500.0, D=2500.0)
+    >>> f"{weld.solution(26.0)['phi']:.12f}"
+    '0.473587795480'
+    """
+
+    A: float = parameter("1/s", "pre-exponential factor", above=0)
+    E_a: float = parameter("J/mol", "activation energy", above=0)
+    T_i: float = parameter("K", "initial temperature", above=0)
+    C: float = parameter("J/(m^2 K)", "total heat capacity", above=0)
+    D: float = parameter("W/m^2", "friction power", above=0)
+    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        own = {name: scene.reaction(name) for name in ("A", "E_a")}
+        heat = {"T_i": scene.temperature, "C": scene.capacity, "D": scene.friction_power()}
+        return {**own, **heat, "phi_i": scene.initial("phi")}
+
+    def quantities(self, t: Array) -> Quantities:
+        heating, T_E = self.D / self.C, self.E_a / GAS_CONSTANT
+        rise = heating * t
+        T = self.T_i + rise
+
+        def antiderivative(T: Array | float) -> Array:
+            s = np.asarray(T_E / T)
+            return np.asarray(T * np.exp(-s) * scaled_expint(2, s))
+
+        apart = self.A / heating * (antiderivative(T) - antiderivative(self.T_i))
+        exponent = T_E / self.T_i * rise / T
+        early = (exponent < 0.5) & (rise < 0.5 * self.T_i)  # there the difference cancels
+        soon = short_integral(lambda t: self.A * np.exp(-T_E / (self.T_i + heating * t)), t)
+        reacted = np.where(early, soon, apart)
+        return {
+            "phi": self.phi_i - (1.0 - self.phi_i) * np.expm1(-reacted),
+            "T": T,
+            "ln_unbonded": np.log1p(-self.phi_i) - reacted,
         }

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class BouncingBody(UniformBody):
@@ -28,8 +26,6 @@ class BouncingBody(UniformBody):
     (0.2, 0.6000000000000001, 0.05)
     """
 
-    name: ClassVar[str] = "bouncing-body"
-
     m: float = parameter("kg/m^2", "mass", above=0)
     e: float = parameter("1", "coefficient of restitution", default=0.0, at_least=0, at_most=1)
     F_n: float = parameter("Pa", "load, negative where it presses", at_most=0)
@@ -43,55 +39,52 @@ class BouncingBody(UniformBody):
         return {**own, **start, **super().from_scene(scene)}
 
     @property
-    def _fall(self) -> float:
-        return -self.F_n / self.m
-
-    @property
-    def _speed(self) -> float:
-        return math.sqrt(self.v_n_i**2 + 2 * self._fall * self.g_n_i)
+    def _fall(self) -> tuple[float, float]:
+        """Acceleration towards contact, and the speed of the first impact."""
+        acceleration = -self.F_n / self.m
+        return acceleration, math.sqrt(self.v_n_i**2 + 2 * acceleration * self.g_n_i)
 
     @property
     def first(self) -> float:
         """Time [s] of the first impact."""
-        if not self._fall:
+        a, speed = self._fall
+        if not a:
             return -self.g_n_i / self.v_n_i if self.v_n_i < 0 else math.inf
-        return (self.v_n_i + self._speed) / self._fall
+        return (self.v_n_i + speed) / a
 
     @property
     def rest_time(self) -> float:
         """Time [s] from which on it rests."""
-        if self.e == 1 or not self._fall:
+        a, speed = self._fall
+        if self.e == 1 or not a:
             return self.first if self.e == 0 else math.inf
-        return self.first + 2 * self._speed / self._fall * self.e / (1 - self.e)
+        return self.first + 2 * speed / a * self.e / (1 - self.e)
 
-    def _rebounds(self, t: Array) -> Array:
-        """Number of impacts by the times, before it rests."""
-        if not self._fall or self.e == 0:
-            return np.where(t < self.first, 0.0, 1.0)
-        flights = np.maximum((t - self.first) * self._fall / (2 * self._speed), 0.0)
-        left = 1 - flights * (1 - self.e) / self.e
-        count = flights if self.e == 1 else np.log(np.maximum(left, np.finfo(float).tiny)) / math.log(self.e)
-        whole = np.floor(count)
-        # The logarithm rounds: it may be in the flight before, or beyond.
-        whole += np.where(flights >= self._sum(whole + 1), 1.0, 0.0) - np.where(flights < self._sum(whole), 1.0, 0.0)
-        return np.where(t < self.first, 0.0, whole + 1)
+    def quantities(self, t: Array) -> Quantities:
+        a, speed = self._fall
+        e, first = self.e, self.first
+        flight = 2 * speed / a if a else math.inf  # lasts a flight that begins with the speed of the first impact
 
-    def _sum(self, n: Array) -> Array:
-        """Flights after the first impact up to a number, in times of one with the speed of the first impact."""
-        return n if self.e == 1 else self.e * (1 - self.e**n) / (1 - self.e)
+        def flown(n: Array) -> Array:
+            """Duration of n flights after the first impact, in units of ``flight``."""
+            return n if e == 1 else e * (1 - e**n) / (1 - e)
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        n = self._rebounds(t)
-        started = self.first + 2 * self._speed / self._fall * self._sum(n - 1) if self._fall else self.first
-        tau = np.where(n > 0, t - started, t)
-        v = np.where(n > 0, self._speed * self.e**n, self.v_n_i)
-        g = np.where(n > 0, 0.0, self.g_n_i) + v * tau - self._fall * tau**2 / 2
+        n = np.where(t < first, 0.0, 1.0)  # impacts by the times
+        if a and e:
+            flights = np.maximum((t - first) / flight, 0.0)
+            left = np.maximum(1 - flights * (1 - e) / e, np.finfo(float).tiny)
+            whole = np.floor(flights if e == 1 else np.log(left) / math.log(e))
+            # The logarithm rounds: it may be in the flight before, or beyond.
+            whole += np.where(flights >= flown(whole + 1), 1.0, 0.0) - np.where(flights < flown(whole), 1.0, 0.0)
+            n = np.where(t < first, 0.0, whole + 1)
+        since = np.where(n > 0, t - first - (flight * flown(n - 1) if a else 0.0), t)
+        v = np.where(n > 0, speed * e**n, self.v_n_i)
+        g = np.where(n > 0, 0.0, self.g_n_i) + v * since - a * since**2 / 2
         rests = t >= self.rest_time
-        lost = np.where(rests, 1.0, 1 - self.e ** (2 * n))
-        heat = self.m * self._speed**2 / 2 * lost
+        heat = self.m * speed**2 / 2 * np.where(rests, 1.0, 1 - e ** (2 * n))
         return {
             "g_n": np.where(rests, 0.0, g),
-            "v_n": np.where(rests, 0.0, v - self._fall * tau),
+            "v_n": np.where(rests, 0.0, v - a * since),
             "released": heat,
             "T": self.heated(heat),
         }

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._inversion import Separable, increasing_root, short_integral
-from surfacechem.references._special_functions import lambert_of_exp, remainder, scaled_expint
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._numerics import (
+    Separable,
+    increasing_root,
+    lambert_of_exp,
+    remainder,
+    scaled_expint,
+    short_integral,
+)
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 from surfacechem.references.bell import BellBond
 
 FAR = 0.1
@@ -56,49 +60,37 @@ class SharedLoadCluster(Cluster):
     '0.559773594776 s, 0.582551985238'
     """
 
-    name: ClassVar[str] = "shared-load-cluster"
-
     @property
     def end_time(self) -> float:
         """Time [s] at which the last bond breaks; zero below 1e-323 s."""
-        start = self._start
+        start = self.load / self.phi_i
         return float(np.exp(-start) * scaled_expint(1, np.array(start))) / self.k_off
 
-    @property
-    def _start(self) -> float:
-        return self.load / self.phi_i
+    def quantities(self, t: Array) -> Quantities:
+        # The growth w of F/phi from its start x_0 solves e^x_0 [E_1(x_0) - E_1(x_0 + w)] = k_off t e^x_0: as it stands
+        # in the first half of the time, by logarithms of what is left in the second.
+        x_0 = self.load / self.phi_i
+        scaled, whole = np.exp(x_0 + np.log(self.k_off * t)), float(scaled_expint(1, np.array(x_0)))
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        exponent = self._start + self._growth(np.exp(self._start + np.log(self.k_off * t)))
+        def slope(w: Array) -> Array:
+            return np.exp(-w) / (x_0 + w)
+
+        def elapsed(w: Array) -> tuple[Array, Array]:
+            apart = scaled_expint(1, np.array(x_0)) - np.exp(-w) * scaled_expint(1, x_0 + w)
+            near = w < 0.25 * min(1.0, x_0)  # there the integrals cancel
+            return np.where(near, short_integral(slope, w), apart), slope(w)
+
+        def log_left(w: Array) -> tuple[Array, Array]:
+            left = scaled_expint(1, x_0 + w)
+            return w - np.log(left), 1.0 / (left * (x_0 + w))
+
+        early, nothing = scaled < 0.5 * whole, np.zeros_like(scaled)
+        first = increasing_root(elapsed, np.where(early, scaled, 0.0), nothing, nothing + max(1.0, x_0) * 50.0)
+        left = -np.log(np.where(early, 0.5, np.maximum(1.0 - scaled / whole, 2.0**-60)) * whole)
+        last = increasing_root(log_left, left, nothing, np.maximum(left, 1.0) + 1.0)
+        exponent = x_0 + np.where(early, first, last)
         phi = np.where(t < self.end_time, self.load / exponent, 0.0)
         return {"phi": phi, "f": self.t_n / (self.n_c * phi)}
-
-    def _growth(self, scaled: Array) -> Array:
-        """By how much the exponent F/phi has grown at the time ``scaled``, in units of the start's rate."""
-        x_0 = self._start
-        whole = float(scaled_expint(1, np.array(x_0)))
-        early = scaled < 0.5 * whole
-        nothing = np.zeros_like(scaled)
-        spent = np.where(early, scaled, 0.0)
-        first = increasing_root(self._elapsed, spent, nothing, nothing + max(1.0, x_0) * 50.0)
-        remaining = -np.log(np.where(early, 0.5, np.maximum(1.0 - scaled / whole, 2.0**-60)) * whole)
-        last = increasing_root(self._log_remaining, remaining, nothing, np.maximum(remaining, 1.0) + 1.0)
-        return np.where(early, first, last)
-
-    def _elapsed(self, w: Array) -> tuple[Array, Array]:
-        r""":math:`e^{x_0}[E_1(x_0)-E_1(x_0+w)]` and its slope."""
-        x_0 = self._start
-        apart = scaled_expint(1, np.array(x_0)) - np.exp(-w) * scaled_expint(1, x_0 + w)
-        near = w < 0.25 * min(1.0, x_0)
-        return np.where(near, short_integral(self._slope, w), apart), self._slope(w)
-
-    def _slope(self, w: Array) -> Array:
-        return np.exp(-w) / (self._start + w)
-
-    def _log_remaining(self, w: Array) -> tuple[Array, Array]:
-        r""":math:`-\ln[e^{x_0}E_1(x_0+w)]` and its slope."""
-        scaled = scaled_expint(1, self._start + w)
-        return w - np.log(scaled), 1.0 / (scaled * (self._start + w))
 
 
 @dataclass(frozen=True)
@@ -150,8 +142,6 @@ class RebindingCluster(Cluster):
     '0.2784645428, 0.2178117057, 3.163522 s'
     """
 
-    name: ClassVar[str] = "rebinding-cluster"
-
     k_on: float = parameter("1/s", "rate at which free sites bond", above=0)
 
     @classmethod
@@ -177,7 +167,7 @@ class RebindingCluster(Cluster):
     def breaks(self) -> bool:
         """True if the cluster goes to rupture, not to its steady state."""
         below = self.phi_i < self.critical_state and bool(
-            self._critical.rate(self.phi_i - self.critical_state, self.phi_i) > 0.0
+            self._about(0.0).rate(self.phi_i - self.critical_state, self.phi_i) > 0.0
         )
         return self.load > self.critical_load or below
 
@@ -199,10 +189,6 @@ class RebindingCluster(Cluster):
         distance = math.exp(exponent) * (self.load - self.critical_load)
         return math.pi * math.sqrt(2.0 / (distance * curvature)) / self.k_off
 
-    @property
-    def _critical(self) -> Expansion:
-        return self._about(0.0)
-
     def _about(self, d: float) -> Expansion:
         """The rate about the state that is ``d`` above the critical one."""
         state, exponent, below = self.critical_state + d, 1.0 + self.critical_load, self.critical_load - self.load
@@ -216,7 +202,7 @@ class RebindingCluster(Cluster):
         """Distance of the stable state from the critical one."""
         if self.load > self.critical_load:
             raise InputError(f"{self.name}: no steady state above t_n = {self.critical_traction!r} Pa.")
-        expansion = self._critical
+        expansion = self._about(0.0)
         target = np.array([-expansion.value])
         if target[0] == 0.0:
             return 0.0
@@ -230,28 +216,25 @@ class RebindingCluster(Cluster):
     @cached_property
     def _path(self) -> Separable:
         """The way from the start to rupture or to the steady state, in units of 1/k_off."""
+        scale, critical = math.exp(1.0 + self.critical_load), self._about(0.0)
         if self.breaks:
-            return Separable(self._rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
-        end = self._about(self._above_critical)
-        side = math.copysign(1.0, self.phi_i - self.steady_state)
+
+            def rupture(gone: Array, left: Array) -> Array:
+                if self.load > self.critical_load + FAR * self.critical_state:  # there the two terms do not cancel
+                    return left * np.exp(self.load / left) - self.k_on / self.k_off * (1.0 - left)
+                delta = np.where(gone < left, self.phi_i - self.critical_state - gone, left - self.critical_state)
+                return scale * critical.rate(delta, left)
+
+            return Separable(rupture, self.phi_i, [x for x in [self.phi_i - self.critical_state] if x > 0.0])
+        end, steady = self._about(self._above_critical), self.steady_state
+        side = math.copysign(1.0, self.phi_i - steady)
 
         def relaxing(_: Array, left: Array) -> Array:
-            return side * self._scale * end.rate(side * left, self.steady_state + side * left)
+            return side * scale * end.rate(side * left, steady + side * left)
 
-        return Separable(relaxing, abs(self.phi_i - self.steady_state))
+        return Separable(relaxing, abs(self.phi_i - steady))
 
-    @property
-    def _scale(self) -> float:
-        return math.exp(1.0 + self.critical_load)
-
-    def _rupture(self, gone: Array, left: Array) -> Array:
-        """Rate at which bonds break; far above the critical load its two terms do not cancel."""
-        if self.load > self.critical_load + FAR * self.critical_state:
-            return left * np.exp(self.load / left) - self.k_on / self.k_off * (1.0 - left)
-        delta = np.where(gone < left, self.phi_i - self.critical_state - gone, left - self.critical_state)
-        return self._scale * self._critical.rate(delta, left)
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         if not self.breaks and self.phi_i == self.steady_state:
             phi: Array | float = self.phi_i
         else:

@@ -8,7 +8,7 @@ Talbot quadratures and rational approximations, BIT 46, for the contour.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Varying, parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 if TYPE_CHECKING:
     from surfacechem.scene import Body, Scene
@@ -120,7 +120,6 @@ class ConductingSlabs(Reference):
     '306.43289553'
     """
 
-    name: ClassVar[str] = "conducting-slabs"
     continuous: ClassVar[bool] = True
 
     T_1: float = parameter("K", "initial temperature of body 1", above=0)
@@ -152,7 +151,7 @@ class ConductingSlabs(Reference):
             Slab(self.T_2, self.C_2, self.thickness_2, self.conductivity_2, self.h_far_2, self.T_far_2),
         )
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         """Temperatures at the contact; through a resistance also the heat fluxes, which begin finite."""
         T_1, T_2 = (self.profile(number, np.zeros(1), t)[:, 0] for number in (1, 2))
         if not self.R:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class CoulombStop(UniformBody):
@@ -26,8 +23,6 @@ class CoulombStop(UniformBody):
     >>> slider.stop_time, slider.stop_distance, float(slider.solution(0.01)["v"])
     (0.0013333333333333333, 0.0013333333333333333, 0.0)
     """
-
-    name: ClassVar[str] = "coulomb-stop"
 
     m: float = parameter("kg/m^2", "mass", above=0)
     mu: float = parameter("1", "sliding friction coefficient", above=0)
@@ -49,7 +44,7 @@ class CoulombStop(UniformBody):
         """Slip [m] at rest."""
         return 0.5 * self.v_i * self.stop_time
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         sliding = np.minimum(t, self.stop_time)
         v = np.where(t < self.stop_time, self.v_i - self.mu * self.p / self.m * sliding, 0.0)
         slip = sliding * 0.5 * (self.v_i + v)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class ElasticContact(Reference):
@@ -25,8 +22,6 @@ class ElasticContact(Reference):
     '-9990.009990'
     """
 
-    name: ClassVar[str] = "elastic-contact"
-
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     E_n: float = parameter("Pa/m", "contact stiffness", above=0)
     w_i: float = parameter("m", "initial far-field displacement")
@@ -37,7 +32,7 @@ class ElasticContact(Reference):
         own = {"k": scene.support("normal", "k"), "E_n": scene.potential("E_n")}
         return {**own, "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t
         g, delta = self.k / (self.k + self.E_n) * w, self.E_n / (self.k + self.E_n) * w
         energies = {"E_spring_n": 0.5 * self.k * delta**2, "U_contact": 0.5 * self.E_n * g**2}

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references._inversion import increasing_root
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._numerics import increasing_root
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class IsentropicCohesiveOpening(UniformBody):
@@ -29,8 +26,6 @@ class IsentropicCohesiveOpening(UniformBody):
     '286.764808584 232.042954289'
     """
 
-    name: ClassVar[str] = "isentropic-cohesive-opening"
-
     t_max: float = parameter("Pa", "strength at T_0", above=0)
     g_0: float = parameter("m", "gap at the strength", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
@@ -46,7 +41,7 @@ class IsentropicCohesiveOpening(UniformBody):
         """Temperature [K] of the open bodies."""
         return self.T_i - float(self._a(np.array(self.g_i))) / self.T_i**2
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         g, B = self.g_i + self.g_dot * t, self.open_temperature
         a = self._a(g)
         low = np.full_like(a, max(B, 0.0))

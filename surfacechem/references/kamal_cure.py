@@ -1,18 +1,16 @@
-"""Autocatalytic cure with the heat of reaction in the bodies, for both energy models."""
+"""Autocatalytic cure with the heat of reaction in the bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._inversion import Separable
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import Separable
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class KamalCureConstantCapacity(Reference):
@@ -30,8 +28,6 @@ class KamalCureConstantCapacity(Reference):
     >>> f"{layer.solution(190.424045193457)['phi']:.10f}"
     '0.5000000000'
     """
-
-    name: ClassVar[str] = "kamal-cure-constant-capacity"
 
     A_1: float = parameter("1/s", "pre-exponential factor of the uncatalysed reaction", at_least=0)
     E_1: float = parameter("J/mol", "activation energy of the uncatalysed reaction", default=0.0, at_least=0)
@@ -54,13 +50,9 @@ class KamalCureConstantCapacity(Reference):
         if self.A_1 == 0.0 and (self.phi_i == 0.0 or self.A_2 == 0.0):
             raise InputError(f"{self.name}: nothing starts the reaction; A_1 or phi_i and A_2 must be above zero.")
 
-    def temperature(self, cured: Array) -> Array:
-        """Temperature when phi has grown by ``cured``."""
-        return self.T_i + self.delta_T * cured
-
     def rate(self, cured: Array, left: Array) -> Array:
         """Rate of phi [1/s] when it has grown by ``cured`` and is short of one by ``left``."""
-        RT = GAS_CONSTANT * self.temperature(cured)
+        RT = GAS_CONSTANT * (self.T_i + self.delta_T * cured)
         k_1, k_2 = self.A_1 * np.exp(-self.E_1 / RT), self.A_2 * np.exp(-self.E_2 / RT)
         return np.asarray((k_1 + k_2 * (self.phi_i + cured) ** self.m) * left**self.n)
 
@@ -68,38 +60,9 @@ class KamalCureConstantCapacity(Reference):
     def _path(self) -> Separable:
         return Separable(self.rate, 1.0 - self.phi_i)
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         if self.phi_i == 1.0:
             return {"phi": 1.0, "unreacted": 0.0, "T": self.T_i, "phi_dot": 0.0}
         cured, left = self._path.position(t)
         phi = np.where(left < 0.5, 1.0 - left, self.phi_i + cured)
-        return {"phi": phi, "unreacted": left, "T": self.temperature(cured), "phi_dot": self.rate(cured, left)}
-
-
-class KamalCure(KamalCureConstantCapacity):
-    r"""Adiabatic autocatalytic cure, quadratic energies.
-
-    .. math:: \dot\phi=\Big(A_1e^{-E_1/R_gT}+A_2e^{-E_2/R_gT}\phi^m\Big)(1-\phi)^n,\qquad
-        T^2=T_i^2+2T_0\,\Delta T\,(\phi-\phi_i)
-
-    The time :math:`t=\int d\phi/\dot\phi(\phi,T(\phi))` is a sum of Gauss panels that shrink towards both ends, and is
-    inverted to rounding. A ΔT of zero is isothermal cure. :math:`n\ge1`; any t >= 0.
-
-    Source: Kamal & Sourour (1973), Polym. Eng. Sci. 13, 59-64, doi 10.1002/pen.760130110, integrated; quadratic
-    energy of Sauer, Duong & Mandadapu (2021).
-
-    >>> layer = KamalCure(A_1=4e5, E_1=7e4, A_2=2e6, E_2=6e4, m=0.5, n=1.5, T_i=360.0, T_0=360.0, delta_T=120.0)
-    >>> f"{layer.solution(194.380585280484161)['phi']:.10f}"
-    '0.5000000000'
-    """
-
-    name: ClassVar[str] = "kamal-cure"
-
-    T_0: float = parameter("K", "reference temperature", above=0)
-
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "T_0": scene.constant("T_0")}
-
-    def temperature(self, cured: Array) -> Array:
-        return np.sqrt(self.T_i**2 + 2.0 * self.T_0 * self.delta_T * cured)
+        return {"phi": phi, "unreacted": left, "T": self.T_i + self.delta_T * cured, "phi_dot": self.rate(cured, left)}

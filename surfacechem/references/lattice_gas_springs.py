@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references._special_functions import lambert_of_exp
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import lambert_of_exp
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class LatticeGasSprings(Reference):
@@ -32,8 +30,6 @@ class LatticeGasSprings(Reference):
     >>> f"{1e9 * film.peak_gap:.9f} nm, {film.peak_traction:.6f} Pa, {film.work_of_separation:.9e} J/m^2"
     '9.719412472 nm, 92932.604786 Pa, 6.000000212e-04 J/m^2'
     """
-
-    name: ClassVar[str] = "lattice-gas-springs"
 
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
     epsilon: float = parameter("J", "energy released per bond")
@@ -81,7 +77,7 @@ class LatticeGasSprings(Reference):
         thermal = BOLTZMANN * self.T
         return self.n_c * thermal * float(np.logaddexp(0.0, self.epsilon / thermal))
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         distance = float(self.equilibrium(self.g_n)) - self.phi_i
         relaxation = self.k_i * (1.0 - self.phi_i) / distance if distance else 0.0  # k_f + k_r
         phi = self.phi_i - distance * np.expm1(-relaxation * t)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references._inversion import increasing_root
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import increasing_root
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 SERIES_LIMIT = 0.1
 """Up to here a series of 16 terms is exact: the next is 0.1^18 / 18 against 0.1^2 / 2."""
@@ -35,8 +33,6 @@ class SemenovFold(Reference):
     >>> f"{interface.solution(0.0)['T_c']:.10f}, {interface.critical_dissipation:.10f}"
     '304.6392190597, 367.8794411714'
     """
-
-    name: ClassVar[str] = "semenov-fold"
 
     T_0: float = parameter("K", "temperature of both bodies", above=0)
     beta: float = parameter("1/K", "growth of the dissipation per kelvin", above=0)
@@ -64,7 +60,7 @@ class SemenovFold(Reference):
         """Interface temperature [K] at the largest D_0."""
         return self.T_0 + 1.0 / self.beta
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         scaled = scaled_rise(np.array([self.D_0 / self.critical_dissipation]))[0]
         return {"T_c": self.T_0 + scaled / self.beta, "D": self.H * scaled / self.beta}
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import ConstantCapacity, EnergyModel, PerfectContact, QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class Sliding(PerfectContact):
@@ -25,7 +24,6 @@ class Sliding(PerfectContact):
     '519.6152422707'
     """
 
-    name: ClassVar[str] = "sliding"
     model: ClassVar[EnergyModel] = QuadraticEnergy()
 
     T_i: float = parameter("K", "initial temperature", above=0)
@@ -35,7 +33,7 @@ class Sliding(PerfectContact):
     def from_scene(cls, scene: SceneView) -> Parameters:
         return {**super().from_scene(scene), "T_i": scene.temperature, "D": scene.friction_power()}
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         rise = self.model.rise(self.D * t, self.C, self.T_0, self.T_i)
         return {
             "T": self.T_i + rise,
@@ -57,5 +55,4 @@ class SlidingConstantCapacity(Sliding):
     '600.0000000000'
     """
 
-    name: ClassVar[str] = "sliding-constant-capacity"
     model: ClassVar[EnergyModel] = ConstantCapacity()

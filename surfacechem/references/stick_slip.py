@@ -1,17 +1,21 @@
-"""Stick-slip of a mass that is pulled by a spring at constant speed."""
+"""Stick-slip of a mass that a spring pulls at constant speed: without bonds, with bonds that break, or form again."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from itertools import islice
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import increasing_root
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+
+CYCLES = 1_000_000
+"""Cycles at most, so that a time far beyond them is refused and not waited for."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,9 @@ class StickSlip(Reference):
     Source: Sauer, Duong & Mandadapu (2021), eqs. e:tt_max and e:dry_fric, with an oscillator, integrated.
 
     >>> slider = StickSlip(m=10.0, k=1e8, V=1e-3, t_s=6e4, t_k=4e4)
-    >>> f"{slider.period:.12f} {slider.slip_time:.6e} {slider.v_max:.9f} {slider.heat_per_cycle:.9f}"
+    >>> f"{slider.period:.12f} {slider.slip_time:.6e} {slider.slip.v_max:.9f} {slider.heat_per_cycle:.9f}"
     '0.400994458826 9.944588e-04 0.633456323 16.039778353'
     """
-
-    name: ClassVar[str] = "stick-slip"
 
     m: float = parameter("kg/m^2", "mass", above=0)
     k: float = parameter("Pa/m", "tangential stiffness", above=0)
@@ -123,29 +125,203 @@ class StickSlip(Reference):
         return self.slip_time + self.stick_time
 
     @property
-    def slip_distance(self) -> float:
-        """Slip [m] of a cycle."""
-        return self.slip.distance
-
-    @property
-    def v_max(self) -> float:
-        """Largest sliding velocity [m/s]."""
-        return self.slip.v_max
-
-    @property
     def heat_per_cycle(self) -> float:
         """Heat [J/m^2] of a cycle."""
-        return self.t_k * self.slip_distance
+        return self.t_k * self.slip.distance
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        since = t - self.onset_time
+    def quantities(self, t: Array) -> Quantities:
+        since, pull = t - self.onset_time, self.k * self.V
         cycle = np.maximum(np.floor(since / self.period), 0.0)
         within = since - cycle * self.period
         slips = (since >= 0.0) & (within < self.slip_time)
         slip, v, above = self.slip.motion(np.where(slips, within, 0.0))
-        held = np.where(since < 0.0, 0.0, self.slip_distance)
-        rest = 2.0 * self.t_k - self.t_s + self.k * self.V * (within - self.slip_time)
-        slip = cycle * self.slip_distance + np.where(slips, slip, held)
-        spring = np.where(slips, self.t_k + above, np.where(since < 0.0, self.k * self.V * t, rest))
+        slip = cycle * self.slip.distance + np.where(slips, slip, np.where(since < 0.0, 0.0, self.slip.distance))
+        rest = 2.0 * self.t_k - self.t_s + pull * (within - self.slip_time)
+        spring = np.where(slips, self.t_k + above, np.where(since < 0.0, pull * t, rest))
         tractions = {"t_t": np.where(slips, self.t_k, spring), "spring_traction": spring}
         return {"v": np.where(slips, v, 0.0), "u_t": slip, **tractions, "heat": self.t_k * slip}
+
+
+class BondedSlider(Reference):
+    """A mass on a driven spring whose contact sticks the better the more bonds it has."""
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    k: float = parameter("Pa/m", "tangential stiffness", above=0)
+    V: float = parameter("m/s", "speed of the spring's end", above=0)
+    p: float = parameter("Pa", "contact pressure", above=0)
+    mu_b: float = parameter("1", "static friction coefficient of complete bonding", above=0)
+    mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
+    mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        held = {name: scene.support("tangential", name) for name in ("m", "k")}
+        T, T_0 = scene.temperature, scene.constant("T_0")
+        cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
+        limits = {name: scene.friction(name) for name in ("mu_b", "mu_ub")}
+        static = {name: None if mu is None else mu * cooler for name, mu in limits.items()}
+        return {**held, **static, "V": scene.ramp("w_t"), "p": scene.initial("p"), "mu_k": scene.friction("mu")}
+
+    def __post_init__(self) -> None:
+        """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""
+        super().__post_init__()
+        if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
+            raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
+
+
+class StickSlipDebonding(BondedSlider):
+    r"""Stick-slip that begins bonded: sticking bears :math:`\mu_bp` once and :math:`\mu_{ub}p` ever after.
+
+    The first slip begins at :math:`t_1=\mu_bp/(kV)` and drops the traction of the spring to :math:`(2\mu_k-\mu_b)p`,
+    which may push. From then on it is stick-slip without bonds,
+
+    .. math:: t_2=t_1+t_{slip}(\mu_b)+\frac{(\mu_{ub}+\mu_b-2\mu_k)p}{kV},\quad
+        t_{j+1}=t_j+t_{slip}(\mu_{ub})+\frac{2(\mu_{ub}-\mu_k)p}{kV}
+
+    for the beginnings of slips. The contact starts at rest, complete in its bonds, with a relaxed spring. Any t >= 0.
+
+    Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
+
+    >>> slider = StickSlipDebonding(m=10.0, k=1e8, V=1e-3, p=1e5, mu_b=0.9, mu_ub=0.6, mu_k=0.4)
+    >>> f"{slider.first.v_max:.9f} {slider.unbonded_from:.9f}"
+    '1.582139146 1.600993859'
+    """
+
+    @property
+    def first(self) -> Slip:
+        """The slip that breaks the bonds."""
+        return Slip(self.m, self.k, self.V, (self.mu_b - self.mu_k) * self.p)
+
+    @property
+    def onset_time(self) -> float:
+        """Time [s] of the first slip."""
+        return self.mu_b * self.p / (self.k * self.V)
+
+    @property
+    def unbonded_from(self) -> float:
+        """Time [s] of the second slip."""
+        left = (2.0 * self.mu_k - self.mu_b) * self.p
+        return self.onset_time + self.first.duration + (self.mu_ub * self.p - left) / (self.k * self.V)
+
+    def quantities(self, t: Array) -> Quantities:
+        onset, rest = self.onset_time, self.onset_time + self.first.duration
+        slip, v, above = self.first.motion(np.clip(t - onset, 0.0, self.first.duration))
+        sliding, t_k = (t > onset) & (t < rest), self.mu_k * self.p
+        start = np.where(t < rest, 0.0, (2.0 * self.mu_k - self.mu_b) * self.p)
+        pulled = start + self.k * self.V * (t - np.where(t < rest, 0.0, rest))
+        spring = np.where(sliding, t_k + above, pulled)
+        # Without bonds it goes on as plain stick-slip does from the onset of its first slip.
+        plain = StickSlip(m=self.m, k=self.k, V=self.V, t_s=self.mu_ub * self.p, t_k=t_k)
+        later = plain.solution(np.maximum(t - self.unbonded_from, 0.0) + plain.onset_time)
+        after = t >= self.unbonded_from
+        u_t = np.where(t < onset, 0.0, slip) + np.where(after, later["u_t"], 0.0)
+        return {
+            "phi": np.where(t > onset, 0.0, 1.0),
+            "u_t": u_t,
+            "v": np.where(after, later["v"], np.where(sliding, v, 0.0)),
+            "t_t": np.where(after, later["t_t"], np.where(sliding, t_k, spring)),
+            "spring_traction": np.where(after, later["spring_traction"], spring),
+            "heat": t_k * u_t,
+        }
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A stick and the slip that ends it."""
+
+    start: float
+    """Spring traction [Pa] at the beginning of the stick."""
+    stick_time: float
+    phi: float
+    """Bonding state at the end of the stick."""
+    limit: float
+    """Traction [Pa] at the end of the stick."""
+    slip: Slip
+
+    @property
+    def duration(self) -> float:
+        """Stick and slip [s]."""
+        return self.stick_time + self.slip.duration
+
+
+class StickSlipRebonding(BondedSlider):
+    r"""Stick-slip with a sticking limit that grows as bonds form; sliding breaks all of them.
+
+    .. math:: \dot\phi=\frac{1-\phi}\tau,\quad t_s=p\,[\mu_{ub}+(\mu_b-\mu_{ub})\phi],\quad
+        s=\alpha+\tau W_0\Big(-\frac\beta\tau e^{-\alpha/\tau}\Big)
+
+    is the duration of a stick that begins with the traction :math:`t_b`, with :math:`\alpha=(p\mu_b-t_b)/(kV)`,
+    :math:`\beta=p(\mu_b-\mu_{ub})/(kV)`; the next begins with :math:`2t_k-t_s`. In the steady cycle
+    :math:`\alpha=2p(\mu_b-\mu_k)/(kV)`, :math:`\beta=2p(\mu_b-\mu_{ub})/(kV)`. For :math:`\mu_{ub}=\mu_k` there is none
+    above :math:`V_c=2p(\mu_b-\mu_{ub})/(k\tau)`. Near there the Lambert function loses all digits; what is solved, to
+    rounding, is the equation without it. The contact starts at rest, without bonds, with a relaxed spring.
+
+    Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
+
+    >>> slider = StickSlipRebonding(m=10.0, k=1e8, V=7.5e-5, p=1e5, mu_b=0.7, mu_ub=0.4, mu_k=0.4, tau=2.0)
+    >>> f"{slider.steady.stick_time:.9f} {slider.critical_speed:.9f}"
+    '7.841380790 0.000300000'
+    """
+
+    tau: float = parameter("s", "time scale of bonding", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), "tau": scene.relaxation_time}
+
+    @property
+    def critical_speed(self) -> float:
+        """Speed [m/s] above which a contact with mu_ub = mu_k slides without rest."""
+        return 2.0 * self.p * (self.mu_b - self.mu_ub) / (self.k * self.tau)
+
+    @property
+    def steady(self) -> Cycle:
+        """The cycle that repeats."""
+        excess = 2.0 * self.p * (self.mu_ub - self.mu_k)
+        if excess == 0.0 and self.critical_speed <= self.V:
+            raise InputError(f"{self.name}: no stick-slip above V = {self.critical_speed!r} m/s.")
+        cycle = self._cycle(math.nan, excess, 2.0)
+        return Cycle(2.0 * self.p * self.mu_k - cycle.limit, cycle.stick_time, cycle.phi, cycle.limit, cycle.slip)
+
+    def cycles(self) -> Iterator[Cycle]:
+        """The cycles from the start on."""
+        start = 0.0
+        while True:
+            cycle = self._cycle(start, self.p * self.mu_ub - start, 1.0)
+            yield cycle
+            start = 2.0 * self.p * self.mu_k - cycle.limit
+
+    def _cycle(self, start: float, missing: float, weight: float) -> Cycle:
+        """The stick after which the spring has pulled by `missing` more than `weight` times what bonds have added."""
+        scale = self.k * self.V * self.tau
+        ratio = weight * self.p * (self.mu_b - self.mu_ub) / scale
+
+        # x, the stick time over tau, solves x + ratio (exp(-x) - 1) = missing / scale, which rises beyond ln(ratio).
+        def pulled(x: Array) -> tuple[Array, Array]:
+            return x + ratio * np.expm1(-x), 1.0 - ratio * np.exp(-x)
+
+        target, low = np.array([missing / scale]), np.array([max(math.log(ratio), 0.0) if ratio > 0.0 else 0.0])
+        x = float(increasing_root(pulled, target, low, target + ratio)[0])
+        phi = -math.expm1(-x)
+        limit = self.p * (self.mu_ub + (self.mu_b - self.mu_ub) * phi)
+        drop = self.p * ((self.mu_ub - self.mu_k) + (self.mu_b - self.mu_ub) * phi)
+        return Cycle(start, x * self.tau, phi, limit, Slip(self.m, self.k, self.V, drop))
+
+    def quantities(self, t: Array) -> Quantities:
+        values = np.zeros((5, len(t)))
+        begin, slipped, last = 0.0, 0.0, float(np.max(t, initial=0.0))
+        for cycle in islice(self.cycles(), CYCLES):
+            inside = (t >= begin) & (t < begin + cycle.duration)
+            since = t[inside] - begin
+            sticks = since < cycle.stick_time
+            slip, v, above = cycle.slip.motion(np.where(sticks, 0.0, since - cycle.stick_time))
+            phi = np.where(sticks, -np.expm1(-since / self.tau), 0.0)
+            spring = np.where(sticks, cycle.start + self.k * self.V * since, self.p * self.mu_k + above)
+            values[:, inside] = phi, v, slipped + slip, np.where(sticks, spring, self.p * self.mu_k), spring
+            begin, slipped = begin + cycle.duration, slipped + cycle.slip.distance
+            if begin > last:
+                break
+        else:
+            raise InputError(f"{self.name}: more than {CYCLES} cycles until t = {last!r} s.")
+        found = dict(zip(("phi", "v", "u_t", "t_t", "spring_traction"), values, strict=True))
+        return {**found, "heat": self.p * self.mu_k * found["u_t"]}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Iterator
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._special_functions import first_difference, second_difference
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references._numerics import first_difference, second_difference
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class HeatedMedium(Reference):
@@ -53,8 +52,6 @@ class ThreeTemperatures(HeatedMedium):
     '310.081108421144'
     """
 
-    name: ClassVar[str] = "three-temperatures"
-
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the medium", above=0)
     T_c: float = parameter("K", "initial temperature of the medium", above=0)
 
@@ -62,74 +59,57 @@ class ThreeTemperatures(HeatedMedium):
     def from_scene(cls, scene: SceneView) -> Parameters:
         return {**super().from_scene(scene), "C_c": scene.constant("C_c"), "T_c": scene.initial("T_c")}
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        (q_1, heat_1), (q_2, heat_2), sizes = self._fluxes(t)
-        to_1, to_2, (by_1, by_2, off_1, off_2) = q_1 / self.h_1, q_2 / self.h_2, sizes
-        given = self.D_0 * t + self.D_1 * t * first_difference(np.zeros_like(t), -self.gamma * t)
-        stored = (given - heat_1 - heat_2) / self.C_c
-        by_c = self.T_c + (np.abs(given) + by_1 * self.C_1 + by_2 * self.C_2) / self.C_c
-        bodies = self.T_1 + heat_1 / self.C_1, self.T_2 + heat_2 / self.C_2
-        # Each temperature by the way on which the least is lost: its own heat, or that of another and the flux between.
-        ways = (self.T_1 + by_1 + off_1, self.T_2 + by_2 + off_2, by_c)
-        T_c = np.choose(np.argmin(ways, axis=0), (bodies[0] + to_1, bodies[1] + to_2, self.T_c + stored))
-        least = np.min(ways, axis=0)
-        T_1 = np.where(self.T_1 + by_1 <= least + off_1, bodies[0], T_c - to_1)
-        T_2 = np.where(self.T_2 + by_2 <= least + off_2, bodies[1], T_c - to_2)
-        return {"T_1": T_1, "T_2": T_2, "T_c": T_c, "q_1": q_1, "q_2": q_2}
-
-    def _fluxes(self, t: Array) -> tuple[tuple[Array, Array], tuple[Array, Array], tuple[Array, Array, Array, Array]]:
-        """Flux and heat into each body, and the sizes of the terms that they are sums of, as temperatures [K]."""
+    def quantities(self, t: Array) -> Quantities:
+        zero, decay, total = np.zeros_like(t), -self.gamma * t, self.C_1 + self.C_2 + self.C_c
+        # Flux and heat into each body, and the sizes of the terms that they are sums of, as temperatures [K].
         q, heat, by, off = np.zeros((4, 2, t.size))
         for rate, mode, initial in self.modes():
-            for k, (root, C, h) in enumerate(((self._root_1, self.C_1, self.h_1), (self._root_2, self.C_2, self.h_2))):
-                amplitude, integral, size, area = self._mode_in_time(t, rate, mode, initial)
-                q[k] += root * mode[k] * amplitude
-                heat[k] += root * mode[k] * integral
-                by[k] += root * abs(mode[k]) * area / C
-                off[k] += root * abs(mode[k]) * size / h
-        return (q[0], heat[0]), (q[1], heat[1]), (by[0], by[1], off[0], off[1])
+            # Amplitude of the mode and its integral over time: free decay and both parts of the source.
+            drive = rate * sum(axis * C / total / root for axis, C, _, root in zip(mode, *self._paths, strict=True))
+            free = -rate * t
+            amplitudes, integrals = [initial * np.exp(free)], [initial * t * first_difference(zero, free)]
+            for strength, exponent in ((self.D_0, zero), (self.D_1, decay)):
+                amplitudes.append(strength * drive * t * first_difference(exponent, free))
+                integrals.append(strength * drive * t**2 * second_difference(exponent, free))
+            for k, (axis, C, h, root) in enumerate(zip(mode, *self._paths, strict=True)):
+                q[k] += root * axis * np.sum(amplitudes, axis=0)
+                heat[k] += root * axis * np.sum(integrals, axis=0)
+                by[k] += root * abs(axis) * np.sum(np.abs(integrals), axis=0) / C
+                off[k] += root * abs(axis) * np.sum(np.abs(amplitudes), axis=0) / h
+        given = self.D_0 * t + self.D_1 * t * first_difference(zero, decay)
+        by_c = self.T_c + (np.abs(given) + by[0] * self.C_1 + by[1] * self.C_2) / self.C_c
+        bodies, to = (self.T_1 + heat[0] / self.C_1, self.T_2 + heat[1] / self.C_2), (q[0] / self.h_1, q[1] / self.h_2)
+        # Each temperature by the way on which the least is lost: its own heat, or that of another and the flux between.
+        ways = (self.T_1 + by[0] + off[0], self.T_2 + by[1] + off[1], by_c)
+        own = self.T_c + (given - heat[0] - heat[1]) / self.C_c
+        T_c = np.choose(np.argmin(ways, axis=0), (bodies[0] + to[0], bodies[1] + to[1], own))
+        least = np.min(ways, axis=0)
+        T_1 = np.where(self.T_1 + by[0] <= least + off[0], bodies[0], T_c - to[0])
+        T_2 = np.where(self.T_2 + by[1] <= least + off[1], bodies[1], T_c - to[1])
+        return {"T_1": T_1, "T_2": T_2, "T_c": T_c, "q_1": q[0], "q_2": q[1]}
 
     @property
-    def _root_1(self) -> float:
-        return float(np.sqrt(self.h_1))
-
-    @property
-    def _root_2(self) -> float:
-        return float(np.sqrt(self.h_2))
+    def _paths(self) -> tuple[tuple[float, float], ...]:
+        """Capacities of the bodies, conductances to them, and the roots of these."""
+        return (self.C_1, self.C_2), (self.h_1, self.h_2), (float(np.sqrt(self.h_1)), float(np.sqrt(self.h_2)))
 
     def modes(self) -> Iterator[tuple[float, tuple[float, float], float]]:
-        """Decay rate [1/s], unit vector and initial amplitude of the fast and of the slow mode."""
-        fast, slow, (along, across) = self._rates_and_axes()
-        start = (self._root_1 * (self.T_c - self.T_1), self._root_2 * (self.T_c - self.T_2))
-        yield fast, (along, across), along * start[0] + across * start[1]
-        yield slow, (-across, along), along * start[1] - across * start[0]
+        """Decay rate [1/s], unit vector and initial amplitude of the fast and of the slow mode.
 
-    def _rates_and_axes(self) -> tuple[float, float, tuple[float, float]]:
-        """Eigenvalues of S and the eigenvector of the larger one: a Jacobi rotation, accurate entry by entry."""
+        The eigenvalues of S and the eigenvector of the larger one by a Jacobi rotation, accurate entry by entry.
+        """
+        _, _, (root_1, root_2) = self._paths
         own_1, own_2 = self.h_1 / self.C_1, self.h_2 / self.C_2
-        coupling = self._root_1 * self._root_2 / self.C_c
-        half_gap = 0.5 * ((own_1 - own_2) / coupling + (self.h_1 - self.h_2) / (self._root_1 * self._root_2))
+        coupling = root_1 * root_2 / self.C_c
+        half_gap = 0.5 * ((own_1 - own_2) / coupling + (self.h_1 - self.h_2) / (root_1 * root_2))
         tangent = 1.0 / (abs(half_gap) + np.hypot(1.0, half_gap))
         cosine = 1.0 / np.hypot(1.0, tangent)
         fast = max(own_1 + self.h_1 / self.C_c, own_2 + self.h_2 / self.C_c) + coupling * tangent
         slow = own_1 * (self.h_2 / self.C_c) * ((self.C_1 + self.C_2 + self.C_c) / self.C_2) / fast
-        axes = (cosine, cosine * tangent)
-        return fast, slow, axes if half_gap >= 0.0 else axes[::-1]
-
-    def _mode_in_time(
-        self, t: Array, rate: float, mode: tuple[float, float], initial: float
-    ) -> tuple[Array, Array, Array, Array]:
-        """Amplitude of a mode and its integral over time, of free decay and sources, and the sizes of their terms."""
-        zero, decay, source_decay = np.zeros_like(t), -rate * t, -self.gamma * t
-        total = self.C_1 + self.C_2 + self.C_c
-        drive = rate * (mode[0] * self.C_1 / total / self._root_1 + mode[1] * self.C_2 / total / self._root_2)
-        amplitudes = [initial * np.exp(decay)]
-        integrals = [initial * t * first_difference(zero, decay)]
-        for strength, exponent in ((self.D_0, zero), (self.D_1, source_decay)):
-            amplitudes.append(strength * drive * t * first_difference(exponent, decay))
-            integrals.append(strength * drive * t**2 * second_difference(exponent, decay))
-        sizes = (np.sum(np.abs(terms), axis=0) for terms in (amplitudes, integrals))
-        return np.sum(amplitudes, axis=0), np.sum(integrals, axis=0), *sizes
+        along, across = (cosine, cosine * tangent) if half_gap >= 0.0 else (cosine * tangent, cosine)
+        start = (root_1 * (self.T_c - self.T_1), root_2 * (self.T_c - self.T_2))
+        yield fast, (along, across), along * start[0] + across * start[1]
+        yield slow, (-across, along), along * start[1] - across * start[0]
 
 
 class ThreeTemperaturesNoCapacity(HeatedMedium):
@@ -150,17 +130,19 @@ class ThreeTemperaturesNoCapacity(HeatedMedium):
     '317.303334981051'
     """
 
-    name: ClassVar[str] = "three-temperatures-no-capacity"
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         share_1, share_2 = self.h_1 / (self.h_1 + self.h_2), self.h_2 / (self.h_1 + self.h_2)
-        h = share_1 * self.h_2
-        decay = -self.gamma * t
-        source = self.D_0 + self.D_1 * np.exp(decay)
-        source_energy = self.D_0 * t + self.D_1 * t * first_difference(np.zeros_like(t), decay)
-        difference, difference_integral = self._difference(t, h, share_2 / self.C_2 - share_1 / self.C_1)
-        T_1 = self.T_1 + (share_1 * source_energy + h * difference_integral) / self.C_1
-        T_2 = self.T_2 + (share_2 * source_energy - h * difference_integral) / self.C_2
+        h, initial, zero, source_decay = share_1 * self.h_2, self.T_2 - self.T_1, np.zeros_like(t), -self.gamma * t
+        # T_2 - T_1 and its integral over time: free decay and both parts of the source.
+        decay, drive = -h * (1.0 / self.C_1 + 1.0 / self.C_2) * t, share_2 / self.C_2 - share_1 / self.C_1
+        difference, integral = initial * np.exp(decay), initial * t * first_difference(zero, decay)
+        for strength, exponent in ((self.D_0, zero), (self.D_1, source_decay)):
+            difference = difference + strength * drive * t * first_difference(exponent, decay)
+            integral = integral + strength * drive * t**2 * second_difference(exponent, decay)
+        source = self.D_0 + self.D_1 * np.exp(source_decay)
+        given = self.D_0 * t + self.D_1 * t * first_difference(zero, source_decay)
+        T_1 = self.T_1 + (share_1 * given + h * integral) / self.C_1
+        T_2 = self.T_2 + (share_2 * given - h * integral) / self.C_2
         return {
             "T_1": T_1,
             "T_2": T_2,
@@ -168,13 +150,3 @@ class ThreeTemperaturesNoCapacity(HeatedMedium):
             "q_1": share_1 * source + h * difference,
             "q_2": share_2 * source - h * difference,
         }
-
-    def _difference(self, t: Array, h: float, drive: float) -> tuple[Array, Array]:
-        """T_2 - T_1 and its integral over time."""
-        zero, decay, source_decay = np.zeros_like(t), -h * (1.0 / self.C_1 + 1.0 / self.C_2) * t, -self.gamma * t
-        initial = self.T_2 - self.T_1
-        value, integral = initial * np.exp(decay), initial * t * first_difference(zero, decay)
-        for strength, exponent in ((self.D_0, zero), (self.D_1, source_decay)):
-            value = value + strength * drive * t * first_difference(exponent, decay)
-            integral = integral + strength * drive * t**2 * second_difference(exponent, decay)
-        return value, integral

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
 class VelocitySteps(Reference):
@@ -45,7 +44,7 @@ class VelocitySteps(Reference):
     def relaxed(self, ln_age: Array, slip: Array) -> Array:
         r"""Logarithm of :math:`v\theta/L` after a slip [in units of L] at a constant velocity."""
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         after_1, after_2 = t > self.t_1, t > self.t_2
         v = np.where(after_1 & ~after_2, self.v_step, self.v_i)
         begun = np.where(after_2, self.t_2, np.where(after_1, self.t_1, 0.0))
@@ -81,7 +80,6 @@ class AgingVelocitySteps(VelocitySteps):
     '3000000.000 3052021.636 2942466.011 2969843.586'
     """
 
-    name: ClassVar[str] = "aging-velocity-steps"
     law: ClassVar[str] = "rate_and_state_aging"
 
     def relaxed(self, ln_age: Array, slip: Array) -> Array:
@@ -105,7 +103,6 @@ class SlipVelocitySteps(VelocitySteps):
     '3000000.000 3005965.901 2942443.213 2936472.355'
     """
 
-    name: ClassVar[str] = "slip-velocity-steps"
     law: ClassVar[str] = "rate_and_state_slip"
 
     def relaxed(self, ln_age: Array, slip: Array) -> Array:

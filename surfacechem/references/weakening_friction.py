@@ -1,17 +1,15 @@
-"""Heating by dry friction that weakens with temperature: both energy models, and with heat loss."""
+"""Heating by dry friction that weakens with temperature, quadratic energies: without and with heat loss."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import FrictionallyHeated
-from surfacechem.references._inversion import increasing_root, short_integral
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._numerics import increasing_root, short_integral
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class WeakeningFriction(FrictionallyHeated):
@@ -29,32 +27,8 @@ class WeakeningFriction(FrictionallyHeated):
     '2010.5278186134'
     """
 
-    name: ClassVar[str] = "weakening-friction"
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         T = np.cbrt(self.T_i**3 + 3.0 * self.T_0**2 * self.D_0 * t / self.C)
-        return {"T": T, "D": self.D_0 * self.T_0 / T}
-
-
-class WeakeningFrictionConstantCapacity(FrictionallyHeated):
-    r"""Heating by friction with :math:`\mu=\mu_0T_0/T`, constant capacity, no loss.
-
-    .. math:: C\dot T=D_0\frac{T_0}T,\qquad T^2=T_i^2+2T_0D_0t/C
-
-    With :math:`D_0=\mu_0pv`. The same T(t) as steady sliding with quadratic energies. Any t >= 0.
-
-    Source: Sauer, Duong & Mandadapu (2021), section 6.1, with the temperature dependence of their friction coefficient
-    and a constant capacity, integrated.
-
-    >>> body = WeakeningFrictionConstantCapacity(C=4000.0, T_0=300.0, T_i=300.0, D_0=3000.0)
-    >>> f"{body.solution(4e4)['T']:.10f}"
-    '4253.2340636273'
-    """
-
-    name: ClassVar[str] = "weakening-friction-constant-capacity"
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        T = np.sqrt(self.T_i**2 + 2.0 * self.T_0 * self.D_0 * t / self.C)
         return {"T": T, "D": self.D_0 * self.T_0 / T}
 
 
@@ -78,8 +52,6 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
     '446.0249099279'
     """
 
-    name: ClassVar[str] = "weakening-friction-with-loss"
-
     H: float = parameter("W/(m^2 K)", "conductance to the surroundings", above=0)
     T_a: float = parameter("K", "temperature of the surroundings", above=0)
 
@@ -92,37 +64,32 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
         """Temperature [K] at which friction and loss balance."""
         return 0.5 * (self.T_a + math.hypot(self.T_a, 2.0 * math.sqrt(self.D_0 * self.T_0 / self.H)))
 
-    @property
-    def _other_root(self) -> float:
-        return -self.D_0 * self.T_0 / self.H / self.steady_temperature
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        T = self.T_i + self._rise(self._approach(t))
+    def quantities(self, t: Array) -> Quantities:
+        scaled = t * self.H * self.T_0 / self.C
+        # The slope of the scaled time lies between its values at both ends, and so does s.
+        ends = [T**2 / (T - self._other_root) for T in (self.T_i, self.steady_temperature)]
+        s = increasing_root(self._scaled_time, scaled, scaled / max(ends), scaled / min(ends))
+        T = self.T_i + (self.T_i - self.steady_temperature) * np.expm1(-s)
         return {"T": T, "D": self.D_0 * self.T_0 / T}
 
     def time(self, T: Array) -> Array:
         """The time [s] at which the temperature is T, between T_i and the steady state."""
-        steady = self.steady_temperature
-        approach = -np.log1p((T - self.T_i) / (self.T_i - steady))
+        approach = -np.log1p((T - self.T_i) / (self.T_i - self.steady_temperature))
         return self._scaled_time(approach)[0] * self.C / (self.H * self.T_0)
 
-    def _rise(self, s: Array) -> Array:
-        return (self.T_i - self.steady_temperature) * np.expm1(-s)
-
-    def _approach(self, t: Array) -> Array:
-        """The s that belongs to t; its rate of change lies between the values at both ends."""
-        scaled = t * self.H * self.T_0 / self.C
-        ends = [T**2 / (T - self._other_root) for T in (self.T_i, self.steady_temperature)]
-        return increasing_root(self._scaled_time, scaled, scaled / max(ends), scaled / min(ends))
+    @property
+    def _other_root(self) -> float:
+        return -self.D_0 * self.T_0 / self.H / self.steady_temperature
 
     def _scaled_time(self, s: Array) -> tuple[Array, Array]:
         """The right-hand side of the implicit solution and its slope."""
-        steady, other, rise = self.steady_temperature, self._other_root, self._rise(s)
+        steady, other = self.steady_temperature, self._other_root
+
+        def slope(s: Array) -> Array:
+            T = self.T_i + (self.T_i - steady) * np.expm1(-s)
+            return np.asarray(T**2 / (T - other))
+
+        rise = (self.T_i - steady) * np.expm1(-s)
         logarithms = steady**2 * s + other**2 * np.log1p(rise / (self.T_i - other))
         weak_loss = 4.0 * (self.T_i + rise) < -other  # far below both roots the logarithms cancel
-        slope = self._slope(s)
-        return np.where(weak_loss, short_integral(self._slope, s), logarithms / (steady - other) - rise), slope
-
-    def _slope(self, s: Array) -> Array:
-        T = self.T_i + self._rise(s)
-        return np.asarray(T**2 / (T - self._other_root))
+        return np.where(weak_loss, short_integral(slope, s), logarithms / (steady - other) - rise), slope(s)

@@ -23,7 +23,6 @@ from surfacechem.laws.loading import Hold
 from surfacechem.laws.media import Roelands, Vogel
 from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
-from surfacechem.references.couette_flow import CouetteFlow
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
 from surfacechem.runs import simulation
@@ -180,9 +179,21 @@ def test_heat_made_across_a_gas_passes_the_jump_at_each_wall(alphas):
 
 
 def couette_flow(beta: float, v: float) -> dict[str, float]:
-    """Steady values of a film of viscosity ETA exp(-beta (T - 300 K)) between two walls at 300 K."""
-    film = CouetteFlow(T_w=300.0, d_m=D_M, k_m=K_M, eta_w=ETA, beta=beta, v=v)
-    return {name: float(value) for name, value in film.solution(0.0).items()}
+    """Steady values of a film of viscosity ETA exp(-beta (T - T_w)) between two walls at T_w = 300 K, across the film.
+
+    T = T_w + 2/beta ln(cosh(lam) / cosh(lam s)), sinh(lam)^2 = Na / 8, Na = beta ETA v^2 / k, with s from -1 to 1;
+    traction ETA v / d 2 lam / sinh(2 lam). T_c is the mean of T, T_max its largest value. Source: Nahme (1940),
+    Ing.-Arch. 11, 191; Gavis & Laurence (1968), doi 10.1021/i160025a032.
+    """
+    lam = np.arcsinh(np.sqrt(beta * ETA * v**2 / K_M / 8))
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+
+    def temperature(s):
+        hotter = 2 * np.sinh(lam * (1 + s) / 2) * np.sinh(lam * (1 - s) / 2) / np.cosh(lam * s)
+        return 300.0 + 2 / beta * np.log1p(hotter)
+
+    mean, top = float(weights @ temperature((nodes + 1) / 2)) / 2, float(temperature(0.0))
+    return {"T_c": mean, "T_max": top, "t_t": float(ETA * v / D_M * 2 * lam / np.sinh(2 * lam))}
 
 
 @pytest.mark.parametrize("Na", [0.01, 1.0, 18.2, 1e4])

@@ -9,7 +9,7 @@ from test_references import RELATIVE, assert_exact, bell, build, cluster, table
 
 from surfacechem.errors import InputError
 from surfacechem.references import get
-from surfacechem.references._special_functions import lambert_of_exp
+from surfacechem.references._numerics import lambert_of_exp
 
 
 @pytest.mark.parametrize("row", range(20))

@@ -59,27 +59,21 @@ class BondingConstantCapacity(Bonding):
 
     """
 
-    name = "bonding-constant-capacity"
     model = ConstantCapacity()
 
     @property
-    def _bond_capacity_scale(self) -> Fraction:
-        return self._exact_C * Fraction(self.T_0) ** 2 / Fraction(self.T_i)
+    def free_capacity(self) -> float:
+        taken = Fraction(self.K_2) * (1 - Fraction(self.phi_i)) ** 2
+        return float(1 - taken * Fraction(self.T_i) / (self.exact_capacity * Fraction(self.T_0) ** 2))
 
-    def _curvature(self, unbonded_squared: Array) -> Array:
-        return self.K_2 * unbonded_squared / self.T_0**2
-
-    def temperature(self, t: Array) -> tuple[Array, Array]:
-        x, y = self.unbonded_squared(t)
-        released = 0.5 * y * (self.K_0 - self.K_2 * (self.T_i / self.T_0) ** 2) + self.D * t
-        at_start = self.C * self.free_capacity + self._curvature(y) * self.T_i
-        rise = 2.0 * released / (at_start + np.sqrt(at_start**2 - 2.0 * self._curvature(x) * released))
-        return np.where(self.T_i + rise > 0.0, self.T_i + rise, np.nan), rise
-
-    def heating_share(self, T: Array, t: Array) -> Array:
-        x, y = self.unbonded_squared(t)
-        rise = T - self.T_i
-        return 1.0 / (self.C * self.free_capacity + self._curvature(y) * self.T_i - self._curvature(x) * rise)
+    def heated(self, t: Array) -> tuple[Array, Array, Array]:
+        x, gone = self.unbonded_squared(t)
+        curvature, lost = self.K_2 * x / self.T_0**2, self.K_2 * gone / self.T_0**2
+        released = 0.5 * gone * (self.K_0 - self.K_2 * (self.T_i / self.T_0) ** 2) + self.D * t
+        at_start = self.C * self.free_capacity + lost * self.T_i
+        rise = 2.0 * released / (at_start + np.sqrt(at_start**2 - 2.0 * curvature * released))
+        T = np.where(self.T_i + rise > 0.0, self.T_i + rise, np.nan)
+        return T, rise, at_start - curvature * (T - self.T_i)
 
 
 def get(name: str) -> type[Reference]:
@@ -175,12 +169,6 @@ class TestLimits:
         moved = [reference.solution(TIMES)["phi"] - 0.5 for reference in (exponential, linear)]
         np.testing.assert_allclose(moved[0], moved[1], rtol=1e-6, atol=1e-16)
 
-    def test_weakening_friction_is_quadratic_sliding(self):
-        """Capacity growing with T and friction falling with T are the same balance."""
-        friction = get("weakening-friction-constant-capacity")(**FILM, T_i=310.0).solution(TIMES)["T"]
-        sliding = get("sliding")(C_1=3000.0, C_2=1000.0, T_0=300.0, T_i=310.0, D=3000.0).solution(TIMES)["T"]
-        np.testing.assert_allclose(friction, sliding, rtol=1e-15)
-
     @pytest.mark.parametrize("beta", [0.0, 1e-18])
     def test_film_that_does_not_thin_is_sliding(self, beta):
         film = get("thinning-film")(**FILM, T_i=310.0, beta=beta)
@@ -261,11 +249,10 @@ class TestEquations:
     @pytest.mark.parametrize("T_i", [250.0, 300.0, 600.0])
     @pytest.mark.parametrize("t", [1.0, 100.0, 3000.0])
     def test_friction_heating(self, T_i, t):
-        for name, more, quadratic in (
-            ("weakening-friction", {}, True),
-            ("weakening-friction-constant-capacity", {}, False),
-            ("weakening-friction-with-loss", {"H": 12.0, "T_a": 280.0}, True),
-            ("thinning-film", {"beta": 0.02}, True),
+        for name, more in (
+            ("weakening-friction", {}),
+            ("weakening-friction-with-loss", {"H": 12.0, "T_a": 280.0}),
+            ("thinning-film", {"beta": 0.02}),
         ):
             reference = get(name)(**FILM, **more, T_i=T_i)
             now = reference.solution(t)
@@ -273,8 +260,7 @@ class TestEquations:
             friction = 3000.0 * (math.exp(-0.02 * (T - 300.0)) if "beta" in more else 300.0 / T)
             assert now["D"] == pytest.approx(friction, rel=1e-13)
             heating = friction - more.get("H", 0.0) * (T - more.get("T_a", 0.0))
-            capacity = 4000.0 * T / 300.0 if quadratic else 4000.0
-            assert capacity * derivative(reference, "T", t) == pytest.approx(heating, rel=1e-6, abs=1e-6)
+            assert 4000.0 * T / 300.0 * derivative(reference, "T", t) == pytest.approx(heating, rel=1e-6, abs=1e-6)
 
     @pytest.mark.parametrize("phi_i", [0.0, 0.3, 1.0])
     @pytest.mark.parametrize("t", [1e-3, 0.1, 1.0])

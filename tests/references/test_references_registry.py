@@ -77,8 +77,6 @@ class NewtonCooling(Reference):
     Any t >= 0. Source: Newton (1701), integrated.
     """
 
-    name = "newton-cooling"
-
     C: float = parameter("J/(m^2 K)", "heat capacity", above=0)
     h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
     T_i: float = parameter("K", "initial temperature", above=0)

@@ -10,12 +10,12 @@ import numpy as np
 
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
+from surfacechem.references.affinity import ExponentialAffinity
 from surfacechem.references.bell import BellConstantForce
 from surfacechem.references.bonding import Bonding, EndothermicBonding, ExothermicBonding
 from surfacechem.references.cluster import SharedLoadCluster
 from surfacechem.references.cooling_to_zero import CoolingToZero
-from surfacechem.references.exponential_affinity import ExponentialAffinity
-from surfacechem.references.sudden_debonding import SuddenDebonding
+from surfacechem.references.debonding import SuddenDebonding
 from surfacechem.studies.regimes import Array, Exact, Problem, Refused, Regime, Stops
 
 LOST = "heat capacity at T was lost"

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from surfacechem.errors import InputError
-from surfacechem.references.closing_film import ClosingFilm
 from surfacechem.references.coulomb_stop import CoulombStop
 from surfacechem.references.elastic_contact import ElasticContact
-from surfacechem.references.overdamped_pull_off import OverdampedPullOff
+from surfacechem.references.film import ClosingFilm
+from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
 from surfacechem.studies.regimes import Array, Exact, Problem, Regime, Stops
 
@@ -116,8 +116,9 @@ class Fold(Regime):
     values = (1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
     def problem(self, value: float) -> Problem:
-        exact = OverdampedPullOff(t_max=1e6, g_0=1e-8, k=1e13, c=2e5, delta_w=value * _fold())
-        gaps = exact.bodies.opening().g + exact.width * np.linspace(-3.0, 3.0, 7)
+        gap = {"t_max": 1e6, "g_0": 1e-8, "k": 1e13, "c": 2e5}
+        exact = OverdampedPullOff(**gap, delta_w=value * OverdampedPullOff(**gap, delta_w=1.0).fold.w)
+        gaps = exact.fold.g + exact.width * np.linspace(-3.0, 3.0, 7)
         times = np.array([exact.time(g) for g in gaps])
         ahead = np.array([exact.time(g) for g in gaps + SHORTEST * exact.width])
         speeds = SHORTEST * exact.width / (ahead - times)
@@ -125,7 +126,7 @@ class Fold(Regime):
         def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
             """Gaps for other data, to first order, from when these are reached; given is the far-field displacement."""
             given = {name: data[name] for name in ("t_max", "g_0", "k", "c")}
-            beyond = data["w"] - OverdampedPullOff(**given, delta_w=1.0).bodies.opening().w
+            beyond = data["w"] - OverdampedPullOff(**given, delta_w=1.0).fold.w
             if beyond <= 0:
                 raise InputError("the fold is not reached.")
             other = OverdampedPullOff(**given, delta_w=beyond)
@@ -134,8 +135,3 @@ class Fold(Regime):
         data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
         passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
         return Problem("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
-
-
-def _fold() -> float:
-    """Far-field displacement at which equilibrium is lost."""
-    return OverdampedPullOff(t_max=1e6, g_0=1e-8, k=1e13, c=2e5, delta_w=1.0).bodies.opening().w

@@ -1,17 +1,13 @@
-"""A viscous film that thins with temperature, quadratic energies."""
+"""Viscous films that heat bodies: one that thins with temperature, and one that closes at constant speed."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import FrictionallyHeated
-from surfacechem.references._inversion import increasing_root
-from surfacechem.references._special_functions import first_difference, second_difference
-from surfacechem.references.base import Array, Parameters, SceneView
+from surfacechem.references._bodies import FrictionallyHeated, UniformBody
+from surfacechem.references._numerics import first_difference, increasing_root, second_difference
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView
 
 
 class ThinningFilm(FrictionallyHeated):
@@ -33,15 +29,13 @@ class ThinningFilm(FrictionallyHeated):
     '467.5516435377'
     """
 
-    name: ClassVar[str] = "thinning-film"
-
     beta: float = parameter("1/K", "decay of the viscosity per kelvin", at_least=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         return {**super().from_scene(scene), "beta": scene.friction("beta")}
 
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
+    def quantities(self, t: Array) -> Quantities:
         initial = self.D_0 * np.exp(-self.beta * (self.T_i - self.T_0))
         heat = initial * self.T_0 * t / self.C
         without_thinning = 2.0 * heat / (self.T_i + np.sqrt(self.T_i**2 + 2.0 * heat))
@@ -56,3 +50,44 @@ class ThinningFilm(FrictionallyHeated):
         linear = self.T_i * first_difference(np.zeros_like(exponent), exponent)
         quadratic = rise * np.exp(exponent) * second_difference(np.zeros_like(exponent), -exponent)
         return rise * (linear + quadratic), (self.T_i + rise) * np.exp(exponent)
+
+
+class ClosingFilm(UniformBody):
+    r"""Heating by a viscous film whose gap closes linearly: it grows like a logarithm.
+
+    .. math:: g_n=g_i-at,\qquad T^2=T_i^2+\frac{2T_0\eta v^2}{Ca}\ln\frac{g_i}{g_n}
+
+    Quadratic energies, perfect thermal contact. Before `end_time` :math:`g_i/a`, at which dissipation and temperature
+    are infinite.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. e:visc_fric and section 6.1, integrated.
+
+    >>> film = ClosingFilm(eta=0.01, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
+    >>> f"{film.solution(9.0)['T']:.10f} {film.end_time:.1f}"
+    '307.1112942393 10.0'
+    """
+
+    eta: float = parameter("Pa s", "film viscosity", at_least=0)
+    v: float = parameter("m/s", "sliding velocity")
+    g_i: float = parameter("m", "initial gap", above=0)
+    a: float = parameter("m/s", "closing speed", above=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        opening = scene.ramp("g_n")
+        film = {"eta": scene.friction("eta"), "v": scene.initial("v"), "g_i": scene.initial("g_n")}
+        return {**film, "a": None if opening is None else -opening, **super().from_scene(scene)}
+
+    @property
+    def end_time(self) -> float:
+        """Time [s] at which the gap is closed."""
+        return self.g_i / self.a
+
+    def quantities(self, t: Array) -> Quantities:
+        return self.at_gap(self.g_i * (self.end_time - t) / self.end_time)
+
+    def at_gap(self, g: Array) -> Quantities:
+        """The state when the gap is g; better than by time where that is rounded close to the end."""
+        heat = self.eta * self.v**2 / self.a * np.log(self.g_i / g)
+        T = np.sqrt(self.T_i**2 + 2.0 * self.T_0 * heat / self.C)  # not by the rise: it is infinite at the end
+        return {"g_n": g, "T": T, "D": self.eta * self.v**2 / g, "heat": heat}

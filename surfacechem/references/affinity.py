@@ -1,15 +1,50 @@
-"""Bonding and debonding with a rate exponential in the affinity, isothermal."""
+"""Isothermal bonding and debonding with a rate linear or exponential in the affinity."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+
+
+class LinearAffinity(Reference):
+    r"""Two-way bonding whose rate is linear in the affinity, constant temperature.
+
+    .. math:: \phi=\phi_{eq}+(\phi_i-\phi_{eq})e^{-\lambda t},\quad \lambda=\frac{c_rK_c}{n_c},\quad
+        R_f=n_ck_f(1-\phi),\quad R_b=n_ck_b\phi,\quad R_c=R_f-R_b=n_c\dot\phi
+
+    with :math:`k_f=\lambda\phi_{eq}`, :math:`k_b=\lambda(1-\phi_{eq})`. Any t >= 0.
+
+    Source: Sauer, Duong & Mandadapu (2021), section 5.7 (bonding reactions), linear law, integrated.
+
+    >>> sites = LinearAffinity(n_c=1e18, c_r=4e18, K_c=0.275, phi_eq=0.2 / 0.275, phi_i=0.05)
+    >>> f"{sites.solution(0.06043817678166709)['phi']:.12f}"
+    '0.093562342248'
+    """
+
+    n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
+    c_r: float = parameter("1/(J s)", "rate constant per bond", at_least=0)
+    K_c: float = parameter("J/m^2", "bond energy density", at_least=0)
+    phi_eq: float = parameter("1", "equilibrium bonding state", at_least=0, at_most=1)
+    phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        sites = {"n_c": scene.constant("N_c"), "c_r": scene.reaction("c_r")}
+        bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
+        return {**sites, **bonds}
+
+    def quantities(self, t: Array) -> Quantities:
+        relaxation, distance = self.c_r * self.K_c / self.n_c, self.phi_eq - self.phi_i
+        phi = self.phi_i - distance * np.expm1(-relaxation * t)
+        return {
+            "phi": phi,
+            "R_forward": self.n_c * relaxation * self.phi_eq * (1.0 - phi),
+            "R_backward": self.n_c * relaxation * (1.0 - self.phi_eq) * phi,
+            "R_c": self.n_c * relaxation * distance * np.exp(-relaxation * t),
+        }
 
 
 class ExponentialAffinity(Reference):
@@ -31,8 +66,6 @@ class ExponentialAffinity(Reference):
     '0.996949093794'
     """
 
-    name: ClassVar[str] = "exponential-affinity"
-
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
     C_r: float = parameter("1/(J s m^2)", "rate constant per area", at_least=0)
     K_c: float = parameter("J/m^2", "bond energy density", above=0)
@@ -46,28 +79,15 @@ class ExponentialAffinity(Reference):
         bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
         return {**sites, **bonds}
 
-    @property
-    def steepness(self) -> float:
-        """Affinity in units of k_B T per distance of phi from equilibrium."""
-        return self.K_c / (self.n_c * BOLTZMANN * self.T)
-
-    @property
-    def relaxation_rate(self) -> float:
-        """Decay rate [1/s] close to equilibrium."""
-        return self.C_r * self.K_c / self.n_c**2
-
-    @property
-    def initial_affinity(self) -> float:
-        """Affinity at the start in units of k_B T; positive when bonds form."""
-        return self.steepness * (self.phi_eq - self.phi_i)
-
-    def quantities(self, t: Array) -> Mapping[str, Array | float]:
-        state = _bonding if self.initial_affinity >= 0.0 else _debonding
-        spent, left, thrust = state(self.initial_affinity, self.relaxation_rate * t)
-        from_start, to_equilibrium = self.phi_i + spent / self.steepness, self.phi_eq - left / self.steepness
+    def quantities(self, t: Array) -> Quantities:
+        steepness = self.K_c / (self.n_c * BOLTZMANN * self.T)  # affinity in k_B T per distance of phi from equilibrium
+        relaxation = self.C_r * self.K_c / self.n_c**2  # decay rate close to equilibrium
+        initial = steepness * (self.phi_eq - self.phi_i)
+        spent, left, thrust = (_bonding if initial >= 0.0 else _debonding)(initial, relaxation * t)
+        from_start, to_equilibrium = self.phi_i + spent / steepness, self.phi_eq - left / steepness
         return {
             "phi": np.where(np.abs(left) < np.abs(spent), to_equilibrium, from_start),
-            "phi_dot": self.relaxation_rate / self.steepness * thrust,
+            "phi_dot": relaxation / steepness * thrust,
         }
 
 

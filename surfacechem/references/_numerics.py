@@ -1,0 +1,246 @@
+r"""Numerics to rounding: roots, integrals, autonomous equations, and special functions in forms that do not cancel.
+
+Divided differences of the exponential are what the response of a linear system to an exponential source is made of:
+:math:`\int_0^t e^{-\lambda(t-s)}e^{-\gamma s}\,ds = t\,\exp[-\lambda t,-\gamma t]`, and its integral over time is
+:math:`t^2\exp[0,-\lambda t,-\gamma t]`. No difference of nearly equal exponentials is ever formed.
+
+Sources: McCurdy, Ng & Parlett (1984), Math. Comp. 43, 501-528 (differences); Abramowitz & Stegun (1964), 5.1
+(exponential integrals); Corless, Gonnet, Hare, Jeffrey & Knuth (1996), Adv. Comput. Math. 5, 329-359 (Lambert's W).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.references.base import Array
+
+ROUNDING = 4.0 * np.finfo(np.float64).eps
+"""Relative difference to a target that no further iteration removes."""
+
+ITERATIONS = 400
+"""At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
+
+POINTS = 18
+"""Gauss points of a panel: a singularity a panel's length away leaves an error of 5.8^-36 = 3e-28."""
+
+HALVINGS = 800
+"""Panels towards each end: the smallest is 2^-801 of the path."""
+
+SOON = 1e-300
+"""Times [s] below this count as zero."""
+
+NEAR = 60
+"""Halvings towards a point inside; below 2^-60 of the span it is no longer resolved."""
+
+Rate = Callable[[Array, Array], Array]
+"""Rate at which the distance covered grows, from the distances to the start and to the end; positive between them."""
+
+
+def increasing_root(
+    function: Callable[[Array], tuple[Array, Array]],
+    target: Array,
+    low: Array,
+    high: Array,
+    start: Array | None = None,
+) -> Array:
+    """Arguments at which `function`, which gives value and slope and increases on [low, high], reaches `target`.
+
+    Newton's method, kept inside a shrinking bracket.
+
+    It starts at `low` unless a better guess is given.
+
+    >>> increasing_root(lambda x: (x**2, 2 * x), np.array([2.0]), np.array([1.0]), np.array([2.0]))
+    array([1.41421356])
+    """
+    x = low if start is None else np.clip(start, low, high)
+    for _ in range(ITERATIONS):
+        value, slope = function(x)
+        error = value - target
+        low, high = np.where(error <= 0.0, x, low), np.where(error >= 0.0, x, high)
+        with np.errstate(all="ignore"):
+            newton = x - error / slope
+        inside = (newton > low) & (newton < high)
+        following = np.where(inside, newton, 0.5 * (low + high))
+        reached = np.abs(error) <= ROUNDING * np.abs(target)
+        step = np.minimum(np.abs(following - x), high - low)
+        settled = reached | (step <= ROUNDING * np.abs(x))
+        x = np.where((error == 0.0) | (reached & ~inside), x, following)
+        if settled.all():
+            return x
+    raise ArithmeticError(f"no root found between {low} and {high}")
+
+
+def short_integral(function: Callable[[Array], Array], upper: Array) -> Array:
+    """Integral from zero to `upper` by ten Gauss points: exact where closed forms cancel to nothing.
+
+    >>> f"{float(short_integral(np.exp, np.array(1e-20))):.14e}"
+    '1.00000000000000e-20'
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    return np.asarray(0.5 * upper * (function(0.5 * np.multiply.outer(upper, 1.0 + nodes)) @ weights))
+
+
+class Separable:
+    """An autonomous equation of one variable: times along a path of given length, by quadrature, and their inverse.
+
+    The variable runs from a start to an end that it may reach or only approach. It is known by its distances from both,
+    so that neither end loses digits. Gauss panels shrink geometrically towards both ends and towards any point at which
+    the rate nearly vanishes (``hard``), so that no singularity is closer to a panel than its length.
+    """
+
+    def __init__(self, rate: Rate, length: float, hard: Sequence[float] = ()) -> None:
+        self.rate, self.length = rate, length
+        self.nodes, self.weights = np.polynomial.legendre.leggauss(POINTS)
+        half = 0.5 * length
+        steps = half * 0.5 ** np.arange(1.0, NEAR)
+        edges = []
+        for found in ([x for x in hard if x < half], [length - x for x in hard if x >= half]):
+            near = [x + step for x in found for step in (*-steps, 0.0, *steps)]
+            points = np.array([0.0, *half * 0.5 ** np.arange(HALVINGS + 1.0), *near])
+            edges.append(np.unique(points[(points >= 0.0) & (points <= half)]))
+        early, late = edges
+        # Distances of a panel are from the nearer end: from the start in the first half, from the end in the second.
+        self.first, self.last = np.append(early[:-1], late[:0:-1]), np.append(early[1:], late[-2::-1])
+        self.from_end = np.arange(len(self.first)) >= len(early) - 1
+        self.times = np.append(0.0, np.cumsum(self._elapsed(self.first, self.last, self.from_end)))
+
+    def _elapsed(self, first: Array, last: Array, from_end: NDArray[np.bool_]) -> Array:
+        """Time between two points of one panel."""
+        middle, half = 0.5 * (first + last)[:, None], 0.5 * (last - first)[:, None]
+        with np.errstate(all="ignore"):  # where the rate overflows no time passes
+            times = np.abs(half) / self._rate(middle + half * self.nodes, from_end[:, None]) @ self.weights
+        return np.where(first == last, 0.0, times)
+
+    def _rate(self, distance: Array, from_end: NDArray[np.bool_]) -> Array:
+        rest = self.length - distance
+        return self.rate(np.where(from_end, rest, distance), np.where(from_end, distance, rest))
+
+    @property
+    def duration(self) -> float:
+        """Time in which all but 2^-801 of the path is covered."""
+        return float(self.times[-1])
+
+    def position(self, t: Array) -> tuple[Array, Array]:
+        """Distances from the start and from the end at the times t."""
+        t = np.where(t < SOON, 0.0, t)
+        j = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.first) - 1)
+        start, stop, from_end = self.first[j], self.last[j], self.from_end[j]
+
+        def elapsed(share: Array) -> tuple[Array, Array]:
+            point = start + share * (stop - start)
+            return self._elapsed(start, point, from_end), np.abs(stop - start) / self._rate(point, from_end)
+
+        target = np.minimum(t, self.duration) - self.times[j]
+        share = increasing_root(elapsed, target, np.zeros_like(target), np.ones_like(target))
+        distance = np.where(t < self.duration, start + share * (stop - start), 0.0)
+        rest = self.length - distance
+        return np.where(from_end, rest, distance), np.where(from_end, distance, rest)
+
+
+SERIES_TERMS = 22
+"""Of the second difference for arguments within [-1, 0]; those left out begin with 23 / 24! = 4e-23."""
+
+ASYMPTOTIC_TERMS = 38
+CONVERGENT_TERMS = 160
+"""Of Ei up to FAR_EI; those left out begin with 40^160 / (160 160!) = 3e-31, against e^40 / 40 = 6e15."""
+
+FAR, FAR_EI = 50.0, 40.0
+"""Arguments of E_n and Ei from which on asymptotic series reach rounding before they diverge: 38! / 40^38 = 7e-17."""
+
+
+def first_difference(a: Array, b: Array) -> Array:
+    r""":math:`\exp[a,b]=(e^a-e^b)/(a-b)`, and :math:`e^a` for equal arguments.
+
+    >>> float(first_difference(np.array(0.0), np.array(-1e-20)))
+    1.0
+    """
+    distance = np.abs(a - b)
+    safe = np.where(distance > 0.0, distance, 1.0)
+    return np.asarray(np.exp(np.maximum(a, b)) * np.where(distance > 0.0, -np.expm1(-safe) / safe, 1.0))
+
+
+def second_difference(a: Array, b: Array) -> Array:
+    r""":math:`\exp[0,a,b]` for :math:`a,b\le0`.
+
+    >>> float(second_difference(np.array(0.0), np.array(-1e-9)))
+    0.4999999998333333
+    """
+    low, middle = np.minimum(a, b), np.maximum(a, b)
+    far = np.where(low < -1.0, low, -1.0)
+    apart = (first_difference(middle, np.zeros_like(middle)) - first_difference(low, middle)) / -far
+    # Within [-1, 0] the differences cancel: Taylor series in the complete homogeneous symmetric polynomials of both.
+    near_low, near_middle = np.maximum(low, -1.0), np.maximum(middle, -1.0)
+    polynomial, power, factorial = np.ones_like(near_low), np.ones_like(near_low), 2.0
+    series = polynomial / factorial
+    for order in range(1, SERIES_TERMS):
+        power = power * near_middle
+        polynomial = polynomial * near_low + power
+        factorial *= order + 2.0
+        series = series + polynomial / factorial
+    return np.where(low < -1.0, apart, series)
+
+
+def remainder(q: Array) -> Array:
+    r""":math:`e^{-q}-1+q\ge0` without cancellation, for any q.
+
+    >>> float(remainder(np.array(1e-9)))
+    4.999999998333333e-19
+    """
+    p = np.abs(q)
+    near = np.minimum(p, 1.0)
+    falling = near**2 * second_difference(np.zeros_like(near), -near)
+    rising = near**2 * np.exp(near) * second_difference(-near, -near)
+    with np.errstate(over="ignore"):
+        far = np.where(q < -40.0, np.exp(p), np.expm1(-np.maximum(q, -40.0)) + q)
+    return np.where(p < 1.0, np.where(q < 0.0, rising, falling), far)
+
+
+def scaled_expint(n: int, x: Array) -> Array:
+    r""":math:`e^xE_n(x)` for x > 0 and n = 1 or 2.
+
+    >>> scaled_expint(1, np.array([1e-3, 1.0, 1e3]))
+    array([6.33787407e+00, 5.96347362e-01, 9.99001994e-04])
+    """
+    from scipy.special import expn
+
+    near, far = np.minimum(x, FAR), np.maximum(x, FAR)
+    return np.where(x < FAR, np.exp(near) * expn(n, near), _asymptotic(n, far))
+
+
+def scaled_Ei(x: Array) -> Array:
+    r""":math:`e^{-x}{\rm Ei}(x)` for x > 0.
+
+    >>> scaled_Ei(np.array([1.0, 50.0]))
+    array([0.69717488, 0.02041705])
+    """
+    near, far = np.minimum(x, FAR_EI), np.maximum(x, FAR_EI)
+    term, total = np.ones_like(near), np.zeros_like(near)
+    for n in range(1, CONVERGENT_TERMS):
+        term = term * near / n
+        total = total + term / n
+    convergent = np.exp(-near) * (np.euler_gamma + np.log(near) + total)
+    return np.where(x < FAR_EI, convergent, -_asymptotic(1, -far))  # Ei(x) = -E_1(-x)
+
+
+def _asymptotic(n: int, x: Array) -> Array:
+    r"""Asymptotic series of :math:`e^xE_n(x)`."""
+    term, total = 1.0 / x, 1.0 / x
+    for k in range(n, n + ASYMPTOTIC_TERMS):
+        term = -term * k / x
+        total = total + term
+    return total
+
+
+def lambert_of_exp(a: Array) -> Array:
+    r""":math:`W_0(e^a)`, the w > 0 with :math:`w+\ln w=a`, for any a.
+
+    >>> lambert_of_exp(np.array([1.0, 1e4]))
+    array([1.00000000e+00, 9.99079058e+03])
+    """
+    low, high = np.minimum(a, 1.0), np.maximum(a, 1.0)
+    small = np.exp(increasing_root(lambda s: (s + np.exp(s), 1.0 + np.exp(s)), low, low - np.exp(low), low))
+    large = increasing_root(lambda w: (w + np.log(w), 1.0 + 1.0 / w), high, 0.5 * (1.0 + high), high)
+    return np.where(a < 1.0, small, large)

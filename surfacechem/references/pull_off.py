@@ -1,0 +1,298 @@
+"""Pull-off from an exponential cohesive zone: by a snap, what that heats, and slowly past the fold of a damped gap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from surfacechem.contracts.terms import parameter
+from surfacechem.errors import InputError
+from surfacechem.references._bodies import UniformBody
+from surfacechem.references._numerics import increasing_root
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.semenov_fold import scaled_rise
+
+GRID = 200
+"""Gaps whose times give the first guess of the gap at a time."""
+
+PANEL = 0.25
+"""Length of a panel in arsinh of the distance from the fold; the poles of 1 / cosh are pi / 2 away, so that
+16 Gauss points leave 25^-32."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A state in which the quasi-static gap is lost, and the one it jumps to at the same displacement."""
+
+    g: float
+    w: float
+    t: float
+    g_after: float
+    t_after: float
+    release: float
+    """Energy [J/m^2] that the jump turns into heat."""
+
+
+@dataclass(frozen=True)
+class SpringAndZone:
+    """An exponential cohesive zone in series with a spring: its branches, and where they end.
+
+    Stiffness [Pa/m] of the spring, strength [Pa] of the zone and the gap [m] at which it is reached.
+    """
+
+    k: float
+    t_max: float
+    g_0: float
+
+    @property
+    def severity(self) -> float:
+        """Stiffness over the steepest softening; from one on every displacement has one gap."""
+        return math.e * self.k * self.g_0 / self.t_max
+
+    def traction(self, g: Array) -> Array:
+        """Traction [Pa] of the zone."""
+        return np.asarray(self.t_max * g / self.g_0 * np.exp(1.0 - g / self.g_0))
+
+    def energy(self, g: float, w: float) -> float:
+        """Energy [J/m^2] of spring and zone."""
+        u = g / self.g_0
+        return 0.5 * self.k * (w - g) ** 2 - self.t_max * self.g_0 * (1.0 + u) * math.exp(1.0 - u)
+
+    def gap(self, w: Array, low: float, high: float) -> Array:
+        """The gap [m] at displacements w, on a stable branch between two gaps."""
+        lower = np.minimum(np.full_like(w, low), w)
+        return increasing_root(self._displacement, w, lower, np.maximum(np.minimum(w, high), lower))
+
+    def _displacement(self, g: Array) -> tuple[Array, Array]:
+        slope = self.t_max / self.g_0 * (1.0 - g / self.g_0) * np.exp(1.0 - g / self.g_0)
+        return g + self.traction(g) / self.k, 1.0 + slope / self.k
+
+    @cached_property
+    def folds(self) -> tuple[Fold, Fold]:
+        """The snap apart and the snap together: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
+        if self.severity >= 1.0:
+            raise InputError("stable for every displacement; there is no jump.")
+        distance = np.array([-math.log(self.severity)])
+        low, high = np.sqrt(2.0 * distance), distance + np.sqrt(distance * (distance + 2.0))
+
+        def beyond(v: Array) -> tuple[Array, Array]:
+            """The function v - ln(1 + v), by its series up to 0.1 (the 17th term is 0.1^18 / 18), and its slope."""
+            near = np.minimum(v, 0.1)
+            series = sum((-1) ** n * near**n / n for n in range(2, 18))
+            return np.where(v < 0.1, series, v - np.log1p(v)), v / (1.0 + v)
+
+        smaller = float(scaled_rise(np.array([self.severity]))[0])
+        larger = 1.0 + float(increasing_root(beyond, distance, low, high)[0])
+        return self._fold(smaller, larger, math.inf), self._fold(larger, -1.0, smaller)
+
+    def _fold(self, x: float, low: float, high: float) -> Fold:
+        """The jump from the gap at x to the branch between two others."""
+        g, t = self.g_0 * (1.0 + x), self.t_max * (1.0 + x) * math.exp(-x)
+        w = g + t / self.k
+        after = float(self.gap(np.array([w]), self.g_0 * (1.0 + low), self.g_0 * (1.0 + high))[0])
+        release = self.energy(g, w) - self.energy(after, w)
+        return Fold(g, w, t, after, float(self.traction(np.array(after))), release)
+
+
+class CohesivePullOff(Reference):
+    r"""Elastic bodies, held together by an exponential cohesive zone, are pulled apart at constant speed.
+
+    .. math:: k(w-g_n)=t_{max}\frac{g_n}{g_0}e^{1-g_n/g_0},\qquad
+        g_{off}=g_0\Big[1-W_0\Big(-\frac{kg_0}{t_{max}}\Big)\Big],\quad
+        g_{on}=g_0\Big[1-W_{-1}\Big(-\frac{kg_0}{t_{max}}\Big)\Big]
+
+    Stable for every w iff :math:`kg_0/t_{max}\ge1/e`; otherwise the gap jumps, on opening from :math:`g_{off}`, on
+    closing from :math:`g_{on}`, to the other branch at the same w. The heat is the drop of
+    :math:`\tfrac12k(w-g_n)^2+\Psi`. Here :math:`w=w_i+\dot wt`, opening, from the closed branch. Both folds are good to
+    rounding also where they meet.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, with an elastic body.
+
+    >>> bodies = CohesivePullOff(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8)
+    >>> f"{bodies.opening.g:.9e} {bodies.opening.w:.9e} {bodies.opening.release:.9e} {bodies.closing.release:.9e}"
+    '1.111832559e-08 1.105377225e-07 3.054240033e-02 1.000742319e-02'
+    """
+
+    t_max: float = parameter("Pa", "strength", above=0)
+    g_0: float = parameter("m", "gap at the strength", above=0)
+    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
+    w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
+    w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        far = {"k": scene.support("normal", "k"), "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
+        return {**zone, **far}
+
+    def __post_init__(self) -> None:
+        """Refuse what starts beyond the closed branch."""
+        super().__post_init__()
+        if not self.stable and self.w_i > self.opening.w:
+            raise InputError(f"{self.name}: w_i must not be above the fold at {self.opening.w!r} m.")
+
+    @cached_property
+    def bodies(self) -> SpringAndZone:
+        """Spring and zone."""
+        return SpringAndZone(self.k, self.t_max, self.g_0)
+
+    @property
+    def stable(self) -> bool:
+        """True if every displacement has one gap."""
+        return self.bodies.severity >= 1.0
+
+    @property
+    def opening(self) -> Fold:
+        """The jump on opening; InputError if it is stable."""
+        return self.bodies.folds[0]
+
+    @property
+    def closing(self) -> Fold:
+        """The jump on closing; InputError if it is stable."""
+        return self.bodies.folds[1]
+
+    def quantities(self, t: Array) -> Quantities:
+        w = self.w_i + self.w_dot * t
+        if self.stable:
+            g, heat = self.bodies.gap(w, 0.0, math.inf), np.zeros_like(w)
+        else:
+            fold, open_ = self.opening, w > self.opening.w
+            closed = self.bodies.gap(np.minimum(w, fold.w), 0.0, fold.g)
+            g = np.where(open_, self.bodies.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
+            heat = np.where(open_, fold.release, 0.0)
+        return {"w_n": w, "g_n": g, "t_n": self.bodies.traction(g), "heat": heat}
+
+
+class CohesivePullOffHeating(CohesivePullOff, UniformBody):
+    r"""Cohesive pull-off in perfect thermal contact: what the jump releases heats the bodies.
+
+    .. math:: T^2=T_i^2+\frac{2T_0}C\,\big[\tfrac12k(w-g_n)^2+\Psi\big]_{after}^{before}
+
+    Quadratic energies; a strength that does not depend on temperature, so that the gap is that of the pull-off without
+    heat and the temperature changes at the jump only.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, and the quadratic energy.
+
+    >>> bodies = CohesivePullOffHeating(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8, C=2e-4, T_0=300.0, T_i=310.0)
+    >>> f"{bodies.solution(20.0)['T']:.9f}"
+    '433.274971584'
+    """
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        return {**super().from_scene(scene), **UniformBody.from_scene(scene)}
+
+    def quantities(self, t: Array) -> Quantities:
+        mechanics = super().quantities(t)
+        return {**mechanics, "T": self.heated(np.asarray(mechanics["heat"]))}
+
+
+class OverdampedPullOff(Reference):
+    r"""Overdamped opening of a cohesive zone at a far-field displacement a little beyond its fold.
+
+    .. math:: c\,\dot g_n=k(w_{off}+\delta w-g_n)-t_n(g_n),\qquad
+        t\simeq\pi c\sqrt{\frac2{a\,k\,\delta w}},\quad a=-t_n''(g_{off})
+
+    The time is an integral over the gap whose peak of width :math:`\sqrt{2k\delta w/a}` at the fold is resolved by
+    :math:`g_n-g_{off}\propto\sinh`; the force is summed without cancellation, so that any :math:`\delta w` is met to
+    rounding. Exact until half the way from the fold to the open gap, at `end_time`.
+
+    Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension; passage time of Strogatz, Nonlinear
+    Dynamics and Chaos (1994), section 4.3.
+
+    >>> gap = OverdampedPullOff(t_max=1e6, g_0=1e-8, k=1e13, c=2e5, delta_w=1.1e-15)
+    >>> f"{gap.time(4e-8):.8e} {gap.asymptotic_time:.8e}"
+    '9.50710596e-05 9.50681912e-05'
+    """
+
+    t_max: float = parameter("Pa", "strength", above=0)
+    g_0: float = parameter("m", "gap at the strength", above=0)
+    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
+    c: float = parameter("Pa s/m", "damping", above=0)
+    delta_w: float = parameter("m", "far-field displacement beyond the fold", above=0)
+    g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        dampers = [c for c in (scene.support("normal", name) for name in ("c_b", "c_g")) if c is not None]
+        held = {"k": scene.support("normal", "k"), "c": sum(dampers) if dampers else None}
+        return {**zone, **held, "g_i": scene.initial("g_n")}
+
+    @cached_property
+    def bodies(self) -> SpringAndZone:
+        """Spring and zone."""
+        return SpringAndZone(self.k, self.t_max, self.g_0)
+
+    @property
+    def fold(self) -> Fold:
+        """The fold that is passed."""
+        return self.bodies.folds[0]
+
+    @property
+    def w(self) -> float:
+        """Far-field displacement [m]."""
+        return self.fold.w + self.delta_w
+
+    @property
+    def width(self) -> float:
+        """Width [m] of the bottleneck."""
+        return math.sqrt(2.0 * self.k * self.delta_w / self._curvature)
+
+    @property
+    def asymptotic_time(self) -> float:
+        """Time [s] of the passage from far below to far above, for small delta_w."""
+        return math.pi * self.c * math.sqrt(2.0 / (self._curvature * self.k * self.delta_w))
+
+    @property
+    def _curvature(self) -> float:
+        x = self.fold.g / self.g_0 - 1.0
+        return self.t_max / self.g_0**2 * (1.0 - x) * math.exp(-x)
+
+    @cached_property
+    def end_gap(self) -> float:
+        """Gap [m] at `end_time`."""
+        final = float(self.bodies.gap(np.array([self.w]), self.bodies.folds[1].g, math.inf)[0])
+        return 0.5 * (self.fold.g + final)
+
+    @property
+    def end_time(self) -> float:
+        """Time [s] until which the solution is stated."""
+        return self.time(self.end_gap)
+
+    def time(self, g: float) -> float:
+        """The time [s] at which the gap is g."""
+        return float(self._times(np.array([g]))[0])
+
+    def quantities(self, t: Array) -> Quantities:
+        low, high = np.full_like(t, self.g_i), np.full_like(t, self.end_gap)
+        first, last = np.arcsinh((np.array([self.g_i, self.end_gap]) - self.fold.g) / self.width)
+        grid = self.fold.g + self.width * np.sinh(np.linspace(first, last, GRID))
+        guess = np.where(t > 0, np.interp(t, self._times(grid), grid), low)
+        g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self.fold.g)), t, low, high, guess)
+        return {"g_n": g, "t_n": self.bodies.traction(g), "v_n": self._force(g - self.fold.g) / self.c}
+
+    def _times(self, g: Array) -> Array:
+        """Integral of c dg / force over panels in arsinh of the distance from the fold."""
+        start, ends = math.asinh((self.g_i - self.fold.g) / self.width), np.arcsinh((g - self.fold.g) / self.width)
+        panels = max(1, math.ceil(float(np.max(ends) - start) / PANEL))
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        edges = start + np.multiply.outer(ends - start, np.arange(panels) / panels)
+        step = ((ends - start) / panels)[:, None, None]
+        u = edges[:, :, None] + 0.5 * step * (1.0 + nodes)
+        rates = self.c * self.width * np.cosh(u) / self._force(self.width * np.sinh(u))
+        return np.asarray(np.sum(0.5 * step * weights * rates, axis=(1, 2)))
+
+    def _force(self, distance: Array) -> Array:
+        """Driving traction [Pa] at a distance from the gap of the fold."""
+        y, x = distance / self.g_0, self.fold.g / self.g_0 - 1.0
+        # Up to 0.5 a series of 18 terms is exact where the terms would cancel: the next is 0.5^20 19 / 20! = 7e-24.
+        near = np.where(np.abs(y) < 0.5, y, 0.0)
+        coefficients = [0.0, 0.0, *((-1) ** n * (n - 1 - x) / math.factorial(n) for n in range(2, 20))]
+        series = np.polynomial.polynomial.polyval(near, coefficients)
+        far = -(1.0 + x) * np.expm1(-y) - x * y - y * np.exp(-y)
+        shape = np.where(np.abs(y) < 0.5, series, far)
+        return np.asarray(self.k * self.delta_w + self.t_max * math.exp(-x) * shape)
