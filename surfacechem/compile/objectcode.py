@@ -83,7 +83,7 @@ def load(folder: Path) -> Callable[..., None] | None:
 
 
 class Kernel:
-    """Machine code of a function of integers, numbers and contiguous arrays that returns nothing."""
+    """Machine code of a function of integers, numbers, contiguous arrays and tuples of these that returns nothing."""
 
     def __init__(self, name: str, code: bytes) -> None:
         import llvmlite.binding as llvm
@@ -115,7 +115,11 @@ class Kernel:
 
 
 def _words(argument: Any) -> Sequence[Any]:
-    """An argument as Numba passes it: of an array its owners, number and size of entries, address, shape, strides."""
+    """An argument as Numba passes it: entry by entry of a tuple; of an array its owners, number and size of entries,
+    address, shape, strides.
+    """
+    if isinstance(argument, tuple):
+        return [word for entry in argument for word in _words(entry)]
     if isinstance(argument, np.ndarray):
         return (0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides)
     return (argument,)

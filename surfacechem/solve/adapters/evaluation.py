@@ -10,7 +10,8 @@ import numpy as np
 from surfacechem.compile.program import Function, Program
 from surfacechem.solve.contract import Array
 from surfacechem.solve.radau import stepper
-from surfacechem.solve.radau.solver import END, search_arguments
+from surfacechem.solve.radau.solver import search_batch
+from surfacechem.solve.radau.stepper import COLUMNS, END
 
 CODE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -34,10 +35,10 @@ class Evaluation:
         self.free = np.flatnonzero(~program.algebraic_mask)
         self._algebraic = np.flatnonzero(program.algebraic_mask)
         self.guess = y[self._algebraic]
-        self._counts = np.zeros((1, 10), np.int64)
+        self._counts = np.zeros((1, COLUMNS), np.int64)
         self._search = stepper.run_batch()
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
-        self._arguments = search_arguments(program, ends, table, self._counts)
+        self._batch = search_batch(program, ends, table, self._counts)
         self._ledger = _Code(program.ledger, self.inputs)
         self._margins = _Code(program.margins, self.inputs)
 
@@ -49,7 +50,7 @@ class Evaluation:
         self.ydot[:] = 0.0
         self._counts[:] = 0
         self.program.filled(self.inputs)
-        self._search(*self._arguments)
+        self._search(0, 1, self._batch)
         found = bool(self._counts[0, END] == 0)
         if found:
             self.guess = self.y[self._algebraic]

@@ -44,6 +44,7 @@ from surfacechem.solve.radau.step import (
     preferred_member,
     set_weights,
 )
+from surfacechem.solve.radau.stepper import STOP
 from surfacechem.solve.radau.tables import GAMMA
 from surfacechem.solve.radau.work import (
     BASE,
@@ -153,7 +154,7 @@ def too_small(w: Any, h: float) -> bool:
 
 @compiled
 def advance(
-    w: Any, h: float, max_steps: int, stop: Any, size_last: float, norm_last: float
+    w: Any, h: float, max_steps: int, counts: Any, size_last: float, norm_last: float
 ) -> tuple[int, float, float, float]:
     """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
     repeated = w.clock[H_LAST] == 0.0
@@ -163,7 +164,7 @@ def advance(
             return STEP_UNDERFLOW, h, 0.0, h
         if w.count[STEPS] + w.count[REJECTED] >= max_steps:
             return MAX_STEPS, h, 0.0, h
-        if stop[0] != 0:
+        if counts[STOP] != 0:
             return STOPPED, h, 0.0, h
         predict(w, h)
         outcome = _prepare(w, h, not failed)

@@ -65,13 +65,13 @@ def noise(w: Any, m: int) -> float:
 
 
 @compiled
-def is_limit(kinds: Any, m: int) -> bool:
+def is_limit(w: Any, m: int) -> bool:
     """Whether the run may not go on where this margin is below zero."""
-    return bool(kinds[m, 0] == 1 and kinds[m, 1] <= 0)
+    return bool(w.kinds[m, 0] == 1 and w.kinds[m, 1] <= 0)
 
 
 @compiled
-def start_margins(w: Any, kinds: Any) -> None:
+def start_margins(w: Any) -> None:
     """Sides of zero at a start or restart."""
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
     set_inputs(w, w.vector[Y], w.vector[YDOT])
@@ -79,18 +79,18 @@ def start_margins(w: Any, kinds: Any) -> None:
     copy(w.margin[M_NOW], w.margin[M_BEFORE])
     for m in range(w.margin.shape[1]):
         value = w.margin[M_NOW, m]
-        if kinds[m, 4] == 0:
+        if w.kinds[m, 4] == 0:
             w.margin[M_SIDE, m] = OUT_OF_PLAY
             continue
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
         if w.fired[m] != 0:
             w.margin[M_SIDE, m] = LEAVING
         elif abs(value) <= noise(w, m):
-            w.margin[M_SIDE, m] = AT_ZERO if is_limit(kinds, m) else LEAVING
+            w.margin[M_SIDE, m] = AT_ZERO if is_limit(w, m) else LEAVING
         elif value > 0.0:
             w.margin[M_SIDE, m] = 1.0
         else:
-            w.margin[M_SIDE, m] = BEYOND if is_limit(kinds, m) else -1.0
+            w.margin[M_SIDE, m] = BEYOND if is_limit(w, m) else -1.0
 
 
 @compiled
@@ -109,10 +109,10 @@ def restore_sides(w: Any) -> None:
 
 
 @compiled
-def crosses(w: Any, kinds: Any, m: int) -> bool:
+def crosses(w: Any, m: int) -> bool:
     """Whether a margin lies across zero from its side, in a direction that counts; one to pass, by more than noise."""
-    side, value, direction = w.margin[M_SIDE, m], w.margin[M_NOW, m], kinds[m, 1]
-    if kinds[m, 3] == 1:
+    side, value, direction = w.margin[M_SIDE, m], w.margin[M_NOW, m], w.kinds[m, 1]
+    if w.kinds[m, 3] == 1:
         return bool(side == 1.0 and value < -noise(w, m))
     falling = side == 1.0 and value <= 0.0 and direction <= 0
     rising = side == -1.0 and value >= 0.0 and direction >= 0
@@ -120,22 +120,22 @@ def crosses(w: Any, kinds: Any, m: int) -> bool:
 
 
 @compiled
-def mark_at_end(w: Any, kinds: Any) -> None:
+def mark_at_end(w: Any) -> None:
     """Mark the kinks that reach zero with the end of a segment: the next one cannot tell on which side they were."""
     set_inputs(w, w.vector[Y], w.vector[YDOT])
     w.inputs[0] = w.clock[BASE] + w.clock[TAU]
     evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-    for m in range(kinds.shape[0]):
+    for m in range(w.kinds.shape[0]):
         side = w.margin[M_SIDE, m]
-        counts = kinds[m, 0] == 0 and abs(side) == 1.0 and side * kinds[m, 1] <= 0.0
+        counts = w.kinds[m, 0] == 0 and abs(side) == 1.0 and side * w.kinds[m, 1] <= 0.0
         if counts and abs(w.margin[M_NOW, m]) <= noise(w, m):
             w.fired[m] = 1
 
 
 @compiled
-def passed_by(w: Any, kinds: Any, m: int) -> float:
+def passed_by(w: Any, m: int) -> float:
     """How far below zero the lowest point between two crossings has to lie to count."""
-    return float(max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m)) if kinds[m, 3] == 1 else 0.0)
+    return float(max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m)) if w.kinds[m, 3] == 1 else 0.0)
 
 
 @compiled
@@ -203,24 +203,24 @@ def falls_from_start(w: Any, m: int) -> bool:
 
 
 @compiled
-def update_sides(w: Any, kinds: Any) -> None:
+def update_sides(w: Any) -> None:
     """Move on to the margins of now: their sides, the largest seen, and what was before."""
     copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
     for m in range(w.margin.shape[1]):
         value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        least = 0.0 if abs(side) == 1.0 and kinds[m, 3] == 0 else noise(w, m)
+        least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
         if abs(side) < AT_ZERO and abs(value) > least:
             w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
         w.margin[M_BEFORE, m] = value
 
 
 @compiled
-def kink_at(w: Any, kinds: Any, first: int) -> int:
+def kink_at(w: Any, first: int) -> int:
     """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
     found = -1
-    for m in range(kinds.shape[0]):
-        if kinds[m, 0] == 0 and kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
+    for m in range(w.kinds.shape[0]):
+        if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
             found = m
     return found
 
@@ -288,34 +288,34 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bo
 
 
 @compiled
-def _dips(w: Any, h: float, kinds: Any, m: int, a: float, b: float, c: float) -> bool:
+def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
     """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
     side = w.margin[M_SIDE, m]
-    if not ((side == 1.0 and kinds[m, 1] <= 0) or (side == -1.0 and kinds[m, 1] >= 0)):
+    if not ((side == 1.0 and w.kinds[m, 1] <= 0) or (side == -1.0 and w.kinds[m, 1] >= 0)):
         return False
     values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
     if not _may_reach(a, b, c, values[0], values[1], values[2]):
         return False
     keep_polynomial(w)
-    x = _reaches(w, h, m, a, b, c, is_limit(kinds, m) and kinds[m, 3] == 0, passed_by(w, kinds, m))
+    x = _reaches(w, h, m, a, b, c, is_limit(w, m) and w.kinds[m, 3] == 0, passed_by(w, m))
     w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
     return x > 0.0
 
 
 @compiled
-def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float) -> float:
+def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
     """Mark the margins that reach zero up to x with their brackets; x if there are any, AT_START where a limit is
     passed there, else 0.
     """
     found = 0.0
-    for m in range(kinds.shape[0]):
+    for m in range(w.kinds.shape[0]):
         w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
         falls = falls_from_start(w, m)
         if falls and before <= EDGE:
             found = AT_START
         elif falls:
             w.margin[M_HIGH, m] = before
-        marked = falls or crosses(w, kinds, m) or (before > 0.0 and _dips(w, h, kinds, m, earlier, before, x))
+        marked = falls or crosses(w, m) or (before > 0.0 and _dips(w, h, m, earlier, before, x))
         w.fired[m] = marked
         if marked and found == 0.0:
             found = x
@@ -323,14 +323,14 @@ def _mark(w: Any, h: float, kinds: Any, earlier: float, before: float, x: float)
 
 
 @compiled
-def _mark_dips(w: Any, h: float, kinds: Any, before: float, x: float) -> None:
+def _mark_dips(w: Any, h: float, before: float, x: float) -> None:
     """Mark the margins whose lowest point lies in an interval at whose end others are across zero."""
     copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
     copy(w.margin[M_NOW], w.margin[M_BEFORE])
     _margin_inside(w, h, x + EDGE, M_NOW)
-    for m in range(kinds.shape[0]):
+    for m in range(w.kinds.shape[0]):
         if w.fired[m] == 0:
-            w.fired[m] = _dips(w, h, kinds, m, before, x, x + EDGE)
+            w.fired[m] = _dips(w, h, m, before, x, x + EDGE)
 
 
 @compiled
@@ -359,7 +359,7 @@ def _sides_are_known(w: Any, h: float) -> bool:
 
 
 @compiled
-def _scan(w: Any, h: float, kinds: Any) -> float:
+def _scan(w: Any, h: float) -> float:
     """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
     there, SHORTER where one may be.
     """
@@ -371,13 +371,13 @@ def _scan(w: Any, h: float, kinds: Any) -> float:
         x = SCANNED[w.count[MEMBER], i]
         put_scanned(w, h, i)
         evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-        found = _mark(w, h, kinds, earlier, before, x)
+        found = _mark(w, h, earlier, before, x)
         if found > 0.0:
             keep_polynomial(w)
-            _mark_dips(w, h, kinds, before, x)
+            _mark_dips(w, h, before, x)
         if found != 0.0:
             return found
-        update_sides(w, kinds)
+        update_sides(w)
         earlier, before = before, x
     return 0.0
 
@@ -500,13 +500,13 @@ def _resolved(w: Any, size: float) -> float:
 
 
 @compiled
-def _mark_coincident(w: Any, h: float, size: float, kinds: Any) -> None:
+def _mark_coincident(w: Any, h: float, size: float) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
     _margins_at_end(w, size)
     near = _resolved(w, size)
-    for m in range(kinds.shape[0]):
+    for m in range(w.kinds.shape[0]):
         value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
-        across = crosses(w, kinds, m)
+        across = crosses(w, m)
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
         w.fired[m] = across or (w.fired[m] != 0 and close)
 
@@ -519,10 +519,10 @@ def _has_reached(w: Any, h: float, size: float, m: int) -> bool:
 
 
 @compiled
-def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
+def _first(w: Any, h: float) -> tuple[int, float]:
     """The marked margin that reaches zero first, and where; the slopes of all."""
     first, earliest = -1, 2.0
-    for m in range(kinds.shape[0]):
+    for m in range(w.kinds.shape[0]):
         w.margin[M_SLOPE, m] = 0.0
         if w.fired[m] != 0:
             x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
@@ -534,29 +534,29 @@ def _first(w: Any, h: float, kinds: Any) -> tuple[int, float]:
 
 
 @compiled
-def find_event(w: Any, h: float, kinds: Any) -> float:
+def find_event(w: Any, h: float) -> float:
     """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
     """
-    end = _scan(w, h, kinds)
+    end = _scan(w, h)
     if end == SHORTER:
         restore_sides(w)
         return 0.0
     if end <= 0.0:
         return h if end == 0.0 else AT_START
-    first, earliest = _first(w, h, kinds)
-    worst = 1.0 if kinds[first, 2] == 1 else np.inf
+    first, earliest = _first(w, h)
+    worst = 1.0 if w.kinds[first, 2] == 1 else np.inf
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:
         restore_sides(w)
         return 0.0
-    _mark_coincident(w, h, size, kinds)
-    kink = kink_at(w, kinds, first)
+    _mark_coincident(w, h, size)
+    kink = kink_at(w, first)
     if kink >= 0:
         size = _short_of(w, h, kink, size)
-        _mark_coincident(w, h, size, kinds)
+        _mark_coincident(w, h, size)
         w.fired[kink] = 1
-    w.fired[first] = kinds[first, 3] == 0 or _has_reached(w, h, size, first)
+    w.fired[first] = w.kinds[first, 3] == 0 or _has_reached(w, h, size, first)
     if w.fired[first] == 0 and not any_true(w.fired):
-        update_sides(w, kinds)
+        update_sides(w)
     return size

@@ -13,18 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from surfacechem.compile.program import Program
 from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
+from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, OUTPUTS, RECORDS, STOP, Batch
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
 CHUNK = 256
 """Runs a thread takes at a time."""
-END, OUTPUTS, EVENTS, RECORDS = range(4)
 _STATUSES = tuple(Status)
 LOOSEST = 3e-5
 """Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
-
-SPACING, TIMES = 10, 15
-"""Where the spacing, and segments and output times, stand among the arguments of the compiled entry point."""
 
 
 @lru_cache(maxsize=256)
@@ -34,80 +31,9 @@ def _kinds(margins: tuple[Margin, ...], in_play: tuple[bool, ...] | None = None)
     return np.array(rows, np.int64).reshape(-1, 5)
 
 
-class _Tables:
-    """Input and output arrays of a batch of runs, in the order of the compiled entry point."""
-
-    def __init__(
-        self,
-        program: Program,
-        y0: Array,
-        parameters: Array,
-        segments: Array,
-        times: Array,
-        rtol: float,
-        atol: Array,
-        margins: tuple[Margin, ...],
-        max_steps: int,
-        step_rows: int,
-        event_rows: int,
-        exchanged: Array | None = None,
-        seen: Array | None = None,
-        goes_on: bool = False,
-        spacing: Array | float = np.inf,
-        in_play: tuple[bool, ...] | None = None,
-    ) -> None:
-        runs, n, q = len(y0), program.n, program.n_ledger
-        self.stop = np.zeros(1, np.int64)
-        self.ends = np.empty((runs, 1 + 2 * n + q + program.n_margins))
-        self.counts = np.zeros((runs, 10), np.int64)
-        self.outputs = np.empty((runs, times.shape[-1], n + q))
-        self.steps = np.empty((runs, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(runs)
-        self.events = np.empty((runs, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(runs)
-        self.own_times = (np.broadcast_to(spacing, (runs,)), segments, times) if segments.ndim == 2 else None
-        self.arguments = (
-            program.addresses,
-            program.algebraic_mask,
-            program.chain_table,
-            program.ledger_groups,
-            np.zeros(q) if exchanged is None else exchanged,
-            np.zeros(program.n_margins) if seen is None else seen,
-            int(goes_on),
-            max_steps,
-            self.stop,
-            min(rtol, LOOSEST),
-            spacing if isinstance(spacing, float) else float(np.min(spacing)),
-            atol,
-            _kinds(margins, in_play),
-            y0,
-            parameters,
-            segments,
-            times,
-            self.ends,
-            self.counts,
-            self.outputs,
-            self.steps,
-            self.events,
-        )
-
-    def run(self, first: int, last: int) -> None:
-        if self.own_times is None:
-            stepper.run_batch()(first, last, *self.arguments)
-            return
-        arguments = list(self.arguments)
-        for i in range(first, last):
-            arguments[SPACING] = float(self.own_times[0][i])
-            arguments[TIMES : TIMES + 2] = (own[i] for own in self.own_times[1:])
-            stepper.run_batch()(i, i + 1, *arguments)
-
-
 @lru_cache(maxsize=4)
 def _no_rows(runs: int) -> Array:
     return np.empty((runs, 0, 0))
-
-
-@cache
-def _no_accounts() -> NDArray[np.int64]:
-    return np.empty(0, np.int64)
 
 
 def _contiguous(values: ArrayLike) -> Array:
@@ -116,52 +42,62 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-def _tables(problems: Sequence[Problem], step_rows: int, event_rows: int) -> _Tables:
-    """Tables of problems with as many segments and output times each."""
-    first = problems[0]
-    segments, times = _shared([problem.segments for problem in problems], [problem.times for problem in problems])
-    return _Tables(
-        first.program,
-        _stacked([problem.y0 for problem in problems]),
-        _stacked([problem.parameters for problem in problems]),
+def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: int) -> Any:
+    """Runs that share with a problem all but their y0, parameters, spacing, segments and times, which are given in this
+    order with the run as first axis; with room for so many steps and events of each.
+    """
+    program, (y0, parameters, spacing, segments, times) = problem.program, runs
+    n, q, m, count = program.n, program.n_ledger, program.n_margins, len(y0)
+    peaks = np.zeros(q + m)
+    if problem.exchanged is not None:
+        peaks[:q] = problem.exchanged
+    if problem.seen is not None:
+        peaks[q:] = problem.seen
+    return Batch(
+        program.addresses,
+        program.algebraic_mask,
+        program.chain_table,
+        program.ledger_groups,
+        min(problem.rtol, LOOSEST),
+        _contiguous(problem.atol),
+        problem.max_steps,
+        _kinds(problem.margins, problem.in_play),
+        peaks,
+        int(problem.goes_on),
+        y0,
+        parameters,
+        spacing,
         segments,
         times,
-        first.rtol,
-        _contiguous(first.atol),
-        first.margins,
-        first.max_steps,
-        step_rows,
-        event_rows,
-        first.exchanged,
-        first.seen,
-        first.goes_on,
-        _stacked([problem.spacing for problem in problems]) if segments.ndim == 2 else first.spacing,
-        first.in_play,
+        np.empty((count, 1 + 2 * n + q + m)),
+        np.zeros((count, COLUMNS), np.int64),
+        np.empty((count, times.shape[1], n + q)),
+        np.empty((count, step_rows, 1 + 2 * n + q)) if step_rows else _no_rows(count),
+        np.empty((count, event_rows, 2 + 2 * n + q)) if event_rows else _no_rows(count),
     )
 
 
-def _stacked(rows: Sequence[Any]) -> Array:
-    """Values of each problem below each other, without a copy of those of one."""
-    return _contiguous(rows[0])[None] if len(rows) == 1 else np.array(rows, dtype=float)
+def _shared(rows: Sequence[Array]) -> Array:
+    """A row for all problems where theirs are alike, else those of each."""
+    alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
+    return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
 
 
-def _shared(*columns: Sequence[Array]) -> list[Array]:
-    """Values that all problems have in common, or those of each where they differ in any."""
-    alike = all(np.array_equal(values, rows[0]) for rows in columns for values in rows[1:])
-    return [_contiguous(rows[0]) if alike else np.array(rows, dtype=float) for rows in columns]
-
-
-def _run_timed(tables: _Tables, seconds: float | None) -> None:
-    """Run once; the compiled loop looks at the stop flag before every step."""
-    if seconds is None:
-        tables.run(0, 1)
-    else:
-        timer = threading.Timer(seconds, tables.stop.fill, args=(1,))
-        timer.start()
-        try:
-            tables.run(0, 1)
-        finally:
-            timer.cancel()
+def _run_one(problem: Problem, step_rows: int, event_rows: int) -> Any:
+    """A batch of one, run; the compiled loop looks at the stop flag before every step."""
+    columns = problem.y0, problem.parameters, problem.segments, problem.times
+    y0, parameters, segments, times = (_contiguous(values)[None] for values in columns)
+    batch = _batch(problem, (y0, parameters, np.array((problem.spacing,)), segments, times), step_rows, event_rows)
+    if problem.max_seconds is None:
+        stepper.run_batch()(0, 1, tuple(batch))
+        return batch
+    timer = threading.Timer(problem.max_seconds, batch.counts[:, STOP].fill, args=(1,))
+    timer.start()
+    try:
+        stepper.run_batch()(0, 1, tuple(batch))
+    finally:
+        timer.cancel()
+    return batch
 
 
 def _points(rows: Array, n: int) -> tuple[Array, Array, Array, Array]:
@@ -180,9 +116,7 @@ class Radau(Solver):
         stepper.compile_stepper()
 
     def solve(self, problem: Problem) -> Result:
-        tables = _tables([problem], *_usual_rows(problem))
-        _run_timed(tables, problem.max_seconds)
-        return _whole(problem, tables, 0)
+        return _whole(problem, _run_one(problem, *_usual_rows(problem)), 0)
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
         """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
@@ -205,21 +139,24 @@ class Radau(Solver):
 
 
 def _solved(problems: Sequence[Problem]) -> list[Result]:
-    tables = _tables(problems, *_usual_rows(problems[0]))
-    tables.run(0, len(problems))
-    return [_whole(problem, tables, i) for i, problem in enumerate(problems)]
+    """Results of problems of one model with as many segments and output times each."""
+    segments, times = (_shared([getattr(problem, name) for problem in problems]) for name in ("segments", "times"))
+    own = [(problem.y0, problem.parameters, problem.spacing) for problem in problems]
+    y0, parameters, spacing = (np.array(values, float) for values in zip(*own, strict=True))
+    batch = _batch(problems[0], (y0, parameters, spacing, segments, times), *_usual_rows(problems[0]))
+    stepper.run_batch()(0, len(problems), tuple(batch))
+    return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
 
-def _whole(problem: Problem, tables: _Tables, i: int) -> Result:
-    """The result of a run in tables; where these were too short it is repeated with the sizes it turned out to need,
-    which a limit in seconds may change.
+def _whole(problem: Problem, batch: Any, i: int) -> Result:
+    """The result of a run of a batch; where its tables were too short it is repeated with the sizes it turned out to
+    need, which a limit in seconds may change.
     """
     while True:
-        needed, records = int(tables.counts[i, EVENTS]), int(tables.counts[i, RECORDS]) if problem.record_steps else 0
-        if needed <= tables.events.shape[1] and records <= tables.steps.shape[1]:
-            return _result(problem, tables, i)
-        tables, i = _tables([problem], records, needed), 0
-        _run_timed(tables, problem.max_seconds)
+        needed, records = int(batch.counts[i, EVENTS]), int(batch.counts[i, RECORDS]) if problem.record_steps else 0
+        if needed <= batch.events.shape[1] and records <= batch.steps.shape[1]:
+            return _result(problem, batch, i)
+        batch, i = _run_one(problem, records, needed), 0
 
 
 def _usual_rows(problem: Problem) -> tuple[int, int]:
@@ -227,14 +164,14 @@ def _usual_rows(problem: Problem) -> tuple[int, int]:
     return STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
 
 
-def _result(problem: Problem, tables: _Tables, i: int) -> Result:
+def _result(problem: Problem, batch: Any, i: int) -> Result:
     program, n = problem.program, problem.program.n
-    counts: list[int] = tables.counts[i].tolist()
-    outputs, end = counts[OUTPUTS], tables.ends[i]
+    counts: list[int] = batch.counts[i].tolist()
+    outputs, end = counts[OUTPUTS], batch.ends[i]
     m = 1 + 2 * n + program.n_ledger
-    values = tables.outputs[i, :outputs]
-    events, steps = tables.events[i, : counts[EVENTS]], tables.steps[i, : counts[RECORDS]]
-    if len(tables.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
+    values = batch.outputs[i, :outputs]
+    events, steps = batch.events[i, : counts[EVENTS]], batch.steps[i, : counts[RECORDS]]
+    if len(batch.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
         events, steps = events.copy(), steps.copy()
     return Result(
         problem=problem,
@@ -248,7 +185,7 @@ def _result(problem: Problem, tables: _Tables, i: int) -> Result:
         outputs=values[:, :n],
         ledger_outputs=values[:, n:],
         events=_events(events, n) if counts[EVENTS] else _no_events(n, program.n_ledger),
-        counters=Counters(*counts[RECORDS + 1 :]),
+        counters=Counters(*counts[RECORDS + 1 : STOP]),
         steps=Points(*_points(steps, n)) if problem.record_steps else None,
     )
 
@@ -263,7 +200,7 @@ def _no_events(n: int, q: int) -> Events:
 
 
 @dataclass(frozen=True)
-class Batch:
+class BatchResult:
     """Ends of many runs as arrays; ``outputs[i, :counts[i]]`` are the outputs run i reached, the rest is not set."""
 
     status: NDArray[np.int64]
@@ -286,7 +223,7 @@ def solve_many(
     margins: Sequence[Margin] = (),
     max_steps: int = 100_000,
     threads: int = 1,
-) -> Batch:
+) -> BatchResult:
     """Run arrays of initial values [run, state] and parameters [run, segment, parameter] that share segments and output
     times, without anything of the way but the outputs; independent of the number of threads.
     """
@@ -295,21 +232,22 @@ def solve_many(
         raise ValueError(
             f"{len(states)} initial values but {len(table)} parameter tables; one of each a run is needed."
         )
-    weights, kinds = np.array(np.broadcast_to(np.asarray(atol, dtype=float), (program.n,))), tuple(margins)
-    if len(states):  # of what the runs share is checked that it fits together
-        Problem(program, states[0], outputs, breaks, table[0], rtol, weights, kinds, max_steps)
-    tables = _Tables(program, states, table, breaks, outputs, rtol, weights, kinds, max_steps, 0, 0)
-    stepper.run_batch()
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda i: tables.run(i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
     n = program.n
-    return Batch(
-        status=tables.counts[:, END],
-        t=tables.ends[:, 0],
-        y=tables.ends[:, 1 : 1 + n],
-        outputs=tables.outputs[:, :, :n],
-        ledger_outputs=tables.outputs[:, :, n:],
-        counts=tables.counts[:, OUTPUTS],
+    weights, kinds = np.array(np.broadcast_to(np.asarray(atol, dtype=float), (n,))), tuple(margins)
+    first = states[0] if len(states) else np.zeros(n)
+    fixed = table[0] if len(table) else np.zeros((len(breaks) - 1, program.n_parameters))
+    shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
+    batch = _batch(shared, (states, table, np.array((np.inf,)), breaks[None], outputs[None]), 0, 0)
+    kernel, fields = stepper.run_batch(), tuple(batch)
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda i: kernel(i, min(i + CHUNK, len(states)), fields), range(0, len(states), CHUNK)))
+    return BatchResult(
+        status=batch.counts[:, END],
+        t=batch.ends[:, 0],
+        y=batch.ends[:, 1 : 1 + n],
+        outputs=batch.outputs[:, :, :n],
+        ledger_outputs=batch.outputs[:, :, n:],
+        counts=batch.counts[:, OUTPUTS],
     )
 
 
@@ -322,16 +260,16 @@ class Consistent:
     valid: NDArray[np.bool_]
 
 
-def search_arguments(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> tuple[Any, ...]:
-    """Arguments of the compiled loop that make rows [t | y | ydot] consistent where they stand.
+def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> tuple[Any, ...]:
+    """The batch whose rows [t | y | ydot] of ``ends`` are made consistent where they stand.
 
-    ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, 10] gets the outcomes under END.
+    ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, COLUMNS] gets the outcomes under END.
     """
-    none, nothing = np.zeros(0), _no_rows(len(ends))
+    none, rows, nothing = np.zeros(0), np.zeros((1, 0)), _no_rows(len(ends))
     return (
-        0, len(ends), program.addresses, program.algebraic_mask, program.chain_table, _no_accounts(), none, none, 0, 0,
-        counts[0], 1.0, np.inf, np.ones(program.n), _kinds(()),
-        ends, table, none, none, ends, counts, nothing, nothing, nothing,
+        program.addresses, program.algebraic_mask, program.chain_table, np.empty(0, np.int64),
+        1.0, np.ones(program.n), 0, _kinds(()), none, 0,
+        ends, table, none, rows, rows, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 
 
@@ -356,7 +294,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
         rows = np.broadcast_to(table[:, 0], (len(ends), program.n_parameters))
         filled = program.filled(np.concatenate([ends, rows], axis=1))
         table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
-    counts = np.zeros((len(ends), 10), np.int64)
-    stepper.run_batch()(*search_arguments(program, ends, table, counts))
+    counts = np.zeros((len(ends), COLUMNS), np.int64)
+    stepper.run_batch()(0, len(ends), search_batch(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)

@@ -4,7 +4,7 @@ Importing this module imports neither Numba nor the kernel.
 """
 
 import threading
-from collections.abc import Sequence
+from collections import namedtuple
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,49 @@ import numpy as np
 from surfacechem.compile import objectcode
 from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
 
+FIELDS: dict[str, tuple[Any, int]] = {
+    # the program
+    "code": (np.int64, 2),
+    "algebraic": (np.bool_, 1),
+    "chains": (np.int64, 2),
+    "groups": (np.int64, 1),
+    # the method
+    "rtol": (float, 0),
+    "atol": (float, 1),
+    "max_steps": (int, 0),
+    # guards: a row (terminal, direction, smooth, strict, in play) for each
+    "kinds": (np.int64, 2),
+    # runs that continue others: largest accounts and guards before; and whether others follow
+    "peaks": (float, 1),
+    "goes_on": (int, 0),
+    # the runs; spacing, segments and times have one row for all where these are alike
+    "y0": (float, 2),
+    "parameters": (float, 3),
+    "spacing": (float, 1),
+    "segments": (float, 2),
+    "times": (float, 2),
+    # results
+    "ends": (float, 2),
+    "counts": (np.int64, 2),
+    "outputs": (float, 3),
+    "steps": (float, 3),
+    "events": (float, 3),
+}
+"""Entries of a batch of runs: type and number of axes. The first axis of the last two groups is the run."""
+
+_named: Any = namedtuple
+Batch: Any = _named("Batch", FIELDS)
+"""What a batch of runs reads, and the rows that it writes."""
+
+END, OUTPUTS, EVENTS, RECORDS, FIRST_COUNTER, STOP, COLUMNS = 0, 1, 2, 3, 4, 10, 11
+"""Columns of the table of counts: status, outputs written, events, recorded steps; then six counters, and a flag that
+is set from outside to end the run.
+"""
+
 _SOURCES = (
     "../contract",
+    "../../tolerances",
+    "stepper",
     "work",
     "linear",
     "roundoff",
@@ -43,47 +84,23 @@ def is_compiled() -> bool:
 
 
 def _compiled() -> Any:
-    from numba import boolean, float64, int64, void
+    from numba import from_dtype, types
 
     from surfacechem.solve.radau.driver import run_batch
     from surfacechem.solve.radau.work import PARTS
 
-    real, table, cube, count = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[:, ::1]
-    signature = void(
-        int64,
-        int64,
-        count,
-        boolean[::1],
-        count,
-        int64[::1],
-        real,
-        real,
-        int64,
-        int64,
-        int64[::1],
-        float64,
-        float64,
-        real,
-        count,
-        table,
-        cube,
-        real,
-        real,
-        table,
-        count,
-        cube,
-        cube,
-        cube,
-    )
+    def kind(dtype: Any, ndim: int) -> Any:
+        entry = from_dtype(np.dtype(dtype))
+        return types.Array(entry, ndim, "C") if ndim else entry
+
+    numba_types: Any = types
+    batch = numba_types.Tuple([kind(*field) for field in FIELDS.values()])
+    signature = types.void(types.int64, types.int64, batch)
     kernel = compile_kernel(run_batch, signature, _folder(), PARTS)
-    _call_once(kernel, signature.args)
+    # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
+    kernel(0, 0, tuple(np.zeros((0,) * ndim, dtype) if ndim else dtype(0) for dtype, ndim in FIELDS.values()))
     objectcode.keep(kernel, _folder())
     return kernel
-
-
-def _call_once(kernel: Any, kinds: Sequence[Any]) -> None:
-    """A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes."""
-    kernel(*(np.zeros((0,) * kind.ndim, str(kind.dtype)) if hasattr(kind, "ndim") else 0 for kind in kinds))
 
 
 class _Loaded:

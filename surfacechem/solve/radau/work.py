@@ -61,12 +61,11 @@ Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.ara
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero; value and side at the
 start of the step."""
 (
-    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, SPACING, GUESSED,
-) = np.arange(13)  # fmt: skip
+    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
+) = np.arange(12)  # fmt: skip
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
-t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; SPACING is how far apart the
-points of a long step are at which it is held against the equations; GUESSED is by how much the first guess of the
-stages was wrong, in units of the tolerance."""
+t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; GUESSED is by how much the first
+guess of the stages was wrong, in units of the tolerance."""
 STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
 MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
 """Counters; members of the Radau family used now and by the stored polynomial; Newton
@@ -81,6 +80,7 @@ class Work(NamedTuple):
     algebraic: Any
     chains: Any
     groups: Any
+    kinds: Any
     inputs: Any
     clock: Any
     count: Any
@@ -259,20 +259,21 @@ def _take(_context: Any, cursor: Any, shape: Any, kind: Any) -> Any:
 
 
 @partial(compiled, counted=True)
-def lay_out(
-    code: Any, algebraic: Any, chains: Any, groups: Any, cursor: Any, n_parameters: int, n_margins: int
-) -> Work:
+def lay_out(batch: Any, cursor: Any) -> Work:
     """Workspace of a trajectory on the zeros from the cursor's address on; leaves their end there. No memory is
     touched. The three arrays of derivatives follow each other, as the compiled function writes them.
     """
+    algebraic, chains, groups = batch.algebraic, batch.chains, batch.groups
+    n_parameters, n_margins = batch.parameters.shape[2], batch.kinds.shape[0]
     n, links, n_ledger = algebraic.shape[0], chains.shape[0], groups.shape[0]
     core = chains[0, 0] if links > 0 else n
     cells = n - core
     return Work(
-        code,
+        batch.code,
         algebraic,
         chains,
         groups,
+        batch.kinds,
         _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
         _take(cursor, (GUESSED + 1,), np.float64),
         _take(cursor, (REFUSED + 1,), np.int64),
