@@ -186,6 +186,6 @@ class EmbeddedScene:
         self.evaluation.put(t, x[: len(self.states)])
         booked = self.moments.settle() if index is None else self.moments.fire(index)
         if booked is None:
-            raise EndError(self.moments.reason)
+            raise EndError(self.moments.instant.reason)
         states = self.evaluation.y[self.evaluation.free]
         return np.concatenate((states, x[len(self.states) :] + booked)), booked

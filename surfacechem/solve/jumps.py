@@ -1,6 +1,7 @@
-"""Jumps of the state at a transition: energy is conserved, entropy is tested, gaps find their next equilibrium.
+"""Jumps of the state along an edge: reset, equilibrate, share out the heat, judge by the second law, book.
 
-Source: lumped form of the balances across a jump; Sauer, Duong & Mandadapu (2021), section 6.3, for sudden debonding.
+Energy is conserved in each: what falls is heat. Source: lumped form of the balances across a jump; Sauer, Duong &
+Mandadapu (2021), section 6.3, for sudden debonding.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
-from surfacechem.expressions import Expression, derivative
+from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Account, System
 from surfacechem.solve.branches import Domain
-from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Heat, Lost, Point
+from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point
 from surfacechem.solve.jump_heat import JumpHeat
 from surfacechem.solve.load_path import LoadPath, LoadStep
+from surfacechem.tolerances import DIGITS, ROUNDING
 
 Array = NDArray[np.float64]
 
@@ -30,20 +32,30 @@ NO_REST = "no gap follows at which the tractions are in equilibrium; with a mass
 NO_DOMAIN = "no gap follows at which the tractions are in equilibrium and the laws hold"
 NO_HEAT = "it would take more heat than there is"
 NO_ENERGY = "the energy of the interface is not finite after it"
-
-ROUNDING = 1e-12
-"""Entropy that counts as none, relative to the entropies that change."""
-
-DIGITS = 4 * float(np.finfo(float).eps)
-"""Last digits of a number."""
+NO_SHARES = "where the sliding ends and who takes its heat do not agree; with a damper it would take its time"
 
 ROUNDS = 20
-"""Rounds in which the end of a slip and the shares of its heat agree, where the one depends on the other."""
+"""Rounds in which the end of a slip and the shares of its heat have to agree, where the one depends on the other: each
+adds a digit or more where they converge at all."""
+
+
+@dataclass(frozen=True)
+class Slack:
+    """What is not known of an edge at its moment."""
+
+    noise: float = 0.0
+    """Rounding of its guard."""
+    drift: float = 0.0
+    """How far the integration may have carried its guard."""
+    balanced: float = BALANCED
+    """Part of the tractions by which the integration leaves them out of balance."""
+    rtol: float = 0.0
+    """Relative tolerance of the run, for what is found along the way of a jump."""
 
 
 @dataclass(frozen=True)
 class Jump:
-    """What happened at a transition."""
+    """What happened along an edge."""
 
     t: float
     edge: Edge
@@ -55,7 +67,7 @@ class Jump:
     """Entropy produced [J/(m^2 K)], what reservoirs take included."""
     verdict: str
     since: float = 0.0
-    """Time since the transition before [s], sharper than the difference of their times late in a run."""
+    """Time since the edge before [s], sharper than the difference of their times late in a run."""
     work: Mapping[str, float] = field(default_factory=dict)
     """Work of the far-field tractions [J/m^2], by account."""
     obstacle: str = ""
@@ -86,6 +98,21 @@ def booked(jump: Jump, account: Account, states: Sequence[str]) -> float:
     return amounts[account.kind]
 
 
+class ImpossibleError(Exception):
+    """A jump has no end, with the reason in words."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """A jump on its way: the state as modes and bonds have jumped, before gaps and temperatures follow."""
+
+    edge: Edge
+    start: Point
+    energy: float
+    """What the jump conserves, before it [J/m^2]."""
+    fold: Lost | None = None
+
+
 class Jumper:
     """The jumps of a system, compiled when the first one happens."""
 
@@ -97,46 +124,36 @@ class Jumper:
         kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
+    # -- compiled functions of the inputs -------------------------------------------------------------------------
+
     @cached_property
-    def _maps(self) -> list[Function]:
-        """For each transition the new states and the new modes."""
+    def _resets(self) -> list[Function]:
+        """For each edge the new states, and then the new modes and registers."""
         system = self.system
         modes = [system.parameters[j].symbol for j in self.mode_columns]
         return [
             compile_function(
                 system.inputs,
-                [system.expand(item.reset.get(s.symbol, s.symbol)) for s in system.states]
-                + [system.expand(item.modes.get(m, m)) for m in modes],
+                [system.expand(edge.reset.get(s.symbol, s.symbol)) for s in system.states]
+                + [system.expand(edge.modes.get(m, m)) for m in modes],
             )
-            for item in system.edges
+            for edge in system.edges
         ]
 
-    def modes_after(self, index: int, point: Point) -> Array:
-        """The modes that a transition sets."""
-        return self._maps[index](point.inputs())[len(point.y) :]
+    @cached_property
+    def guards_read_rates(self) -> bool:
+        """Whether guards depend on rates, or on variables that have to be found with them."""
+        states = self.system.states
+        guards = [*(edge.guard for edge in self.system.edges), *(margin.expression for margin in self.system.margins)]
+        read = set().union(*(self.system.expand(guard).free_symbols for guard in guards))
+        return any(state.algebraic or state.dot in read for state in states)
 
     @cached_property
-    def _moving_margins(self) -> list[Expression]:
-        return [self.system.expand(edge.guard) for edge in self.system.edges]
-
-    @cached_property
-    def margins_read_rates(self) -> bool:
-        """Whether margins depend on rates, or on variables that have to be found with them."""
-        rates = {state.dot for state in self.system.states}
-        others = [self.system.expand(margin.expression) for margin in self.system.margins]
-        return any(state.algebraic for state in self.system.states) or any(
-            item.free_symbols & rates for item in [*self._moving_margins, *others]
-        )
-
-    @cached_property
-    def _margin_rates(self) -> Function:
+    def _guard_rates(self) -> Function:
         states, t = self.system.states, self.system.t
-        rates = [sum((derivative(m, s.symbol) * s.dot for s in states), derivative(m, t)) for m in self._moving_margins]
+        guards = [self.system.expand(edge.guard) for edge in self.system.edges]
+        rates = [sum((derivative(g, s.symbol) * s.dot for s in states), derivative(g, t)) for g in guards]
         return compile_function(self.system.inputs, rates)
-
-    def margin_rates(self, point: Point) -> Array:
-        """Time derivatives of the margins of the transitions at a consistent point."""
-        return self._margin_rates(point.inputs())
 
     @cached_property
     def _books(self) -> Function:
@@ -147,8 +164,22 @@ class Jumper:
 
     @cached_property
     def _energy(self) -> Function:
-        """What a jump conserves."""
+        """What a jump conserves, by itself: a search asks for it at many rows."""
         return compile_function(self.system.inputs, [self.system.expand(self.system.jump_energy)])
+
+    @cached_property
+    def _pulls(self) -> Function:
+        """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
+        items = [self.system.expand(item) for pull in self.system.pulls.values() for item in pull]
+        return compile_function(self.system.inputs, items)
+
+    def _far_field(self, point: Point) -> Array:
+        """Stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""
+        return np.asarray(self._pulls(point.inputs()).reshape(-1, 4).T)
+
+    @cached_property
+    def _domain(self) -> Domain:
+        return Domain(self.system)
 
     @cached_property
     def _heat(self) -> JumpHeat:
@@ -168,140 +199,85 @@ class Jumper:
             moved["n"].update(self.system.follows)
         return [(axis, [1 + self.states.index(name) for name in names]) for axis, names in moved.items()]
 
-    def _made(self, rows: Array, item: Edge, start: Point, energy: float) -> Array:
-        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
+    # -- what an instant asks -------------------------------------------------------------------------------------
 
-        Friction is last, with the bonds that it breaks.
-        The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
-        the normal gap is where it goes to.
-        """
-        makers = list(self.system.sinks)
-        made = np.zeros((len(rows), len(makers) + 1))
+    def modes_after(self, index: int, point: Point) -> Array:
+        """The modes and registers that an edge sets."""
+        return self._resets[index](point.inputs())[len(point.y) :]
 
-        def maker(axis: str) -> int:
-            return makers.index(axis if axis in makers and item.heat != "snap" else INTERFACE)
+    def guard_rates(self, point: Point) -> Array:
+        """Time derivatives of the guards of the edges at a consistent point."""
+        return self._guard_rates(point.inputs())
 
-        level = self._energy(start.inputs())[0]
-        first = -1 if item.heat == "local" else maker("n" if item.heat == "joint" else INTERFACE)
-        made[:, first] += energy - level
-        here = np.repeat(start.inputs()[None], len(rows), axis=0)
-        here[:, 1 + 2 * len(start.y) :] = rows[:, 1 + 2 * len(start.y) :]
-        for axis, columns in self._stages:
-            here[:, columns] = rows[:, columns]
-            now = self._energy(here)[:, 0]
-            gives = self._gives(axis, start, rows)
-            with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
-                fall = level - now
-            made[~gives, maker(axis)] += fall[~gives]
-            made[gives, maker(INTERFACE) if axis == "n" else -1] += fall[gives]
-            level = now
-        return made
+    def is_loaded(self, before: Point, point: Point) -> bool:
+        """Whether a jump of the loads does work or sets anything in motion."""
+        if self.equilibria.pushed(before, point):
+            return True
+        if not self.system.pulls:
+            return False
+        old, new = self._far_field(before), self._far_field(point)
+        return not np.allclose(old[[1, 3]], new[[1, 3]], rtol=BALANCED, atol=ATOM)
 
-    def _gives(self, axis: str, start: Point, rows: Array) -> NDArray[np.bool_]:
-        """Whether the interface gives way along an axis: it slides, or loses bonds."""
-        slip, lost = self.equilibria.slip, self.equilibria.followers
-        if axis == "n":
-            return np.asarray(np.any(rows[:, lost] != start.inputs()[lost], axis=1))
-        if slip is None:
-            return np.zeros(len(rows), dtype=bool)
-        return np.asarray(rows[:, 1 + 2 * len(self.states) + slip] != 0)
+    # -- a jump, step by step -------------------------------------------------------------------------------------
 
     def make(
         self,
         index: int,
         before: Point,
         since: float,
-        noise: float = 0.0,
-        drift: float = 0.0,
-        balanced: float = BALANCED,
+        slack: Slack,
         last: Point | None = None,
         step: LoadStep | None = None,
-        rtol: float = 0.0,
     ) -> Jump:
-        """Carry out a transition, ``since`` the one before [s]; ``noise`` is what its margin rounds to, ``drift`` how
-        far the integration may have carried it, and ``balanced`` the part of tractions by which it leaves them out of
-        balance. ``last`` is the state before loads jump, or where the integration ended close to a fold. ``step`` are
-        loads that have jumped at this moment; what their way decides is found within ``rtol``.
+        """Carry out an edge, ``since`` the one before [s]. ``last`` is the state before loads jump, or where the
+        integration ended close to a fold; ``step`` are loads that have jumped at this moment.
         """
-        item = self.system.edges[index]
-        lost = self.equilibria.at_fold(index, before) if item.fold is not None else None
-        before = lost.point if lost is not None else before
-        values = self._maps[index](before.inputs())
-        if self._ends_sliding(before, values):
-            # What the integration has left of the balance would look like a push to what sticks from here on.
-            before = self.equilibria.polished(before)
-            values = self._maps[index](before.inputs())
-        n = len(before.y)
-        parameters = before.parameters.copy()
-        parameters[self.mode_columns] = values[n:]
-        if item.fold is not None and lost is None and self.equilibria.slip is not None:
-            parameters[self.equilibria.slip] = 0.0  # there is no steady sliding, and nothing pushes it on
-        start = Point(before.t, values[:n], np.zeros(n), parameters)
+        edge = self.system.edges[index]
+        fold = self.equilibria.at_fold(index, before) if edge.fold is not None else None
+        before, start = self._reset(index, fold.point if fold is not None else before, fold)
+        jump = Jump(before.t, edge, before, start, 0.0, 0.0, IMPOSSIBLE, since)
         if not np.isfinite(self._books(start.inputs())[0]):
-            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=NO_ENERGY)
-        books, lift = self._opened(item, before, last)
-        energy = float(books[0])
+            return replace(jump, obstacle=NO_ENERGY)
+        books, lift = self._opened(edge, before, last)
+        release = Release(edge, start, float(books[0]), fold)
         if step is not None:
             self._load_path.reach(index, step, before)
-        after: Point | None = start
-        shares: Array | None = None
-        for _ in range(ROUNDS if item.equilibrates else 0):
+        try:
+            rest, shares = self._equilibrated(index, release, slack, step) if edge.equilibrates else (start, None)
+            after, released, heat_out, entropy_out = self._heated(rest, release, shares)
+        except ImpossibleError as obstacle:
+            return replace(jump, obstacle=str(obstacle))
+        if edge.equilibrates and self.equilibria.is_pushed_back(after, slack.balanced):  # friction pulls nothing back
+            after = self.equilibria.with_slip(after, 0.0)
+        jump = replace(jump, after=after, released=released, work=lift, heat_out=heat_out, entropy_out=entropy_out)
+        return self._judged(jump, books, slack.noise)
 
-            def heat(rows: Array, shares: Array | None = shares) -> Array:
-                return self._heat.warmed(rows, self._made(rows, item, start, energy), shares)
+    def _reset(self, index: int, before: Point, fold: Lost | None) -> tuple[Point, Point]:
+        """The point before a jump, and with the modes and states that the edge resets."""
+        slip, n = self.equilibria.slip, len(before.y)
+        values = self._resets[index](before.inputs())
+        if slip is not None and before.parameters[slip] and not values[n + self.mode_columns.index(slip)]:
+            # What the integration has left of the balance would look like a push to what sticks from here on.
+            before = self.equilibria.polished(before)
+            values = self._resets[index](before.inputs())
+        parameters = before.parameters.copy()
+        parameters[self.mode_columns] = values[n:]
+        if self.system.edges[index].fold is not None and fold is None and slip is not None:
+            parameters[slip] = 0.0  # there is no steady sliding, and nothing pushes it on
+        return before, Point(before.t, values[:n], np.zeros(n), parameters)
 
-            after = self._rested(index, start, lost, heat, balanced)
-            after = after if lost is not None else self._kept(item, after, parameters, max(noise, drift))
-            found = self._path_shares(step, item, start, after, energy, rtol)
-            agreed = found is None or (shares is not None and np.allclose(found, shares, rtol=0.0, atol=rtol))
-            shares = found
-            if agreed or not self._load_path.warms_itself:
-                break
-        beyond = self._beyond(item, after)
-        heated = self._heated(after, item, start, energy, shares) if after is not None and not beyond else None
-        if heated is None:
-            obstacle = f"{NO_DOMAIN}: {beyond}" if beyond else NO_REST if after is None else NO_HEAT
-            return Jump(before.t, item, before, start, 0.0, 0.0, IMPOSSIBLE, since, obstacle=obstacle)
-        final, released, out, taken = heated
-        if item.equilibrates and self.equilibria.is_pushed_back(final, balanced):  # friction pulls nothing back
-            final = self.equilibria.with_slip(final, 0.0)
-        jump = Jump(
-            before.t, item, before, final, released, taken, ADMISSIBLE, since, lift, heat_out=out, entropy_out=taken
-        )
-        return self._judged(jump, books, noise)
-
-    def _ends_sliding(self, before: Point, values: Array) -> bool:
-        """Whether the new modes ``values`` end with make what slides in balance stick."""
-        slip = self.equilibria.slip
-        if slip is None:
-            return False
-        return bool(before.parameters[slip]) and not values[len(before.y) + self.mode_columns.index(slip)]
-
-    @cached_property
-    def _pulls(self) -> Function:
-        """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
-        items = [self.system.expand(item) for pull in self.system.pulls.values() for item in pull]
-        return compile_function(self.system.inputs, items)
-
-    def is_loaded(self, before: Point, point: Point) -> bool:
-        """Whether a jump of the loads does work or sets anything in motion."""
-        if self.equilibria.pushed(before, point) or not self.system.pulls:
-            return self.equilibria.pushed(before, point)
-        (_, *old), (_, *new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (before, point))
-        return not np.allclose([old[0], old[2]], [new[0], new[2]], rtol=BALANCED, atol=ATOM)
-
-    def _opened(self, item: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
+    def _opened(self, edge: Edge, before: Point, last: Point | None) -> tuple[Array, dict[str, float]]:
         """The books before a jump, and the work up to there that the integration has not seen.
 
         That of far-field displacements that jump before anything moves, and that on the last of the way to a fold.
         """
-        if last is None or not (item.times or item.fold):
+        if last is None or not (edge.times or edge.fold):
             return self._books(before.inputs()), {}
-        books = self._books((last if item.times else before).inputs())
+        books = self._books((last if edge.times else before).inputs())
         if not self.system.pulls:
             return books, {}
-        (k, w, F, g), (_, w_new, F_new, g_new) = (self._pulls(p.inputs()).reshape(-1, 4).T for p in (last, before))
-        if item.fold:
+        (k, w, F, g), (_, w_new, F_new, g_new) = self._far_field(last), self._far_field(before)
+        if edge.fold:
             middle = (g_new + g) / 2
             way = stored(k, w_new, middle) - stored(k, w, middle) + (F_new + F) / 2 * (g_new - g)
             return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
@@ -312,13 +288,44 @@ class Jumper:
             books[j] = (F_new * g)[accounts.index(name)] if name in accounts else books[j]
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
-    def _rested(self, index: int, start: Point, lost: Lost | None, heat: Heat, balanced: float) -> Point | None:
+    def _equilibrated(
+        self, index: int, release: Release, slack: Slack, step: LoadStep | None
+    ) -> tuple[Point, Array | None]:
+        """Where the gaps come to rest, and the shares of the heat of friction where its way decides them."""
+        edge, start, shares = release.edge, release.start, None
+        for _ in range(ROUNDS):
+            after = self._rested(index, release, shares, slack.balanced)
+            if after is None:
+                raise ImpossibleError(NO_REST)
+            still = edge.measure and abs(after.y[self.states.index(edge.measure)]) <= max(slack.noise, slack.drift)
+            if still and release.fold is None:  # what the guard measures has not moved: the modes of the edge hold
+                slip = self.equilibria.slip
+                sliding = 0.0 if slip is None else after.parameters[slip]
+                after = self.equilibria.with_slip(replace(after, parameters=start.parameters), sliding)
+            found = self._path_shares(step, release, after, slack.rtol)
+            agreed = found is None or (shares is not None and np.allclose(found, shares, rtol=0.0, atol=slack.rtol))
+            shares = found
+            if agreed or not self._load_path.warms_itself:
+                break
+        else:
+            raise ImpossibleError(NO_SHARES)
+        # Touch leaves gaps where they are; any other jump may leave the domain of a law.
+        beyond = "" if edge.measure else self._domain.beyond(after.inputs())
+        if beyond:
+            raise ImpossibleError(f"{NO_DOMAIN}: {beyond}")
+        return after, shares
+
+    def _rested(self, index: int, release: Release, shares: Array | None, balanced: float) -> Point | None:
         """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
-        found = self.equilibria
+
+        def heat(rows: Array) -> Array:
+            return self._heat.warmed(rows, self._made(rows, release), shares)
+
+        found, start, fold = self.equilibria, release.start, release.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if not slip:
-            return found.let_go(lost, start.parameters, heat) if lost else found.settle(start, heat)
-        stuck = None if lost is None else found.held_at(index, lost)
+            return found.let_go(fold, start.parameters, heat) if fold else found.settle(start, heat)
+        stuck = None if fold is None else found.held_at(index, fold)
         at_rest = found.with_slip(start, 0.0)
         trial = found.let_go(stuck, at_rest.parameters, heat) if stuck else found.settle(at_rest, heat)
         if trial is None:
@@ -326,38 +333,69 @@ class Jumper:
         onward = found.with_slip(trial, slip)
         if found.is_pushed_back(onward, balanced, heat):
             return trial
-        if lost is not None and stuck is None:  # it is sliding that is lost
-            return found.let_go(lost, onward.parameters, heat)
+        if fold is not None and stuck is None:  # it is sliding that is lost
+            return found.let_go(fold, onward.parameters, heat)
         return found.settle(onward, heat, balanced)
 
-    def _path_shares(
-        self, step: LoadStep | None, item: Edge, start: Point, after: Point | None, energy: float, rtol: float
-    ) -> Array | None:
+    def _path_shares(self, step: LoadStep | None, release: Release, after: Point, rtol: float) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
-        if step is None or after is None or item.heat == "snap" or not self._load_path.slides(start, after):
+        if step is None or release.edge.heat == "snap" or not self._load_path.slides(after):
             return None
-        made = float(self._made(after.inputs()[None], item, start, energy)[0, -1])
-        broken = energy - float(self._energy(start.inputs())[0]) if item.heat == "local" else 0.0
-        small = self._rounding(after, energy)
-        return self._load_path.shares(step, start, after, broken, rtol * made + small) if made > small else None
+        made = float(self._made(after.inputs()[None], release)[0, -1])
+        local = release.edge.heat == "local"
+        broken = release.energy - float(self._energy(release.start.inputs())[0]) if local else 0.0
+        small = self._rounding(after, release.energy)
+        return self._load_path.shares(step, release.start, after, broken, rtol * made + small) if made > small else None
 
-    def _beyond(self, item: Edge, after: Point | None) -> str:
-        """Why laws end before the gaps come to rest, where they do; touch leaves gaps where they are."""
-        if after is None or not item.equilibrates or item.measure:
-            return ""
-        return self._domain.beyond(after.inputs())
+    def _made(self, rows: Array, release: Release) -> Array:
+        """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).
 
-    @cached_property
-    def _domain(self) -> Domain:
-        return Domain(self.system)
+        Friction is last, with the bonds that it breaks.
+        The energy falls as the state jumps, then as gaps follow, axis by axis: friction holds what would slide until
+        the normal gap is where it goes to.
+        """
+        edge, start = release.edge, release.start
+        makers = list(self.system.sinks)
+        made = np.zeros((len(rows), len(makers) + 1))
 
-    def _kept(self, item: Edge, after: Point | None, parameters: Array, small: float) -> Point | None:
-        """The modes that a transition sets hold while its measure is as good as zero."""
-        if after is None or not item.measure or abs(after.y[self.states.index(item.measure)]) > small:
-            return after
-        slip = self.equilibria.slip
-        kept = replace(after, parameters=parameters)
-        return kept if slip is None else self.equilibria.with_slip(kept, after.parameters[slip])
+        def maker(axis: str) -> int:
+            return makers.index(axis if axis in makers and edge.heat != "snap" else INTERFACE)
+
+        level = self._energy(start.inputs())[0]
+        first = -1 if edge.heat == "local" else maker("n" if edge.heat == "joint" else INTERFACE)
+        made[:, first] += release.energy - level
+        parameters = 1 + 2 * len(start.y)
+        here = np.repeat(start.inputs()[None], len(rows), axis=0)
+        here[:, parameters:] = rows[:, parameters:]
+        slip, lost = self.equilibria.slip, self.equilibria.followers
+        for axis, columns in self._stages:
+            here[:, columns] = rows[:, columns]
+            now = self._energy(here)[:, 0]
+            if axis == "n":  # the interface gives way where it loses bonds, or where it slides
+                gives = np.any(rows[:, lost] != start.inputs()[lost], axis=1)
+            else:
+                gives = rows[:, parameters + slip] != 0 if slip is not None else np.zeros(len(rows), dtype=bool)
+            with np.errstate(invalid="ignore"):  # far away from where it begins a search may see no number
+                fall = level - now
+            made[~gives, maker(axis)] += fall[~gives]
+            made[gives, maker(INTERFACE) if axis == "n" else -1] += fall[gives]
+            level = now
+        return made
+
+    def _heated(self, point: Point, release: Release, shares: Array | None) -> tuple[Point, float, float, float]:
+        """The point with the heat made in its nodes; energy released, heat and entropy passed to reservoirs."""
+        rows = point.inputs()[None]
+        made = self._made(rows, release)
+        made[np.abs(made) <= self._rounding(point, release.energy)] = 0.0
+        if not np.any(made):
+            return point, 0.0, 0.0, 0.0
+        heated = self._heat.warmed(rows, made, shares)
+        if not np.all(np.isfinite(heated)):
+            raise ImpossibleError(NO_HEAT)
+        T, _, _, taken = self._heat.taken(rows, made, shares)
+        passed = np.array([node.prescribed for node in self._heat.nodes.values()])
+        heat, entropy = float(np.sum(taken[0, passed])), float(np.sum((taken / T)[0, passed]))
+        return replace(point, y=heated[0, 1 : 1 + len(point.y)]), float(np.sum(made)), heat, entropy
 
     def _judged(self, jump: Jump, books: Array, noise: float) -> Jump:
         """The jump with the entropy it produces, what the second law says of that, and the work done in it."""
@@ -371,7 +409,7 @@ class Jumper:
         return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -known else VIOLATES, work=work)
 
     def _entropy_rounding(self, jump: Jump, noise: float) -> float:
-        """Entropy that the last digits of the states stand for, and the noise of what the margin measures."""
+        """Entropy that the last digits of the states stand for, and the noise of what the guard measures."""
         point, n = jump.before, len(jump.before.y)
         nudges = DIGITS * np.abs(point.y)
         if jump.edge.measure:
@@ -380,24 +418,6 @@ class Jumper:
         rows[1:, 1 : 1 + n] += np.diag(nudges)
         entropies = self._books(rows)[:, 1]
         return float(np.sum(np.abs(entropies[1:] - entropies[0])))
-
-    def _heated(
-        self, point: Point, item: Edge, start: Point, energy: float, shares: Array | None
-    ) -> tuple[Point, float, float, float] | None:
-        """The point with the heat made in its nodes: point, energy, heat and entropy passed to reservoirs."""
-        rows = point.inputs()[None]
-        made = self._made(rows, item, start, energy)
-        made[np.abs(made) <= self._rounding(point, energy)] = 0.0
-        if not np.any(made):
-            return point, 0.0, 0.0, 0.0
-        heated = self._heat.warmed(rows, made, shares)
-        if not np.all(np.isfinite(heated)):
-            return None
-        T, _, _, taken = self._heat.taken(rows, made, shares)
-        passed = np.array([node.prescribed for node in self._heat.nodes.values()])
-        heat, entropy = float(np.sum(taken[0, passed])), float(np.sum((taken / T)[0, passed]))
-        after = Point(point.t, heated[0, 1 : 1 + len(point.y)], point.ydot, point.parameters)
-        return after, float(np.sum(made)), heat, entropy
 
     def _rounding(self, point: Point, energy: float) -> float:
         """Energy that the last digits of the states and of the energies themselves stand for [J/m^2]."""

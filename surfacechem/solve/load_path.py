@@ -181,7 +181,7 @@ class LoadPath:
 
         step.reached = _first(margin, step.reached)
 
-    def slides(self, start: Point, after: Point) -> bool:
+    def slides(self, after: Point) -> bool:
         """Whether a jump slides, and the shares of its heat change with the loads."""
         slip = self.equilibria.slip
         return slip is not None and self.varies and bool(after.parameters[slip])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function
+from surfacechem.compile.program import Function, Program
 from surfacechem.model.automaton import Edge
 from surfacechem.model.system import Margin as Watched
 from surfacechem.model.system import System
@@ -36,17 +36,11 @@ def awaited(item: Edge) -> Margin:
     return Margin.bear() if item.strict else Margin.stop()
 
 
-def to_pass(problem: Problem) -> NDArray[np.bool_]:
-    """Which margins it takes more to than to touch zero."""
-    return np.array([kind.strict for kind in problem.margins], dtype=bool)
-
-
-def sizes(problem: Problem, system: System, point: Point, seen: Array) -> Array:
-    """Largest sizes of the margins seen; of one to pass also what cancels in it where it is zero."""
-    margins = problem.program.margins
-    if margins is None or not np.any(passed := to_pass(problem)):
+def sizes(program: Program, strict: NDArray[np.bool_], system: System, point: Point, seen: Array) -> Array:
+    """Largest sizes of the guards seen; of a strict one also what cancels in it where it is zero."""
+    if program.margins is None or not np.any(strict):
         return seen
-    return np.where(passed, np.maximum(seen, _terms(margins, system, point)), seen)
+    return np.where(strict, np.maximum(seen, _terms(program.margins, system, point)), seen)
 
 
 def _terms(margins: Function, system: System, point: Point) -> Array:

@@ -365,9 +365,9 @@ class Model:
             return solve(method, problem, self.system.sliding), (), None
         hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
         result = hybrid.run()
-        word = "failed" if hybrid.status is Status.FAILED else "stopped"
-        ended = (word, f"{hybrid.reason} at t = {result.t:.9g} s") if hybrid.reason else None
-        return result, tuple(hybrid.jumps), ended
+        word = "failed" if hybrid.instant.status is Status.FAILED else "stopped"
+        ended = (word, f"{hybrid.instant.reason} at t = {result.t:.9g} s") if hybrid.instant.reason else None
+        return result, tuple(hybrid.instant.jumps), ended
 
     def _visited(self, result: Result, temperature: str) -> Array:
         """A temperature at all steps and at the end."""

@@ -1,0 +1,223 @@
+"""What happens at one moment: which edges are due, in which order, until none is.
+
+Nothing here integrates and no clock runs: a hybrid run and a network of reactors own an instant each, and tell it where
+the flow between has led. What is due is carried out edge by edge; the ledger gains what each of them books.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.model.automaton import RESTS
+from surfacechem.model.system import System
+from surfacechem.solve.bounces import Rebounds
+from surfacechem.solve.contract import Problem, Status
+from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
+from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
+from surfacechem.solve.load_path import LoadStep
+from surfacechem.solve.radau.solver import consistent
+from surfacechem.solve.roundoff import sizes
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NOISE = 1e-13
+"""Guards below this part of the largest seen count as zero."""
+
+REACHED = 1e-14
+"""Part of the time within which two moments are one."""
+
+BRIEF = 1e-6
+"""Part of a run that counts as brief."""
+
+AT_ONCE = 12
+"""Edges at one moment from which on they are chatter."""
+
+SHARPENED = 1e-9
+"""Part of a run after which the largest guards seen may be forgotten again: a choice, far above the rounding of time
+and far below what is of interest. What follows itself without end within it is chatter even where it would calm down.
+"""
+
+NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
+
+
+class Instant:
+    """The present moment of a run: what has jumped so far, and how large the guards have been."""
+
+    def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
+        self.system, self.jumper, self.program = system, jumper, problem.program
+        self.first = first
+        """Index of the first edge among the guards; limits come before."""
+        self.rtol = problem.rtol
+        self.start, self.end = float(problem.segments[0]), float(problem.segments[-1])
+        """Times [s] between which the run goes; what is brief is so against them."""
+        self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
+        self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
+        self.largest = np.zeros(len(problem.margins))
+        self.booked = np.zeros(problem.program.n_ledger)
+        """Ledger now."""
+        self.rebounds = Rebounds(system, first)
+        self.jumps: list[Jump] = []
+        self.limits: list[int] = []
+        """Limits that were reached together with the last edge."""
+        self.step: LoadStep | None = None
+        """The last loads that have jumped."""
+        self.flowed = (np.nan, 0.0, np.nan)
+        """Start of the last flow, its length, and its end [s]; the length is sharper than the difference of the two."""
+        self._resolved = 0
+        """Number of edges before the last chatter that was resolved."""
+        self._sharpened = -np.inf
+        """Time [s] at which the largest guards seen were last forgotten."""
+        self.status = Status.FINISHED
+        self.reason = ""
+        """Why the run ends here, in words, where it does."""
+
+    # -- what is seen of the guards -------------------------------------------------------------------------------
+
+    def in_play(self, point: Point) -> Mask:
+        """Which guards are in play in the modes of a point."""
+        return np.array(self.system.in_play(point.parameters), dtype=bool)
+
+    def see(self, guards: Array, playing: Mask) -> None:
+        """Keep the largest guards seen while in play."""
+        self.largest = np.maximum(self.largest, np.where(playing, np.abs(guards), 0.0))
+        for alike in self._alike:
+            self.largest[alike] = self.largest[alike].max()
+
+    @cached_property
+    def _alike(self) -> list[list[int]]:
+        """Guards that measure the same in different modes."""
+        measures = [edge.measure for edge in self.system.edges]
+        return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
+
+    def sizes(self, point: Point) -> Array:
+        """Sizes to which the rounding of each guard is in proportion."""
+        return sizes(self.program, self.strict, self.system, point, self.largest)
+
+    def consistent(self, point: Point) -> Point:
+        """The point with the rates and algebraic variables that belong to it."""
+        found = consistent(self.program, point.t, point.y, np.zeros_like(point.y), point.parameters)
+        return Point(point.t, found.y, found.ydot, point.parameters)
+
+    # -- what is due ----------------------------------------------------------------------------------------------
+
+    def begin(self, point: Point, before: Point | None) -> Point | None:
+        """The start of a load segment, where loads that jump there have moved what is in equilibrium with them."""
+        polished = self.jumper.equilibria.polished
+        steps = [index for index, edge in enumerate(self.system.edges) if point.t in edge.times]
+        if not steps or before is None:
+            return polished(point)
+        before = polished(before)
+        point, self.step = replace(point, y=before.y), LoadStep(before)
+        return self.apply(steps[0], point, before) if self.jumper.is_loaded(before, point) else point
+
+    def resolve(self, point: Point) -> Point | None:
+        """The point after all edges that are due at its own time; None where the run ends here."""
+        guards = self.program.margins
+        if guards is None:
+            return point
+        while not self._chatters(point.t) or self._calmed(point):
+            seen = self.consistent(point) if self.jumper.guards_read_rates else point
+            now, playing = guards(seen.inputs()), self.in_play(point)
+            self.see(now, playing)
+            due = self._due(now[self.first :], playing[self.first :], point)
+            if self.jumps and (closed := self._closed(now, playing, due is not None)):
+                margin = self.system.moving_margins()[closed[0]]
+                self.status, self.reason = Status.EVENT, self.system.reason(margin, self.jumps[-1].after.inputs())
+                return None
+            if due is None:
+                self.limits = []
+                return point
+            jumped = self.apply(due, point)
+            if jumped is None:
+                return None
+            point = jumped
+        self._end_of_chatter(self.jumps[-1])
+        return None
+
+    def _due(self, now: Array, playing: Mask, point: Point) -> int | None:
+        """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
+        small = NOISE * self.sizes(point)[self.first :]
+        drift = np.maximum(DRIFT * self.rtol * self.largest[self.first :], small)
+        closed = playing & (now < -drift)
+        near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
+        if near.any():
+            near &= self.jumper.guard_rates(self.consistent(point)) < 0
+            closed |= np.array([one and not self._leads_back(j, point) for j, one in enumerate(near)])
+        return int(closed.argmax()) if closed.any() else None
+
+    def _leads_back(self, index: int, point: Point) -> bool:
+        """Whether an edge leads to modes that have been left at this very moment: rounding undoes nothing."""
+        left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
+        return bool(left) and any(np.array_equal(self.jumper.modes_after(index, point), modes) for modes in left)
+
+    @cached_property
+    def _of_modes(self) -> list[bool]:
+        """Which limits read states that have no past: they are found anew as modes change."""
+        found = {state.symbol for state in self.system.states if state.algebraic}
+        return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
+
+    def _closed(self, now: Array, playing: Mask, due: bool) -> list[int]:
+        """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
+        # Beyond the end of a law, be it by rounding, what it says has no meaning.
+        margins = self.system.moving_margins()[: self.first]
+        least = [0.0 if m.domain else -NOISE * size for m, size in zip(margins, self.largest, strict=False)]
+        closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
+        closed += [i for i in self.limits if playing[i] and now[i] <= NOISE * self.largest[i]]
+        return [i for i in closed if not (due and self._of_modes[i])]
+
+    def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
+        """Carry out an edge and book it; None where the run ends with it."""
+        largest, drift = float(self.largest[self.first + index]), DRIFT * self.rtol
+        balanced = BALANCED if self.system.edges[index].times else drift
+        slack = Slack(NOISE * largest, drift * largest, balanced, self.rtol)
+        step = self.step if self.step is not None and self.step.before.t == point.t else None
+        before = self.jumps[-1].t if self.jumps else self.start
+        begun, length, reached = self.flowed
+        since = length + (point.t - reached) if begun == before else point.t - before
+        jump = self.jumper.make(index, point, since, slack, last, step)
+        self.jumps.append(jump)
+        if jump.stops:
+            word = f"is impossible: {jump.obstacle}" if jump.obstacle else jump.verdict
+            self.status, self.reason = Status.EVENT, f"{jump.edge.reason}, which {word}"
+            return None
+        self.rebounds.see(jump)
+        changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
+        self.booked = self.booked + np.array(changes)
+        return jump.after
+
+    # -- edges that follow each other without end -----------------------------------------------------------------
+
+    def _chatters(self, t: float) -> bool:
+        """Whether more edges have followed each other without time going on than any cause needs."""
+        recent = len(self.jumps) - self._resolved
+        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - REACHED * max(t, BRIEF * self.end)
+
+    def _calmed(self, point: Point) -> bool:
+        """Whether what follows itself without end comes to an end, though nothing has stopped it so far.
+
+        It may only seem to do so where what moves now is rounding of what has moved before: that is forgotten first.
+        Rebounds that follow each other faster than time can tell have come to rest.
+        """
+        if point.t > self._sharpened + SHARPENED * self.end:
+            self._sharpened, self._resolved, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
+            return True
+        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
+        if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == point.t:
+            return False
+        point.parameters[rests], self._resolved = point.t, len(self.jumps)
+        return True
+
+    def _end_of_chatter(self, last: Jump) -> None:
+        """A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run."""
+        if last.edge.fold is None or not np.array_equal(last.before.y, last.after.y):
+            endless = f"transitions follow each other without end (chatter): {last.edge.reason}"
+            self.status, self.reason = Status.FAILED, endless
+            return
+        while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
+            self.jumps.pop()
+        self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"
