@@ -1,27 +1,25 @@
-"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed.
-
-Each stage is a module, in the order of STAGES.
-"""
+"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
 from surfacechem.model.components.chemistry import reactions
 from surfacechem.model.components.conduction import conductors, profiles, slabs
-from surfacechem.model.components.energy import equations, surface_work
 from surfacechem.model.components.force import force, rupture
 from surfacechem.model.components.friction import friction
 from surfacechem.model.components.gap import normal_gap, normal_motion
-from surfacechem.model.components.heat import heat_paths, mean_influx
+from surfacechem.model.components.heat import heat_paths
 from surfacechem.model.components.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
 from surfacechem.model.components.logarithms import logarithmic_state
 from surfacechem.model.components.medium import medium
 from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
-from surfacechem.model.components.temperatures import temperatures
+from surfacechem.model.components.thermal import body_energies, equations, surface_rates, surface_work, temperatures
 from surfacechem.model.constraints.bound import released
 from surfacechem.model.constraints.folds import folds
 from surfacechem.model.constraints.impact import impacts, missed
@@ -38,51 +36,55 @@ from surfacechem.scene import Scene
 
 __all__ = ["LOADABLE", "TRACTIONS", "assemble"]
 
-STAGES = (
-    temperatures,
-    slabs,
-    prescribed_variables,
-    programme,
-    bonding_variables,
-    normal_gap,
-    tangential_gap,
-    bonded_mode,
-    softening_mode,
-    medium,
-    free_energy,
-    force,
-    limits,
-    reactions,
-    rupture,
-    friction,
-    normal_motion,
-    tangential_motion,
-    impacts,
-    relaxing,
-    heat_paths,
-    mean_influx,
-    missed,
-    surface_work,
-    flow,
-    equations,
-    folds,
-    load_steps,
-    apart_from_envelope,
-    released,
-    stage_ends,
-    totals,
-    touch,
-    logarithmic_state,
-    profiles,
-)
-
 
 def assemble(scene: Scene) -> System:
     """The system of a scene; InputError where a variable that is read has no role, or two."""
     build = Build(scene)
-    for stage in STAGES:
-        for power in stage(build) or ():
-            state(build, power)
+    stated = partial(state, build)
+    # Variables: what evolves, what is prescribed, and the modes that laws read.
+    build.thermal = temperatures(build)
+    build.thermal = body_energies(build)
+    build.thermal = stated(slabs(build))
+    prescribed_variables(build)
+    programme(build)
+    build.bonding = bonding_variables(build)
+    normal_gap(build)
+    tangential_gap(build)
+    bonded_mode(build)
+    softening_mode(build)
+    fit = medium(build)
+    # The free energy, and the tractions and forces that are its derivatives.
+    build.energy = free_energy(build)
+    if build.interface.temperature is not None:
+        build.thermal = build.thermal.with_energy(INTERFACE, build.psi)
+    force(build)
+    # Laws: what they pass on, and the balances of bonds and of tractions.
+    limits(build)
+    stated(reactions(build))
+    rupture(build)
+    stated(friction(build))
+    stated(normal_motion(build))
+    stated(tangential_motion(build))
+    impacts(build)
+    relaxing(build)
+    build.conductances = stated(heat_paths(build))
+    missed(build)
+    # Balances of energy, from all that passes energy on.
+    build.rates = surface_rates(build)
+    stated(surface_work(build))
+    build.inflow = flow(build)
+    stated(equations(build))
+    # What jumps and what it takes with it.
+    folds(build)
+    load_steps(build)
+    apart_from_envelope(build)
+    released(build)
+    stage_ends(build)
+    # Outputs.
+    totals(build)
+    touch(build)
+    logarithmic_state(build)
+    layers = profiles(build)
     build.varying_margins()
     _refuse_idle_initial_values(build)
     taking = sinks(build)
@@ -91,7 +93,7 @@ def assemble(scene: Scene) -> System:
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
     assert not shared, f"parameters and quantities share the names {shared}"
-    unread = [name for name in scene.loading if name not in build.nodes and not build.variables.was_read(name)]
+    unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -107,11 +109,11 @@ def assemble(scene: Scene) -> System:
         pairs=tuple(build.pairs),
         paces=tuple(build.paces),
         cautions=tuple(build.cautions),
-        profiles=tuple(build.profiles),
+        profiles=layers,
         conductors=tuple(conductors(build)),
         regime=regime(build),
-        breakpoints=tuple(sorted(build.breakpoints)),
-        cycles=tuple(build.cycles),
+        breakpoints=tuple(sorted({t for load in build.loads.values() for t in load.breakpoints()})),
+        cycles=tuple(_cycles(build)),
         modes=tuple(build.modes),
         registers=tuple(build.registers),
         edges=tuple(build.edges),
@@ -120,7 +122,7 @@ def assemble(scene: Scene) -> System:
         follows={str(x): value for x, value in build.motion.follows.items()},
         given=dict(build.motion.given),
         pulls=dict(build.motion.pulls),
-        fit=build.fit() if build.fit else None,
+        fit=fit(),
         warnings=(
             *build.interface.remarks,
             *build.warnings,
@@ -129,6 +131,13 @@ def assemble(scene: Scene) -> System:
         outside=_outside(build),
         origin=partial(assemble, scene),
     )
+
+
+def _cycles(build: Build) -> Iterator[str]:
+    """Paths of the frequencies of histories that repeat themselves."""
+    for name, load in build.loads.items():
+        if load.cycle:
+            yield f"{load.path if load.place else f'loading.{name}'}.{load.cycle}"
 
 
 def _is_there(build: Build, role: Role) -> bool:
@@ -170,5 +179,5 @@ def _refuse_idle_initial_values(build: Build) -> None:
         if name in ("phi", "ln_phi"):
             message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
             raise InputError(message, path=f"initial.{name}")
-        known = {*states, *(slab.profile for slab in build.slabs.values())}
+        known = {*states, *(slab.profile for slab in build.thermal.slabs.values())}
         raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, known)}", path=f"initial.{name}")

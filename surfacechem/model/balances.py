@@ -59,17 +59,15 @@ class Power:
         return symengine.Symbol(f"D_{self.label}") if self.kind == DISSIPATION else self.rate
 
 
-@dataclass
+@dataclass(frozen=True)
 class Node:
-    """A temperature node: free energies of its members and what flows in, per reference area [W/m^2]."""
+    """A temperature node with the free energies of its members."""
 
     name: str
     T: Expression
     T_dot: Expression
-    energies: dict[str, Expression] = field(default_factory=dict)
+    energies: Mapping[str, Expression] = field(default_factory=dict)
     """Free energies of the members, by member name: a body's name or 'interface'."""
-    inflow: list[Expression] = field(default_factory=list)
-    """Heat and mechanical power that flow in; a list, so that a flux between two nodes cancels from their sum."""
     prescribed: bool = False
 
     @property
@@ -153,10 +151,15 @@ def _horner(derivatives: Sequence[Expression], z: Expression) -> Expression:
     return result
 
 
-def node_row(node: Node, rates: Mapping[Any, Expression], about: Mapping[Any, Expression]) -> Expression:
-    """Energy balance of one node as a residual: dU/dt minus what flows in."""
+def node_row(
+    node: Node, inflow: Sequence[Expression], rates: Mapping[Any, Expression], about: Mapping[Any, Expression]
+) -> Expression:
+    """Energy balance of one node as a residual: dU/dt minus what flows in, flow by flow.
+
+    So a flux between two nodes cancels from their sum.
+    """
     rate = energy_rate(node.free_energy, node.T, node.T_dot, rates, about)
-    return symengine.Add(rate, *(-term for flow in node.inflow for term in _terms(flow)))
+    return symengine.Add(rate, *(-term for flow in inflow for term in _terms(flow)))
 
 
 class Rows(dict[str, Expression]):

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import symengine
 
-from surfacechem.contracts import grids
 from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
-from surfacechem.model.automaton import Mode, Register
-from surfacechem.model.balances import Node
-from surfacechem.model.draft import Draft
-from surfacechem.model.system import Margin, Named, Range
-from surfacechem.model.variables import unit_of
+from surfacechem.model import balances
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register
+from surfacechem.model.balances import Node, Power, Rows
+from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, Thermal
+from surfacechem.model.system import Account, Capped, Caution, Margin, Named, Pace, Pair, Range, State
+from surfacechem.model.variables import Parameters, Variables, unit_of
 from surfacechem.quantities import Quantity
+from surfacechem.scene import Interface, Scene
 
 MANY = range(2, 1000)
 
@@ -33,8 +34,116 @@ DIGITS = 1e-12
 """Part of its terms by which rounding may carry a sum below zero."""
 
 
-class Build(Draft):
-    """What has been assembled so far, and how stages add to it."""
+NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
+"""Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
+
+
+@dataclass
+class Motion:
+    """What the stages that let the gap and the interface move leave for each other."""
+
+    mechanical: list[Expression] = field(default_factory=list)
+    """Elastic and kinetic energies of the bodies [J/m^2]."""
+    given: dict[str, Expression] = field(default_factory=dict)
+    """What works in a jump [J/m^2], potentials of the far-field tractions above all, by the account of that work."""
+    pulls: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
+    """Stiffness, displacement and traction of the far field, and the gap, by the account of the work."""
+    far_fields: dict[str, Any] = field(default_factory=dict)
+    """Mountings with their symbols, by direction."""
+    drives: dict[str, Expression] = field(default_factory=dict)
+    """Rates of the variables that a programme moves."""
+    slips: tuple[Any, ...] = ()
+    """What determines the tangential motion in each direction in which it moves by a balance."""
+    slides_by: dict[str, Any] = field(default_factory=dict)
+    """The variables that the balances of tangential tractions determine, where sliding has no inertia, by velocity."""
+    creeping: Any = None
+    """The friction law whose traction is the variable of sliding, where that is not the velocity."""
+    sliding_tractions: dict[str, Expression] = field(default_factory=dict)
+    """Traction that resists sliding along each direction, by axis."""
+    stick_limits: dict[str, Expression] = field(default_factory=dict)
+    """Tangential traction that sticking can bear along each direction, by axis."""
+    jolted: dict[Any, Expression] = field(default_factory=dict)
+    """New values of modes and states where loads jump, before what is in equilibrium with them follows."""
+    follows: dict[Any, Expression] = field(default_factory=dict)
+    """New values of states that follow the normal gap where it jumps."""
+    gap_rates: dict[str, Expression] = field(default_factory=dict)
+    """Rates of the gaps that move by a balance."""
+    works: dict[Friction, str] = field(default_factory=dict)
+    """Accounts of the work against friction where the velocity of sliding is prescribed."""
+    heals: dict[Expression, Expression] = field(default_factory=dict)
+    """New values of modes that a rigid contact has as it closes again."""
+
+
+@dataclass(eq=False)
+class Build:
+    """What has been assembled so far, and how its parts add to it.
+
+    What the phases hand on is set once, by :func:`assemble`: ``thermal`` to ``conductances``.
+    """
+
+    scene: Scene
+    parameters: Parameters = field(init=False)
+    variables: Variables = field(init=False)
+    t: Any = field(default_factory=lambda: symengine.Symbol("t"))
+    thermal: Thermal = NO_NODES
+    bonding: Mapping[str, Bond] = field(default_factory=dict)
+    energy: Energy = NO_ENERGY
+    rates: Mapping[Any, Expression] = field(default_factory=dict)
+    """Time derivatives of what the interface's free energy depends on beside temperature."""
+    inflow: Mapping[str, Sequence[Expression]] = field(default_factory=dict)
+    """Heat and mechanical power that flow into each node [W/m^2]."""
+    conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
+    """Conductances in parallel between two ends [W/(m^2 K)]."""
+    states: list[State] = field(default_factory=list)
+    named: list[Named] = field(default_factory=list)
+    rows: Rows = field(default_factory=Rows)
+    ledger: list[Account] = field(default_factory=list)
+    margins: list[Margin] = field(default_factory=list)
+    bound_frictions: dict[Friction, Friction] = field(default_factory=dict)
+    powers: list[Power] = field(default_factory=list)
+    """All that passes energy on, from which the ledger and the balances of energy follow."""
+    loads: dict[str, Load] = field(default_factory=dict)
+    """Histories that are in use, by variable."""
+    ranges: list[Range] = field(default_factory=list)
+    capped: list[Capped] = field(default_factory=list)
+    modes: list[Mode] = field(default_factory=list)
+    registers: list[Register] = field(default_factory=list)
+    edges: list[Edge] = field(default_factory=list)
+    equilibria: list[Equilibrium] = field(default_factory=list)
+    motion: Motion = field(default_factory=Motion)
+    pairs: list[Pair] = field(default_factory=list)
+    paces: list[Pace] = field(default_factory=list)
+    cautions: list[Caution] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    used_names: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Names that are taken."""
+        custom = [body.temperature for body in self.scene.bodies if isinstance(body.temperature, str)]
+        capacities = [f"C_{node}" for node in (*custom, self.interface.temperature) if isinstance(node, str)]
+        self.parameters = Parameters(
+            [*NAMED, *custom, *capacities, *(variable.name for variable in self.interface.variables)]
+        )
+        self.variables = Variables(self.parameters)
+
+    @property
+    def interface(self) -> Interface:
+        """The interface of the scene."""
+        return self.scene.interface
+
+    @property
+    def psi(self) -> Expression:
+        """Free energy of the interface [J/m^2]."""
+        return self.energy.psi
+
+    @property
+    def about(self) -> dict[Any, Expression]:
+        """Initial values of the bonding variables, about which capacities are written."""
+        return {bond.symbol: bond.initial for bond in self.bonding.values()}
+
+    def energy_row(self, node: Node) -> Expression:
+        """Energy balance of a node as a residual."""
+        return balances.node_row(node, self.inflow.get(node.name, ()), self.rates, self.about)
 
     def name(self, quantity: Quantity, expression: Expression, *, output: bool = True) -> Expression:
         """Add a named quantity and return its symbol."""
@@ -64,12 +173,8 @@ class Build(Draft):
 
     def history(self, name: str, load: Load) -> Expression:
         """A prescribed history as an expression of time; its breakpoints will end a step."""
-        self.breakpoints.update(load.breakpoints())
         self.loads[name] = load
-        bound = self.variables.bind(load, f"loading.{name}", unit=unit_of(name))
-        if load.cycle:
-            self.cycles.append(f"{bound.path}.{load.cycle}")
-        return bound.value(self.t)
+        return self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t)
 
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
         """Make a prescribed variable a named quantity."""
@@ -97,7 +202,7 @@ class Build(Draft):
 
     def refuse_foreign(self, F: Expression, own: set[Any], law: Law) -> None:
         """A free energy depends on what its balance accounts for, and on constants."""
-        moving = {str(state.symbol) for state in self.states} | {node.name for node in self.nodes.values()}
+        moving = {str(state.symbol) for state in self.states} | {node.name for node in self.thermal.nodes.values()}
         moving |= {item.name for item in self.named if item.name in self.loads and self.slope_of(item.name) != 0}
         moving -= {name for name, load in self.loads.items() if self.slope_of(name) == 0 and not load.jumps()}
         foreign = {str(symbol) for symbol in symengine.sympify(F).free_symbols - own} & moving
@@ -150,7 +255,7 @@ class Build(Draft):
         """Time derivative of an expression of the states and of prescribed variables."""
         expanded = self.expanded(expression)
         rates = {state.symbol: state.dot for state in self.states}
-        rates |= {node.T: node.T_dot for node in self.nodes.values() if not node.prescribed}
+        rates |= {node.T: node.T_dot for node in self.thermal.free}
         return sum((derivative(expanded, x) * x_dot for x, x_dot in rates.items()), derivative(expanded, self.t))
 
     @property
@@ -239,13 +344,6 @@ class Build(Draft):
                 found.append(Margin(f"{gap} turns", rate, reason))
         known = {margin.expression for margin in self.margins}
         self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
-
-    def volume(self, body: str) -> list[tuple[Node, Expression]]:
-        """The nodes of a body with their parts of its volume; the one at the contact is the first."""
-        if body not in self.slabs:
-            return [(self.node_of[body], symengine.Integer(1))]
-        slab = self.slabs[body]
-        return list(zip(slab.nodes, grids.shares(slab.points), strict=True))
 
     def varying_margins(self) -> None:
         """Parameters stay in their range as they vary; what may be zero may be so by rounding."""

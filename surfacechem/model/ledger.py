@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import symengine
 
@@ -17,13 +18,10 @@ from surfacechem.model.automaton import Sink
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.heat import takers
+from surfacechem.model.components.thermal import GAPS, GEOMETRY
 from surfacechem.model.system import Account
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
-
-GAPS = ("g_n", "g_t", "u_t", "u_t2")
-GEOMETRY = (*GAPS, "J_c")
-"""Variables of the free energy that move the surfaces rather than their bonds."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ def passages(build: Build) -> Iterator[Passage]:
     """Where the powers of a scene arrive."""
     for power in build.powers:
         targets = power.target if isinstance(power.target, Mapping) else {power.target: symengine.Integer(1)}
-        if INTERFACE in targets and INTERFACE not in build.node_of and power.kind != WORK:
+        if INTERFACE in targets and INTERFACE not in build.thermal.node_of and power.kind != WORK:
             channel = {MECHANICS: "friction", INTERFACE: "reaction", OUTSIDE: "external"}[power.source]
             heats = {end: share * power.amount for end, share in build.shares().items()}
             yield from (Passage(INTERFACE, end, heat, {channel: heat}) for end, heat in heats.items() if heat != 0)
@@ -49,28 +47,36 @@ def passages(build: Build) -> Iterator[Passage]:
                 yield Passage(power.source, place, share * power.amount, power.channels)
 
 
-def state(build: Build, power: Power) -> None:
-    """Keep a power, and state its accounts; what dissipates has its own when all of that is known."""
-    build.powers.append(power)
-    if power.kind != DISSIPATION:
-        _account(build, power)
+def state(build: Build, phase: Iterator[Power]) -> Any:
+    """Keep the powers that a phase yields, with their accounts, and return what it returns.
+
+    What dissipates has its accounts when all of that is known.
+    """
+    while True:
+        try:
+            power = next(phase)
+        except StopIteration as end:
+            return end.value
+        build.powers.append(power)
+        if power.kind != DISSIPATION:
+            _account(build, power)
 
 
-def flow(build: Build) -> None:
-    """Name what is dissipated, and let all powers flow into the nodes."""
+def flow(build: Build) -> dict[str, list[Expression]]:
+    """What flows into each node, by its name; what is dissipated gets its accounts first."""
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
-    inside = {node.name: node for slab in build.slabs.values() for node in slab.nodes[1:]}
-    nodes = {**inside, **build.nodes, **build.node_of}
+    inflow: dict[str, list[Expression]] = {}
     for passage in passages(build):
-        source, target = nodes.get(passage.source), nodes.get(passage.target)
+        source, target = build.thermal.places.get(passage.source), build.thermal.places.get(passage.target)
         if source is target:  # what bonds release stays where they are
             continue
         if target is not None:
-            target.inflow.append(passage.rate)
+            inflow.setdefault(target.name, []).append(passage.rate)
         if source is not None:
-            source.inflow.append(-passage.rate)
+            inflow.setdefault(source.name, []).append(-passage.rate)
+    return inflow
 
 
 def _account(build: Build, power: Power) -> None:
@@ -139,8 +145,8 @@ def _sum(terms: list[Expression]) -> Expression:
 def _energies(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
     """Nodes and free energies of every member that stores energy; no node where there is no medium."""
     found: dict[str, list[tuple[Node | None, Expression]]] = {}
-    inside = [node for slab in build.slabs.values() for node in slab.inner]
-    for node in (*build.nodes.values(), *inside):
+    inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
+    for node in (*build.thermal.nodes.values(), *inside):
         for member, F in node.energies.items():
             if F != 0:
                 found.setdefault(member, []).append((node, F))
@@ -176,8 +182,8 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> Expression 
 
     Two bodies that share a prescribed temperature leave open which of them the heat goes into.
     """
-    node = build.node_of[body.name]
-    sharing = [name for name, other in build.node_of.items() if other is node and name != body.name]
+    node = build.thermal.node_of[body.name]
+    sharing = [name for name, other in build.thermal.node_of.items() if other is node and name != body.name]
     channels, others = _received(build, body, flows)
     if len(channels) > 1 and not sharing:
         channels = {name: _part(build, k, body, name, heat) for name, heat in channels.items()}
@@ -193,7 +199,7 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> Expression 
         flux = recovered if sharing else flux
         if not node.prescribed:
             _book_heat(build, k, body, recovered)
-            if sharing and not build.slabs:
+            if sharing and not build.thermal.slabs:
                 _by_source(build, k, body, flux)
             return flux
     _book_heat(build, k, body, flux)
@@ -234,7 +240,7 @@ def _by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
 
     The rest is exchanged with what has another temperature, supplied from outside, or thermo-elastic.
     """
-    node = build.node_of[body.name]
+    node = build.thermal.node_of[body.name]
     known = any(item.name == f"C_{node.name}" for item in build.named)
     whole = symengine.Symbol(f"C_{node.name}") if known else balances.conditioned(node.capacity(), build.about)
     share = -node.T * balances.second(node.energies[body.name], node.T) / whole
@@ -258,7 +264,7 @@ def _by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
 
 def _heat_of_reaction(build: Build) -> Expression:
     """Heat of all reactions: minus the change of the internal energy with the bonds."""
-    node = build.node_of.get(INTERFACE)
+    node = build.thermal.node_of.get(INTERFACE)
     U = balances.internal_energy(build.psi, node.T) if node else build.psi
     bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
     return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
@@ -275,11 +281,11 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     if not build.edges:
         return {}
     _jump_accounts(build)
-    centre = build.node_of.get("interface")
+    centre = build.thermal.node_of.get("interface")
     if centre is None or not centre.takes_heat:
         _refuse_local(build)
-    supports = {axis: _merged(far.takers(build)) for axis, far in build.motion.far_fields.items()}
-    return {INTERFACE: _merged(takers(build)), **supports}
+    supports = {axis: _merged(build, far.takers(build)) for axis, far in build.motion.far_fields.items()}
+    return {INTERFACE: _merged(build, takers(build)), **supports}
 
 
 def _refuse_local(build: Build) -> None:
@@ -300,7 +306,7 @@ def _jump_accounts(build: Build) -> None:
         ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
         ("entropy_events", "J/(m^2 K)", "entropy produced by jumps", "entropy production"),
     ]
-    if any(node.prescribed for node in build.nodes.values()):
+    if any(node.prescribed for node in build.thermal.nodes.values()):
         rows += [
             ("H_events", "J/m^2", "heat of jumps supplied to prescribed temperatures", "energy supply"),
             ("H_events_entropy", "J/(m^2 K)", "entropy of that heat", "entropy supply"),
@@ -309,21 +315,16 @@ def _jump_accounts(build: Build) -> None:
         build.ledger.append(Account(Quantity(name, unit, text), nothing, kind, "events"))
 
 
-def _merged(shares: list[tuple[Node, Expression]]) -> tuple[Sink, ...]:
+def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
     """One sink a node; shares of the same node add up."""
     total: dict[str, Expression] = {}
-    nodes = {node.name: node for node, _ in shares}
-    for node, share in shares:
-        total[node.name] = total.get(node.name, 0) + share
+    for place, share in shares.items():
+        name = build.thermal.places[place].name
+        total[name] = total.get(name, 0) + share
+    nodes = ((build.thermal.places[name], share) for name, share in total.items())
     return tuple(
-        Sink(
-            name,
-            nodes[name].T,
-            balances.internal_energy(nodes[name].free_energy, nodes[name].T),
-            share,
-            nodes[name].prescribed,
-        )
-        for name, share in total.items()
+        Sink(node.name, node.T, balances.internal_energy(node.free_energy, node.T), share, node.prescribed)
+        for node, share in nodes
     )
 
 
@@ -335,8 +336,8 @@ def _has_medium(build: Build) -> bool:
 
 def regime(build: Build) -> str:
     """The thermal regime in words."""
-    nodes = [build.node_of[body.name] for body in build.scene.bodies]
-    centre = build.node_of.get("interface")
+    nodes = [build.thermal.node_of[body.name] for body in build.scene.bodies]
+    centre = build.thermal.node_of.get("interface")
     if centre is not None and all(node.prescribed for node in (*nodes, centre)):
         loads = [build.loads[node.name] for node in (*nodes, centre)]
         starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}

@@ -22,8 +22,8 @@ from surfacechem.model.components.pulled import book_work, by_affinity, dead_loa
 from surfacechem.model.constraints.bound import free_to_react
 from surfacechem.model.constraints.closing import TOUCHING
 from surfacechem.model.constraints.softening import softening, within_reach
-from surfacechem.model.draft import Bond
 from surfacechem.model.pairs import departure, opposed, own_departure
+from surfacechem.model.parts import Bond
 from surfacechem.model.system import Account, Capped, Caution
 from surfacechem.quantities import Quantity
 

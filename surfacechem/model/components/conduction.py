@@ -6,8 +6,9 @@ capacity: the body's own node, which heat paths, laws and perfect contact know. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
+from itertools import pairwise
 
 import symengine
 
@@ -19,42 +20,25 @@ from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, Node, Power
 from surfacechem.model.build import BOTH, Build
 from surfacechem.model.conductors import Conductor, Profile
+from surfacechem.model.parts import Slab, Thermal
 from surfacechem.model.system import State
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Body, Conduction
 
 
-@dataclass(frozen=True)
-class Slab:
-    """A body with its temperatures in a row, the contact first; a far side that is held is the last one."""
-
-    number: int
-    body: Body
-    law: Conduction
-    points: tuple[float, ...]
-    nodes: tuple[Node, ...]
-
-    @property
-    def inner(self) -> tuple[Node, ...]:
-        """The nodes of its own that evolve."""
-        return tuple(node for node in self.nodes[1:] if not node.prescribed)
-
-    @property
-    def profile(self) -> str:
-        """Name of its temperatures together."""
-        return f"profile_{self.number}"
-
-
-def slabs(build: Build) -> Iterator[Power]:
-    """Divide the bodies that conduct, and let heat flow along them."""
+def slabs(build: Build) -> Generator[Power, None, Thermal]:
+    """Divide the bodies that conduct, and let heat flow along them; returns the nodes with what is divided."""
+    thermal = build.thermal
     for number, body in enumerate(build.scene.bodies, start=1):
         if body.conduction is None:
             continue
         bound = _bound(build, number, body, body.conduction)
-        build.resistances[body.name] = bound.thickness / bound.conductivity
+        resistance = bound.thickness / bound.conductivity
+        thermal = replace(thermal, resistances={**thermal.resistances, body.name: resistance})
         if body.conduction.cells:
-            slab = build.slabs[body.name] = _divided(build, number, body, body.conduction)
-            yield from _conduct(build, slab, bound)
+            slab, thermal = _divided(build, thermal, number, body, body.conduction)
+            yield from _conduct(build, slab, thermal.node_of[body.name], bound)
+    return thermal
 
 
 def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction:
@@ -78,36 +62,41 @@ def conductors(build: Build) -> Iterator[Conductor]:
         law = body.conduction
         if law is None:
             continue
-        node, ends = build.node_of[body.name], build.conductances
-        F = node.energies[body.name] / build.volume(body.name)[0][1]
+        node, ends = build.thermal.node_of[body.name], build.conductances
+        F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
         paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
-        alone = sum(other is node for other in build.node_of.values()) == 1
+        alone = sum(other is node for other in build.thermal.node_of.values()) == 1
         yield Conductor(
             number,
             body.name,
             not law.cells,
-            build.resistances[body.name],
+            build.thermal.resistances[body.name],
             -node.T * balances.second(F, node.T),
             symengine.Add(*paths) if alone else None,
         )
 
 
-def _divided(build: Build, number: int, body: Body, law: Conduction) -> Slab:
+def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Conduction) -> tuple[Slab, Thermal]:
     """The body's energy shared among its nodes."""
-    surface = build.node_of[body.name]
-    at = law.points
-    nodes = [surface]
-    for i in range(1, law.cells + (0 if law.held else 1)):
-        name = f"T_{number}_x{i}"
-        if name in build.nodes:
-            raise InputError(f"{name} is a temperature inside {body.name}; give the other one another name.", law.place)
-        nodes.append(Node(name, symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")))
-    if law.held:
-        nodes.append(_far_node(build, number, body, law))
+    surface, shares = thermal.node_of[body.name], grids.shares(law.points)
     whole = surface.energies[body.name]
-    for node, share in zip(nodes, grids.shares(at), strict=True):
-        node.energies[body.name] = share * whole.subs({surface.T: node.T})
-    return Slab(number, body, law, at, tuple(nodes))
+    nodes = dict(thermal.nodes)
+    behind = []
+    for i, share in enumerate(shares[1:], start=1):
+        name = f"T_{number}_x{i}"
+        if i == len(shares) - 1 and law.held:
+            node = _far_node(build, number, body, law)
+        elif name in nodes:
+            raise InputError(f"{name} is a temperature inside {body.name}; give the other one another name.", law.place)
+        else:
+            node = Node(name, symengine.Symbol(name), symengine.Symbol(f"d{name}_dt"))
+        behind.append(replace(node, energies={body.name: share * whole.subs({surface.T: node.T})}))
+    nodes[surface.name] = replace(surface, energies={**surface.energies, body.name: shares[0] * whole})
+    slab = Slab(number, body, law, law.points, tuple(behind))
+    if law.far is not None:
+        far = behind[-1] if law.held else _far_node(build, number, body, law)
+        nodes[far.name] = far
+    return slab, replace(thermal, nodes=nodes, slabs={**thermal.slabs, body.name: slab})
 
 
 def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
@@ -116,26 +105,26 @@ def _far_node(build: Build, number: int, body: Body, law: Conduction) -> Node:
     where = "at" if law.held else "beyond"
     assert law.far is not None
     build.prescribe(Quantity(name, "K", f"temperature {where} the far side of {body.name}"), law.far)
-    node = build.nodes[name] = Node(name, symengine.Symbol(name), build.slope_of(name), prescribed=True)
-    return node
+    return Node(name, symengine.Symbol(name), build.slope_of(name), prescribed=True)
 
 
-def _conduct(build: Build, slab: Slab, bound: Conduction) -> Iterator[Power]:
+def _conduct(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iterator[Power]:
     """Fluxes from node to node, and through the far side."""
     name = slab.body.name
-    conductivity = _conductivity(build, slab, bound.conductivity)
-    links = list(zip(slab.nodes, slab.nodes[1:], strict=False))
-    widths = [b - a for a, b in zip(slab.points, slab.points[1:], strict=False)]
+    conductivity = _conductivity(build, slab, surface.name, bound.conductivity)
+    links = list(pairwise((surface, *slab.behind)))
+    widths = [b - a for a, b in pairwise(slab.points)]
     conductances = [
         conductivity((a.T + b.T) / 2) / (bound.thickness * width) for (a, b), width in zip(links, widths, strict=True)
     ]
     if slab.law.h_far is not None:
-        links.append((slab.nodes[-1], _far_node(build, slab.number, slab.body, slab.law)))
+        far = f"T_far_{slab.number}"
+        links.append((slab.behind[-1], Node(far, symengine.Symbol(far), build.slope_of(far), prescribed=True)))
         conductances.append(bound.h_far)
     fluxes = [h * (a.T - b.T) for (a, b), h in zip(links, conductances, strict=True)]
     produced = (flux * (a.T - b.T) / (a.T * b.T) for (a, b), flux in zip(links, fluxes, strict=True))
     places = [name, *(b.name for _, b in links)]
-    flows = [Power(HEAT, a, b, flux) for a, b, flux in zip(places, places[1:], fluxes, strict=False)]
+    flows = [Power(HEAT, a, b, flux) for (a, b), flux in zip(pairwise(places), fluxes, strict=True)]
     label, text = f"conduction_{slab.number}", f"heat conduction in {name}"
     yield replace(flows[0], label=label, text=text, entropy=symengine.Add(*produced))
     yield from flows[1:]
@@ -145,12 +134,12 @@ def _reference(law: Conduction) -> float:
     return law.conductivity.value if isinstance(law.conductivity, Varying) else law.conductivity
 
 
-def _conductivity(build: Build, slab: Slab, reference: Expression) -> Callable[[Expression], Expression]:
+def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression) -> Callable[[Expression], Expression]:
     """Conductivity as a function of the temperature where it is asked for."""
     given = slab.law.conductivity
     if not isinstance(given, Varying):
         return lambda T: reference
-    own = {f"T_{slab.number}", slab.nodes[0].name}
+    own = {f"T_{slab.number}", surface}
     bound = []
     for factor in given.factors:
         others = {argument for argument in reads(factor.factor) if argument not in ("x", "T_0", factor.of)}
@@ -169,10 +158,11 @@ def _conductivity(build: Build, slab: Slab, reference: Expression) -> Callable[[
     return conductivity
 
 
-def profiles(build: Build) -> None:
+def profiles(build: Build) -> tuple[Profile, ...]:
     """The balances and states of the nodes inside the bodies, behind all others."""
-    for slab in build.slabs.values():
-        surface, initial = slab.nodes[0], build.scene.initial.get(slab.profile)
+    found = []
+    for slab in build.thermal.slabs.values():
+        surface, initial = build.thermal.node_of[slab.body.name], build.scene.initial.get(slab.profile)
         start = slab.profile if initial is not None else surface.name
         if initial is None and surface.prescribed:
             text = f"nothing gives the temperature inside {slab.body.name}. Add `{slab.profile}:` under `initial`."
@@ -182,22 +172,22 @@ def profiles(build: Build) -> None:
             message = f"initial {start} = {value:g} K is not an absolute temperature above zero."
             raise InputError(message, path=f"initial.{start}")
         for i, node in enumerate(slab.inner, start=1):
-            build.rows.balance(node.name, balances.node_row(node, {}, {}))
+            build.rows.balance(node.name, build.energy_row(node))
             text = f"temperature of {slab.body.name}, point {i} from the contact"
             quantity = Quantity(node.name, "K", text)
             build.states.append(State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start))
-        build.profiles.append(_profile(slab))
-
-
-def _profile(slab: Slab) -> Profile:
-    last = slab.nodes[-1]
-    return Profile(
-        number=slab.number,
-        body=slab.body.name,
-        points=slab.points,
-        thickness=f"{slab.law.path}.thickness" if slab.law.place else f"bodies.{slab.body.name}.conduction.thickness",
-        surface=slab.nodes[0].name,
-        anchored=not slab.nodes[0].prescribed,
-        states=tuple(node.name for node in slab.inner),
-        far=last.name if last.prescribed else "",
-    )
+        law, last = slab.law, slab.behind[-1]
+        thickness = f"{law.path if law.place else f'bodies.{slab.body.name}.conduction'}.thickness"
+        found.append(
+            Profile(
+                number=slab.number,
+                body=slab.body.name,
+                points=slab.points,
+                thickness=thickness,
+                surface=surface.name,
+                anchored=not surface.prescribed,
+                states=tuple(node.name for node in slab.inner),
+                far=last.name if last.prescribed else "",
+            )
+        )
+    return tuple(found)

@@ -24,7 +24,7 @@ from surfacechem.quantities import VARIABLES, Quantity
 
 def friction(build: Build) -> Iterator[Power]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
-    rubs, total = build.motion.rubs, symengine.Integer(0)
+    rubs, total = build.energy.rubs, symengine.Integer(0)
     for law in build.interface.frictions:
         label = build.label(law)
         bound = build.bound(law)

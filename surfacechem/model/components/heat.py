@@ -10,7 +10,7 @@ though one of the two alone may run uphill: into the hotter body, from an interf
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import symengine
@@ -23,16 +23,21 @@ from surfacechem.model.build import BOTH, NOTHING, Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 
+Conductances = dict[tuple[str, str], list[Expression]]
+"""Conductances in parallel between two ends [W/(m^2 K)]."""
 
-def heat_paths(build: Build) -> Iterator[Power]:
-    """Fluxes between nodes, external heat, and the heat of friction and reaction where there is no medium."""
+
+def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
+    """Fluxes between nodes and external heat; returns the conductances."""
+    found: Conductances = {}
     for law in build.scene.heat:
         if law.between[0] == law.between[1]:
             raise InputError(f"a heat path needs two different ends, not {law.between[0]} twice.", _ends(law))
     for paths in _by_ends(build):
-        yield from _between(build, paths)
+        found[paths[0].ends] = yield from _between(build, paths)
     for law in (law for law in build.scene.heat if _made_across(law)):
-        yield from _through_film(build, law)
+        for ends, h in (yield from _through_film(build, law)).items():
+            found.setdefault(ends, []).append(h)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
             yield _external_heat(build, member, Q)
@@ -40,29 +45,31 @@ def heat_paths(build: Build) -> Iterator[Power]:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
         build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
+    if channels := _mean_channels(build):
+        found[BOTH] = list(channels.values())
+        yield from _into_both(build, channels)
+    return found
 
 
-def takers(build: Build) -> list[tuple[Node, Expression]]:
+def takers(build: Build) -> dict[str, Expression]:
     """Who takes the heat that the interface makes in no time, and which part of it.
 
     The interface itself, the ends of its heat without a medium, or, where it stores none, the ends of its paths: its
     temperature rises until these carry off all of it, in proportion to their conductances.
     """
-    centre = build.node_of.get("interface")
+    centre = build.thermal.node_of.get(INTERFACE)
     if centre is None:
-        return [(build.node_of[end], share) for end, share in build.shares().items()]
+        return build.shares()
     if centre.takes_heat:
-        return [(centre, symengine.Integer(1))]
-    ways = [
-        (build.node_of[end], _area(build, pair) * h)
-        for pair, channels in build.conductances.items()
-        if "interface" in pair
-        for end in ((body.name for body in build.scene.bodies) if pair == BOTH else set(pair) - {"interface"})
-        for h in channels
-    ]
-    whole = symengine.Add(*(h for _, h in ways))
+        return {INTERFACE: symengine.Integer(1)}
+    bodies = tuple(body.name for body in build.scene.bodies)
+    ways: dict[str, Expression] = {}
+    for pair, channels in build.conductances.items():
+        for end in bodies if pair == BOTH else set(pair) - {INTERFACE} if INTERFACE in pair else ():
+            ways[end] = ways.get(end, 0) + symengine.Add(*(_area(build, pair) * h for h in channels))
+    whole = symengine.Add(*ways.values())
     conducts = where(whole > 0, whole, 1)
-    return [(node, where(whole > 0, h / conducts, symengine.Rational(1, len(ways)))) for node, h in ways]
+    return {end: where(whole > 0, h / conducts, symengine.Rational(1, len(ways))) for end, h in ways.items()}
 
 
 def _area(build: Build, ends: Collection[str]) -> Expression:
@@ -119,7 +126,7 @@ def _made_across(law: HeatTransfer) -> bool:
     return law.closure == "medium" and hasattr(law, "resistances")
 
 
-def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
+def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dict[tuple[str, str], Expression]]:
     r"""Heat that a film at the mean temperature T_c gives its walls.
 
     Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
@@ -139,10 +146,10 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
     build.law_margins(law, {})
     scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
     beside = -2 * r / scale * (ends[1].T - ends[0].T)
-    flows, produced = [], symengine.Integer(0)
+    flows, produced, walls = [], symengine.Integer(0), {}
     for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
         h = 6 * (r + 2 * wall) / scale
-        build.conductances["interface", end] = [*build.conductances.get(("interface", end), []), h]
+        walls[INTERFACE, end] = h
         text = f"heat flux from the film into {end}"
         flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
@@ -152,6 +159,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power]:
     first = replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
     yield first
     yield from flows[1:]
+    return walls
 
 
 def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
@@ -169,7 +177,7 @@ def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
             yield _Path(ends, double)
 
 
-def _between(build: Build, paths: list[_Path]) -> Iterator[Power]:
+def _between(build: Build, paths: list[_Path]) -> Generator[Power, None, list[Expression]]:
     """All paths between two ends: a flux of each channel where there are several, and their sum."""
     a, b = paths[0].ends
     from_node, to_node = end_node(build, a), end_node(build, b)
@@ -178,12 +186,12 @@ def _between(build: Build, paths: list[_Path]) -> Iterator[Power]:
     for path in paths:
         for channel, h in path.channels.items():
             channels[channel] = channels.get(channel, symengine.Integer(0)) + h
-    build.conductances[a, b] = list(channels.values())
     difference = from_node.T - to_node.T
     flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
     total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
     produced = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
     yield Power(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
+    return list(channels.values())
 
 
 def named_flux(
@@ -212,26 +220,27 @@ def _ends(law: HeatTransfer | None) -> Place:
 
 def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     """The temperature node of an end of a heat path; InputError where it has none."""
-    if end in build.node_of:
-        return build.node_of[end]
+    if end in build.thermal.node_of:
+        return build.thermal.node_of[end]
     if end == "interface":
         raise InputError("the interface has no temperature. Add `interface.temperature`.", _ends(law))
     if end == "surroundings":
         message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
         raise InputError(message, _ends(law))
-    known = [*build.node_of, "interface", "surroundings"]
+    known = [*build.thermal.node_of, "interface", "surroundings"]
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
 def _external_heat(build: Build, member: str, name: str) -> Power:
     Q = build.variables.get(name, "the energy balance")
     text = f"external heat into {member}"
-    T = build.node_of[member].T if member in build.node_of else build.variables.get("T_c", "the external heat")
+    node = build.thermal.node_of.get(member)
+    T = build.variables.get("T_c", "the external heat") if node is None else node.T
     return Power(HEAT, OUTSIDE, member, Q, f"H_{name[2:]}", text, entropy=Q / T)
 
 
-def mean_influx(build: Build) -> Iterator[Power]:
-    """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)] of the paths with the closure `mean`."""
+def _mean_channels(build: Build) -> dict[str, Expression]:
+    """Conductances of the paths with the closure `mean`, by what carries the heat."""
     channels: dict[str, Expression] = {}
     for law in (law for law in build.scene.heat if law.closure == "mean"):
         check_closure(build, law)
@@ -239,14 +248,13 @@ def mean_influx(build: Build) -> Iterator[Power]:
             raise InputError("`closure: mean` is of two bodies with temperatures of their own.", law.place)
         for channel, h in conductances(build, law).items():
             channels[channel] = channels.get(channel, symengine.Integer(0)) + h
-    if channels:
-        yield from _into_both(build, channels)
+    return channels
 
 
 def _into_both(build: Build, channels: dict[str, Expression]) -> Iterator[Power]:
+    """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)]."""
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
-    build.conductances[BOTH] = list(channels.values())
     difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)
     flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
     total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
@@ -260,7 +268,7 @@ def _into_both(build: Build, channels: dict[str, Expression]) -> Iterator[Power]
 
 def _warn_of_uphill(build: Build, bodies: list[str]) -> None:
     """Say where an interface heats a body that is hotter than itself."""
-    (cold, _), (hot, name) = sorted((build.at_start(build.node_of[body].T), body) for body in bodies)
+    (cold, _), (hot, name) = sorted((build.at_start(build.thermal.node_of[body].T), body) for body in bodies)
     if hot > cold:
         harmonic = 2 * cold * hot / (cold + hot)
         build.warnings.append(

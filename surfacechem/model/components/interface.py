@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +16,7 @@ from surfacechem.model.automaton import Edge
 from surfacechem.model.build import NOTHING, Build
 from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
-from surfacechem.model.draft import Bond
+from surfacechem.model.parts import Bond, Energy
 from surfacechem.model.sliding.formulations import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
@@ -55,10 +56,10 @@ TRACTIONS = (
 def prescribed_variables(build: Build) -> None:
     """Histories under ``loading``; each comes to life when something reads it."""
     for name, load in build.scene.loading.items():
-        if name in build.nodes:
+        if name in build.thermal.nodes:
             continue
         if name not in LOADABLE:
-            known = [*LOADABLE, *build.nodes]
+            known = [*LOADABLE, *build.thermal.nodes]
             raise InputError(f"nothing is called '{name}'.{suggestion(name, known)}", path="loading")
         build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
 
@@ -72,9 +73,9 @@ def _prescribed(build: Build, name: str, load: Load) -> Expression:
     return symbol
 
 
-def bonding_variables(build: Build) -> None:
+def bonding_variables(build: Build) -> dict[str, Bond]:
     """Bonding states, site densities and their bounds."""
-    sites = build.interface.sites
+    sites, found = build.interface.sites, {}
     if sites is not None:
         spec = Spec("1/m^2", "nominal density of reference bonding sites", above=0)
         nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
@@ -85,14 +86,17 @@ def bonding_variables(build: Build) -> None:
     breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
-        _bonding_state(build, VARIABLES["phi"], build.variables.get("N_c", "the bonding state", "interface"), limit)
+        density = build.variables.get("N_c", "the bonding state", "interface")
+        found["phi"] = _bonding_state(build, VARIABLES["phi"], density, limit)
     for variable in build.interface.variables:
         spec = Spec("1/m^2", "site density", above=0)
         amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
-        _bonding_state(build, Quantity(variable.name, "1", variable.long_name), amount, 1.0)
+        quantity = Quantity(variable.name, "1", variable.long_name)
+        found[variable.name] = _bonding_state(build, quantity, amount, 1.0)
         _amounts(build, variable.name, amount)
     if build.interface.bonds:
         build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
+    return found
 
 
 def _current_density(build: Build) -> Expression:
@@ -124,18 +128,18 @@ def _derived_phi(build: Build) -> Expression:
     return bonds / N_c
 
 
-def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> None:
+def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> Bond:
     name = quantity.name
     symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
     initial = initial_bonding(build, name)
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
     build.variables.define(name, lambda: symbol, "evolved", "bonding")
-    build.bonding[name] = Bond(symbol, dot, density)
     start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
-    build.about[symbol] = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
+    first = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
     build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
     _bounds(build, name, symbol, limit)
+    return Bond(symbol, dot, density, first)
 
 
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
@@ -151,28 +155,27 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
 
 
-def free_energy(build: Build) -> None:
+def free_energy(build: Build) -> Energy:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
     gaps = _gaps(build, bounds)
-    energies = _energies(build, bounds, gaps)
+    energies, energy = _energies(build, bounds, gaps)
+    psi = symengine.Integer(0)
     for law, F in energies.items():
         build.refuse_foreign(F, _known(build), law)
-        build.psi += F
+        psi += F
         build.law_ranges(law)
         build.law_margins(bounds[law], gaps[law])
-    _sides_of_touch(build)
-    if build.interface.temperature is not None:
-        node = build.node_of["interface"]
-        node.energies["interface"] = build.psi
-    elif any(depends(build.psi, symengine.Symbol(name)) for name in (*build.nodes, "T_c")):
+    psi = _in_sides(build, psi)
+    names = (*build.thermal.nodes, "T_c") if build.interface.temperature is None else ()
+    if any(depends(psi, symengine.Symbol(name)) for name in names):
         raise InputError(
             "the interface's potential depends on temperature, but the interface has none. "
             "Give `interface.temperature` a name.",
             path="interface",
         )
-    _tractions(build)
-    if depends(build.psi, symengine.Symbol("g_n")):
+    _tractions(build, psi)
+    if depends(psi, symengine.Symbol("g_n")):
         borne = [
             _per_reference_area(build, b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()
         ]
@@ -181,6 +184,7 @@ def free_energy(build: Build) -> None:
         _warn_of_net_pressure(build)
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
+    return replace(energy, psi=psi)
 
 
 def _gaps(build: Build, laws: Iterable[Potential]) -> dict[Potential, dict[str, Expression]]:
@@ -193,7 +197,7 @@ def _gaps(build: Build, laws: Iterable[Potential]) -> dict[Potential, dict[str, 
 
 def _energies(
     build: Build, bounds: Mapping[Potential, Potential], gaps: Mapping[Potential, Mapping[str, Expression]]
-) -> dict[Potential, Expression]:
+) -> tuple[dict[Potential, Expression], Energy]:
     """The energy of each potential, with the tangential gap that it has beside friction or behind it.
 
     Where a potential in parallel says that friction acts on a part of the interface only, so does the elastic gap that
@@ -210,15 +214,14 @@ def _energies(
                 for friction in build.interface.frictions
                 if friction.breaks_bonds
             ]
-    for part in parts:
-        build.motion.rubs *= part
-    if build.motion.rubs != 1:
+    rubs, rubbed = symengine.Mul(*parts), symengine.Integer(0)
+    if rubs != 1:
         g_t = symengine.Symbol("g_t")
         for law in series:
             sheared = found[law] - symengine.sympify(found[law]).subs({g_t: 0})
-            build.motion.rubbed += sheared
-            found[law] += (build.motion.rubs - 1) * sheared
-    return found
+            rubbed += sheared
+            found[law] += (rubs - 1) * sheared
+    return found, Energy(symengine.Integer(0), rubs, rubbed)
 
 
 def _attracts(law: Potential) -> bool:
@@ -267,16 +270,15 @@ def _per_reference_area(
     return F.subs({n_c: build.variables.get("N_c", law) / build.stretch}) if depends(F, n_c) else F
 
 
-def _sides_of_touch(build: Build) -> None:
+def _in_sides(build: Build, given: Expression) -> Expression:
     """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
-    psi = symengine.sympify(build.psi).xreplace(_by_side(g))
+    psi = symengine.sympify(given).xreplace(_by_side(g))
     if not depends(psi, side):
-        return
+        return given
     if "g_n" not in build.motion.gap_rates:
         build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
-        return
-    build.psi = psi
+        return given
     rests = _rests(build)
     start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
@@ -295,6 +297,7 @@ def _sides_of_touch(build: Build) -> None:
                 when={side: (value,)},
             )
         )
+    return psi
 
 
 def _by_side(g: Any) -> dict[Any, Any]:
@@ -317,21 +320,21 @@ def _known(build: Build) -> set[Any]:
     """What the balance of the interface accounts for: its own temperature, bonds, gaps and the stretch of its area."""
     names = {"phi", "g_n", "g_t", "u_t", "u_t2", "J_c", *build.bonding}
     if build.interface.temperature is not None:
-        names.add(build.node_of["interface"].name)
+        names.add(build.thermal.node_of["interface"].name)
     return {symengine.Symbol(name) for name in names}
 
 
-def _tractions(build: Build) -> None:
+def _tractions(build: Build, psi: Expression) -> None:
     """Tractions of the elastic gaps; the normal one gives the contact pressure where the potential states it."""
     for gap, traction, text in TRACTIONS:
         symbol = symengine.Symbol(gap)
-        if depends(build.psi, symbol):
-            build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(build.psi, symbol))
+        if depends(psi, symbol):
+            build.areal(Quantity(traction, "Pa", text, tag="e:cons_tc"), derivative(psi, symbol))
     if parallel := in_parallel(build):
-        traction = "t_a" if depends(build.psi, symengine.Symbol("u_t")) else "t_e"
+        traction = "t_a" if depends(psi, symengine.Symbol("u_t")) else "t_e"
         names = " and ".join(law.name() for law in parallel)
         text = f"{names} in parallel with friction" if build.interface.frictions else names
         build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", text)
-    if depends(build.psi, symengine.Symbol("g_n")):
+    if depends(psi, symengine.Symbol("g_n")):
         pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
         build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

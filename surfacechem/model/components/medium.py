@@ -35,21 +35,21 @@ KEYS = {"k_m": "conductivity", "eta_m": "viscosity", "rho_m": "density", "cp_m":
 FITTED = (*KEYS, "gamma_m")
 
 
-def medium(build: Build) -> None:
-    """Properties of the medium; each comes to life when something reads it."""
+def medium(build: Build) -> Callable[[], Fit | None]:
+    """Properties of the medium; each comes to life when something reads it. Returns what has the fit of its fluid."""
     found = build.interface.medium
     if found is None:
-        return
+        return lambda: None
     _film(build, found)
     for name, value in found.properties.items():
         build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{KEYS[name]}")
-    fluid: Callable[[], FluidFit] | None = None
-    if found.fluid is not None:
-        fluid = cache(partial(FluidFit, build, found.fluid))
+    fluid = None if found.fluid is None else cache(partial(FluidFit, build, found.fluid))
+    if fluid is not None:
         for name in FITTED:
             if name not in found.properties:
                 build.variables.define(name, partial(_property, fluid, name), "derived", f"{PATH}.fluid")
     build.variables.define("f_m", partial(_free_energy, build, found, fluid), "derived", PATH)
+    return lambda: fluid().fit() if fluid is not None and fluid.cache_info().currsize else None
 
 
 def _property(fluid: Callable[[], FluidFit], name: str) -> Expression:
@@ -179,8 +179,8 @@ class FluidFit:
         self.T = build.variables.get("T_c", "the medium", "interface.medium")
         assert build.interface.medium is not None
         self.held = (*_held(build), *build.interface.medium.temperatures)
-        starts = [build.scene.initial.get(node.name) for node in build.nodes.values() if not node.prescribed]
-        self.states = tuple(node.name for node in build.nodes.values() if not node.prescribed)
+        starts = [build.scene.initial.get(node.name) for node in build.thermal.nodes.values() if not node.prescribed]
+        self.states = tuple(node.name for node in build.thermal.nodes.values() if not node.prescribed)
         known = [*self.held, *(T for T in starts if T is not None)] or [build.scene.T_0 or 300.0]
         self.coefficients = Coefficients(fluid)
         self.low, self.high, self.start = first_range(fluid, known)
@@ -188,7 +188,6 @@ class FluidFit:
         for end, sign in zip(self.ends, (1, -1), strict=True):
             reason = f"{fluid.name} has no properties beyond its range"
             build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
-        build.fit = self.fit
 
     def fit(self) -> Fit:
         """How a run goes on where it leaves the range."""
@@ -260,5 +259,5 @@ class FluidFit:
 
 def _held(build: Build) -> list[float]:
     """Prescribed temperatures at the start."""
-    loads: list[Load] = [build.loads[node.name] for node in build.nodes.values() if node.prescribed]
+    loads: list[Load] = [build.loads[node.name] for node in build.thermal.nodes.values() if node.prescribed]
     return [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]

@@ -11,7 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Law, Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
-from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Pace
@@ -169,26 +169,17 @@ class FarField:
             return [Pace(f"relaxation of the {text}", (self.c_b + self.c_g) / self.k, remedy)]
         return []
 
-    def shares(self, build: Build) -> list[tuple[str, Expression]]:
-        """The bodies, and which part of what the support dissipates each takes."""
-        return list(zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True))
-
-    def takers(self, build: Build) -> list[tuple[Node, Expression]]:
-        """The same over the volume of the bodies."""
-        return [(node, share * part) for body, share in self.shares(build) for node, part in build.volume(body)]
+    def takers(self, build: Build) -> dict[str, Expression]:
+        """Places in the bodies, and which part of what the support dissipates each takes."""
+        shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
+        return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
     def _damper(self, build: Build, power: Expression) -> Power:
         """What the damper in the bodies dissipates, over their volume."""
         label, text = f"bulk_damper_{self.axis}", f"the damper of the bodies, {AXES[self.axis]}"
-        volumes = [(body, share, build.volume(body)) for body, share in self.shares(build)]
-        targets = {
-            body if i == 0 else node.name: share * part
-            for body, share, nodes in volumes
-            for i, (node, part) in enumerate(nodes)
-        }
-        damped = symengine.Symbol(f"D_{label}")
-        produced = symengine.Add(*(share * damped / node.T for node, share in self.takers(build)))
-        return Power(DISSIPATION, MECHANICS, targets, power, label, text, entropy=produced)
+        damped, takers = symengine.Symbol(f"D_{label}"), self.takers(build)
+        produced = symengine.Add(*(share * damped / build.thermal.places[at].T for at, share in takers.items()))
+        return Power(DISSIPATION, MECHANICS, takers, power, label, text, entropy=produced)
 
     def yielding(self, g: Expression, traction: Expression) -> Expression:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""

@@ -124,14 +124,14 @@ def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dic
 
 
 def _variable(build: Build, item: Stage) -> Expression:
-    if item.variable in build.nodes:
-        return build.nodes[item.variable].T
+    if item.variable in build.thermal.nodes:
+        return build.thermal.nodes[item.variable].T
     if build.variables.has(item.variable):
         return build.variables.get(item.variable, f"the stage {item.name}")
     if any(named.name == item.variable for named in build.named):
         return symengine.Symbol(item.variable)
     roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
-    known = {*roles, *build.nodes} - INTERNAL
+    known = {*roles, *build.thermal.nodes} - INTERNAL
     raise InputError(
         f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}", item.place
     )

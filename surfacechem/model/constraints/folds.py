@@ -19,7 +19,6 @@ import symengine
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
-from surfacechem.model import balances
 from surfacechem.model.automaton import FOLD, Edge, Equilibrium, Fold
 from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
@@ -85,12 +84,12 @@ def _rises(build: Build, e: Equilibrium, residuals: Sequence[Expression]) -> Ris
 
     It is what the energy balances say of motion that is faster than any flow of heat.
     """
-    free = [node for node in build.nodes.values() if not node.prescribed]
+    free = build.thermal.free
     felt = [node for node in free if any(depends(residual, node.T) for residual in residuals)]
     _refuse_no_capacity(felt)
     motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((e.state, symengine.Integer(1)), *e.along.items())}
     rest = {state.dot: symengine.Integer(0) for state in build.states}
-    rows = {node.name: build.expanded(balances.node_row(node, build.rates, build.about)) for node in free}
+    rows = {node.name: build.expanded(build.energy_row(node)) for node in free}
 
     def made(row: Expression) -> Expression:
         return -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))

@@ -151,7 +151,7 @@ def rubbing(build: Build, impulse: Expression) -> Rubbing:
     if not (laws and sliding):
         return Rubbing()
     velocity = "speed" if len(sliding) == 2 else "v"
-    ratio = build.motion.rubs * symengine.Add(*(_ratio(build, law, velocity) for law in laws))
+    ratio = build.energy.rubs * symengine.Add(*(_ratio(build, law, velocity) for law in laws))
     return _slowed(build, sliding[0], symengine.Symbol(velocity), ratio, impulse)
 
 
@@ -172,7 +172,7 @@ def _driven(build: Build, laws: Sequence[Friction], impulse: Expression) -> Rubb
     for law in laws:
         account = build.motion.works[law]
         done = build.register(f"{account}_of_impacts", f"work of impacts against {law.title} [J/m^2]")
-        power = build.motion.rubs * _at_infinity(build, law, _power(build, law))
+        power = build.energy.rubs * _at_infinity(build, law, _power(build, law))
         build.motion.given[account] = done
         works[done] = done + power * exerted
         powers += power

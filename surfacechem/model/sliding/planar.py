@@ -60,7 +60,7 @@ def side_of(build: Build, kind: Kind) -> Side:
     motion, u = build.motion, symengine.Symbol(kind.d.displacement)
     t_a = derivative(build.psi, u)
     far = beside(far_field(build, kind.mount), t_a)
-    resisted, limit = (motion.rubs * by[kind.d.axis] for by in (motion.sliding_tractions, motion.stick_limits))
+    resisted, limit = (build.energy.rubs * by[kind.d.axis] for by in (motion.sliding_tractions, motion.stick_limits))
     rate, cosine = motion.gap_rates[kind.d.displacement], unit_vector()[kind.d is ACROSS]
     return Side(kind, far, u, cosine, rate, resisted, far.force(u, NONE), limit, t_a)
 

@@ -154,11 +154,11 @@ def motion(build: Build, kind: Kind) -> Iterator[Power]:
         build.variables.get("v_t", "the mechanics", "mechanics")
     d, u = kind.d, symengine.Symbol(kind.d.displacement)
     v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
-    rubs, t_a = build.motion.rubs, derivative(build.psi, u)
+    rubs, t_a = build.energy.rubs, derivative(build.psi, u)
     t_f = build.motion.sliding_tractions.get(d.axis, NONE)
     if kind.elastic:
         # Per area on which friction acts, however small that is.
-        t_e = derivative(build.psi if rubs == 1 else build.motion.rubbed, symengine.Symbol("g_t"))
+        t_e = derivative(build.psi if rubs == 1 else build.energy.rubbed, symengine.Symbol("g_t"))
         carried, needed = rubs * t_e, t_e
     else:
         t_e, t_f = None, rubs * t_f
@@ -343,7 +343,7 @@ def _still(build: Build, kind: Kind, needed: Expression, t_f: Expression, v: Exp
 
 def _transitions(build: Build, kind: Kind, needed: Expression, still: Expression) -> None:
     slip = build.variables.get("direction", "sliding")
-    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.motion.rubs)
+    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.energy.rubs)
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
     bears = where(limit > 0, limit, 0)
     breaking = next((law for law in build.interface.frictions if law.breaks_bonds), None)

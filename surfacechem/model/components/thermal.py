@@ -1,0 +1,253 @@
+"""Temperatures: who carries which, the energies of the bodies, the balances of energy and what must hold for them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import partial
+
+import symengine
+
+from surfacechem.contracts.terms import Load, Spec
+from surfacechem.errors import InputError, Place
+from surfacechem.expressions import Expression, depends, derivative
+from surfacechem.model import balances
+from surfacechem.model.balances import HEAT, INTERFACE, MECHANICS, OUTSIDE, SURROUNDINGS, WORK, Node, Power
+from surfacechem.model.build import Build
+from surfacechem.model.constraints.folds import determinant
+from surfacechem.model.parts import Thermal
+from surfacechem.model.system import STABLE, Margin, State
+from surfacechem.quantities import VARIABLES, Quantity
+
+_NEWTON = 20
+"""Steps to a temperature from an energy that is close to quadratic."""
+
+COLD = 1e-9
+"""Temperature that counts as zero [K]."""
+
+CAPACITY_REMEDY = (
+    "The interface's potential takes more capacity than there is. Of a bond energy: kappa_2 (1 - phi_i)^2 must stay "
+    "below 1, with kappa_2 = K_2 / (T_0 C) and C the capacities that share this temperature."
+)
+
+GAPS = ("g_n", "g_t", "u_t", "u_t2")
+GEOMETRY = (*GAPS, "J_c")
+"""Variables of the free energy that move the surfaces rather than their bonds."""
+
+
+def temperatures(build: Build) -> Thermal:
+    """Nodes: who carries which temperature, and which are prescribed."""
+    scene = build.scene
+    if scene.T_0 is not None:
+        spec = Spec("K", "reference temperature", above=0)
+        build.variables.define("T_0", partial(build.constant, "T_0", "T_0", spec, scene.T_0), "constant", "T_0")
+    given = [(f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)]
+    if build.interface.temperature is not None:
+        given.append(("T_c", build.interface.temperature, INTERFACE))
+    else:
+        mean = partial(_mean_temperature, build)
+        build.variables.define("T_c", mean, "derived", "harmonic mean of the bodies, no medium")
+    if scene.surroundings is not None:
+        given.append(("T_a", scene.surroundings, SURROUNDINGS))
+    nodes: dict[str, Node] = {}
+    members: dict[str, str] = {}
+    for variable, temperature, member in given:
+        own_history = isinstance(temperature, Load)
+        name = variable if isinstance(temperature, Load) else temperature
+        place = Place(path=f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature")
+        if own_history and name in nodes:
+            message = f"{name} has two roles: the temperature of {member}, and a node of another member."
+            raise InputError(message, place)
+        if name not in nodes:
+            if name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
+                message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
+                raise InputError(message, place)
+            load = temperature if isinstance(temperature, Load) else scene.loading.get(name)
+            nodes[name] = _node(build, name, load)
+        node, members[member] = nodes[name], name
+        role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
+        build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
+    return Thermal(nodes, members)
+
+
+def _node(build: Build, name: str, load: Load | None) -> Node:
+    symbol = symengine.Symbol(name)
+    if load is None:
+        return Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
+    build.prescribe(VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name)), load)
+    return Node(name, symbol, build.slope_of(name), prescribed=True)
+
+
+def _mean_temperature(build: Build) -> Expression:
+    shares = build.shares()
+    if SURROUNDINGS in shares and SURROUNDINGS not in build.thermal.node_of:
+        raise InputError("heat is lost to surroundings that have no temperature. Add `surroundings`.", path="interface")
+    inverse = symengine.Add(*(share / build.thermal.node_of[end].T for end, share in shares.items()))
+    return build.name(VARIABLES["T_c"], 1 / inverse)
+
+
+def body_energies(build: Build) -> Thermal:
+    """The nodes with the free energies of the bodies."""
+    thermal = build.thermal
+    for k, body in enumerate(build.scene.bodies, start=1):
+        if body.energy is None:
+            continue
+        T = thermal.node_of[body.name].T
+        law = build.variables.bind(body.energy, f"bodies.{body.name}", f"_{k}")
+        F = law.energy(T=T, T_0=build.variables.get("T_0", f"the body {body.name}", f"bodies.{body.name}"))
+        build.refuse_foreign(F, {T}, body.energy)
+        thermal = thermal.with_energy(body.name, F)
+    return thermal
+
+
+def surface_rates(build: Build) -> dict[symengine.Symbol, Expression]:
+    """Time derivatives of what the interface's free energy depends on beside temperature."""
+    rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
+    for name in (*GEOMETRY, "phi"):
+        x = symengine.Symbol(name)
+        if x not in rates and depends(build.psi, x):
+            moved = build.motion.gap_rates.get(name)
+            rates[x] = build.rate_of(name) if moved is None else moved
+    return rates
+
+
+def surface_work(build: Build) -> Iterator[Power]:
+    """Work that tractions do on the interface: from outside where the gap is prescribed, else from the bodies."""
+    for name in GEOMETRY:
+        x = symengine.Symbol(name)
+        power = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
+        if power != 0:
+            stretches = name == "J_c"
+            label = "W_J" if stretches else f"W_{name}"
+            text = "work done in stretching the surface" if stretches else f"work done on the gap {name}"
+            yield Power(WORK, MECHANICS if name in build.motion.gap_rates else OUTSIDE, INTERFACE, power, label, text)
+
+
+def equations(build: Build) -> Iterator[Power]:
+    """Energy balances, states and margins of the temperatures; the heat that keeps prescribed ones is recovered."""
+    thermal = build.thermal
+    for node in thermal.free:
+        _temperature_state(build, node)
+    own_rows = {node.name: build.energy_row(node) for node in thermal.free}
+    for node in thermal.free:
+        _temperature_margins(build, node, own_rows[node.name])
+    # The row of the interface's node is the sum of all; where it has none that is free, that of the first.
+    centre = thermal.members.get(INTERFACE, "")
+    build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
+    for node in thermal.nodes.values():
+        if not node.prescribed:
+            continue
+        build.margins.append(_warm(node))
+        if node.energies:
+            build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
+        supply = build.energy_row(node)
+        if supply != 0:
+            text = f"heat supplied to keep {node.name}"
+            symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", text), supply)
+            yield Power(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)
+    if not (build.states or thermal.slabs):
+        message = "there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve."
+        raise InputError(message, Place(path="bodies"))
+
+
+def _temperature_state(build: Build, node: Node) -> None:
+    algebraic = balances.second(node.free_energy, node.T) == 0
+    members = [body for body in build.scene.bodies if build.thermal.members[body.name] == node.name]
+    if algebraic and members:
+        raise InputError(
+            f"nothing evolves or prescribes {node.name}: give {members[0].name} a heat capacity C, or its "
+            "temperature a value.",
+            path=f"bodies.{members[0].name}",
+        )
+    initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else _initial(build, node)
+    if not initial > 0:
+        raise InputError(
+            f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.",
+            path=f"initial.{node.name}",
+        )
+    quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
+    build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic))
+
+
+def _initial(build: Build, node: Node) -> float:
+    """Initial value; bodies that touch with different temperatures start from the one that keeps their energy."""
+    thermal = build.thermal
+    slabs = [slab for name, slab in thermal.slabs.items() if thermal.members[name] == node.name]
+    inside = [build.scene.initial.get(slab.profile) for slab in slabs]
+    if node.name in build.scene.initial or len(slabs) < len(node.energies) or None in inside:
+        return build.initial(node.name)
+    values = {p.symbol: p.value for p in build.parameters.items}
+    parts = [
+        (balances.internal_energy(node.energies[slab.body.name], node.T).subs(values), float(T))
+        for slab, T in zip(slabs, inside, strict=True)
+        if T is not None
+    ]
+    U = symengine.Add(*(part for part, _ in parts))
+    missing = U - sum(part.subs({node.T: T}) for part, T in parts)
+    T = sum(T for _, T in parts) / len(parts)
+    for _ in range(_NEWTON):
+        T -= float(missing.subs({node.T: T})) / float(derivative(missing, node.T).subs({node.T: T}))
+    return T
+
+
+def _members(build: Build, node: Node) -> str:
+    return " and ".join(member for member, name in build.thermal.members.items() if name == node.name)
+
+
+def _guess(build: Build) -> float:
+    """Start value for an algebraic interface temperature: the mean of the bodies."""
+    values = [build.scene.initial.get(build.thermal.members[body.name]) for body in build.scene.bodies]
+    known = [value for value in values if value is not None]
+    loads = [body.temperature for body in build.scene.bodies if isinstance(body.temperature, Load)]
+    known += [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]
+    return sum(known) / len(known) if known else float(build.scene.T_0 or 300.0)
+
+
+def _warm(node: Node) -> Margin:
+    return Margin(f"{node.name} > 0", node.T - COLD, f"the temperature {node.name} reached zero")
+
+
+def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
+    build.margins.append(_warm(node))
+    if balances.second(node.free_energy, node.T) == 0:
+        _fold_margin(build, node, row)
+    elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
+        capacity = balances.conditioned(node.capacity(), build.about)
+        quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
+        symbol = build.name(quantity, capacity)
+        reason = f"the heat capacity at {node.name} was lost"
+        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface"))
+
+
+def _fold_margin(build: Build, node: Node, row: Expression) -> None:
+    """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
+    explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
+    slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
+    if slope == 0:
+        raise InputError(
+            f"nothing determines the interface temperature {node.name}: it has no capacity and no heat path. Give the "
+            "interface a capacity or a heat path, or let it share the temperature of a body.",
+            Place(path="interface.temperature"),
+        )
+    reason = f"ignition: no temperature {node.name} balances the heat that the interface produces"
+    other = f"runaway cooling: no temperature {node.name} balances the heat that the interface takes up"
+    carried = {power.rate: 0 for power in build.powers if power.channels}
+    produced = -build.expanded(row.subs(explicit).subs(carried))
+    if not slope.free_symbols & {state.symbol for state in build.states}:
+        reason = f"no heat path determines the temperature {node.name}"
+        other = reason
+    build.margins.append(Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other)))
+
+
+def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:
+    """Slope of a balance of heat with temperature as a motion that has no inertia follows it."""
+    following, slope = list(build.motion.slides_by.values()), derivative(heat, T)
+    if not any(depends(heat, x) for x in following):
+        return slope
+    tractions = [build.expanded(build.rows[str(x)]) for x in following]
+    A = [[derivative(row, x) for x in following] for row in tractions]
+    moved = [derivative(row, T) for row in tractions]
+    for j, x in enumerate(following):
+        turned = [[*row[:j], change, *row[j + 1 :]] for row, change in zip(A, moved, strict=True)]
+        slope -= derivative(heat, x) * determinant(turned) / determinant(A)
+    return slope
