@@ -1,9 +1,10 @@
-"""The events of a run as a table: times, what happened, states before and after, energies and verdicts."""
+"""The events of runs as a table: times, what happened, states before and after, energies and verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,17 +13,14 @@ from numpy.typing import NDArray
 from surfacechem.results.netcdf import Column
 from surfacechem.solve.jumps import ADMISSIBLE, VIOLATES, Jump
 from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import NEGLIGIBLE, ROUNDING
 
 Array = NDArray[np.float64]
 
-SIDE = 1e-13
-"""Relative distance from a jump at which a time is that of the jump."""
-
-ROUNDING = 1e-12
-"""Heat of a jump that counts as none, relative to the energy that was exchanged."""
-
-SLOW = 1e-3
-"""Part of the speed of the fastest impact below which a rebound is one of the last."""
+SIDE = ROUNDING / 8
+"""Relative distance from a jump at which a time is that of the jump, 1.1e-13: times are summed, too, over some 1e5
+steps, whose roundings add up to a tenth of those of 1e7.
+"""
 
 REST = "rest"
 
@@ -31,10 +29,12 @@ KINK = "kink of "
 
 
 @dataclass(frozen=True)
-class Row:
+class Event:
     """An event with the states at its two sides, and its jump where it is one."""
 
     t: float
+    since: float
+    """Time since the last jump before it, or since the start."""
     name: str
     reason: str
     before: Array
@@ -42,50 +42,63 @@ class Row:
     jump: Jump | None = None
 
 
-def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = None) -> list[Column]:
-    """The table of one run, or of many along the ``axes`` of a sweep, by name and size: there times and values are not
-    set beyond the last event of a run. Without the columns of jumps where nothing jumped; empty where nothing happened.
-    """
-    tables = [{column.name: column for column in _table(run)} for run in runs]
-    most = max(len(table["event_time"].values) if table else 0 for table in tables)
-    found = []
-    for column in {name: column for table in tables for name, column in table.items()}.values():
-        empty: str | float = "" if column.values.dtype == object else np.nan
-        values = np.full((len(runs), most), empty, dtype=column.values.dtype)
-        for row, table in zip(values, tables, strict=True):
-            if column.name in table:
-                row[: len(table[column.name].values)] = table[column.name].values
-        shape = (*(axes or {}).values(), most)
-        found.append(replace(column, dimensions=(*(axes or {}), "event"), values=values.reshape(shape)))
-    return found
-
-
-def _table(trajectory: Trajectory) -> list[Column]:
-    rows = _rows(trajectory)
-    if not rows:
-        return []
-    columns = [
-        _column("event_time", [row.t for row in rows], "s", "time of the event"),
-        _column("event_name", [row.name for row in rows], "1", "name of the event"),
-        _column("event_reason", [row.reason for row in rows], "1", "what happened"),
-    ]
-    return columns + (_jump_columns(trajectory, rows) if trajectory.jumps else [])
-
-
-def _column(name: str, values: Sequence[float | str] | Array, unit: str, long_name: str) -> Column:
-    return Column(name, ("event",), np.array(values, object if isinstance(values[0], str) else float), unit, long_name)
-
-
-def _rows(trajectory: Trajectory) -> list[Row]:
-    """Jumps and other events in order of time."""
+def events_of(trajectory: Trajectory) -> list[Event]:
+    """Jumps and other events of a run in order of time."""
     margins, events = trajectory.model.margins, trajectory.result.events
-    smooth = [
-        Row(float(t), margins[i].name, margins[i].reason, y, y)
+    found = [
+        Event(float(t), 0.0, margins[i].name, margins[i].reason, y, y)
         for t, i, y in zip(events.t, events.index, events.y, strict=True)
         if i < len(margins) and not margins[i].peak
     ]
-    jumped = [Row(j.t, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
-    return sorted([*smooth, *jumped], key=lambda row: row.t)
+    found += [Event(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
+    last, told = 0.0, []
+    for event in sorted(found, key=lambda event: event.t):
+        told.append(event if event.jump else replace(event, since=event.t - last))
+        last = event.t if event.jump else last
+    return told
+
+
+def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = None) -> list[Column]:
+    """The table of one run, or of many along the ``axes`` of a sweep, by name and size: there times and values are not
+    set beyond the last event of a run. Without the columns of jumps where no run jumps; empty where nothing happens.
+    """
+    system, events = runs[0].model.system, [events_of(run) for run in runs]
+    most = max(map(len, events))
+    sizes = {**(axes or {}), "event": most}
+
+    def column(name: str, unit: str, text: str, value: Callable[[Event], float | str], unset: Any = np.nan) -> Column:
+        table = np.full((len(runs), most), unset, dtype=object if unset == "" else float)
+        for row, own in zip(table, events, strict=True):
+            row[: len(own)] = [value(event) for event in own]
+        return Column(name, tuple(sizes), table.reshape(*sizes.values()), unit, text)
+
+    if not most:
+        return []
+    columns = [
+        column("event_time", "s", "time of the event", lambda event: event.t),
+        column("event_name", "1", "name of the event", lambda event: event.name, ""),
+        column("event_reason", "1", "what happened", lambda event: event.reason, ""),
+    ]
+    if not any(run.jumps for run in runs):
+        return columns
+    verdict = "whether the second law allows it; empty where nothing jumps"
+    # Where nothing jumps the state goes on, and nothing is released.
+    columns += [
+        column("event_since", "s", "time since the transition before or the start", lambda event: event.since),
+        column("event_released", "J/m^2", "energy turned into heat", lambda e: e.jump.released if e.jump else 0.0),
+        column("event_entropy", "J/(m^2 K)", "entropy produced", lambda e: e.jump.entropy if e.jump else 0.0),
+        column("event_verdict", "1", verdict, lambda e: e.jump.verdict if e.jump else "", ""),
+    ]
+    kept = [(k, state.quantity) for k, state in enumerate(system.states) if state.name not in system.inside]
+    return columns + [
+        column(f"{q.name}_{side}", q.unit, f"{q.long_name} {side}", partial(_state, side=side, k=k))
+        for k, q in kept
+        for side in ("before", "after")
+    ]
+
+
+def _state(event: Event, side: str, k: int) -> float:
+    return float(getattr(event, side)[k])
 
 
 def event_times(trajectory: Trajectory) -> dict[str, Any]:
@@ -98,62 +111,21 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
     rounding decides whether it still happens.
     """
-    last = trajectory.run.times[-1] * (1 - SIDE)
-    rows = [row for row in _telling(trajectory, _rows(trajectory)) if row.t < last]
+    names = [state.name for state in trajectory.model.system.states]
+    end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
-    for row in rows:
-        times.setdefault(row.name if row.jump else f"{KINK}{row.name}", []).append(row.t)
+    for event in events_of(trajectory):
+        if event.jump and event.jump.edge.returns is not None:
+            speed = abs(float(event.before[names.index("v_n")]))
+            fastest = max(fastest, speed)
+            slow = event.t if speed < NEGLIGIBLE * fastest else -np.inf
+        elif event.t != slow or event.name == REST:  # coming to rest ends the rebounds, and counts
+            slow = -np.inf
+        if slow == -np.inf and event.t < end:
+            times.setdefault(event.name if event.jump else f"{KINK}{event.name}", []).append(event.t)
     found = {name: np.array(values) for name, values in times.items()}
     ended = {"end": np.array([trajectory.result.t])} if trajectory.status == "stopped" else {}
     return found | ended
-
-
-def _telling(trajectory: Trajectory, rows: Sequence[Row]) -> list[Row]:
-    """The events without slow rebounds and what they set off; coming to rest ends them and is one."""
-    names = [state.name for state in trajectory.model.system.states]
-    kept, fastest, slow = [], 0.0, -np.inf
-    for row in rows:
-        if row.jump and row.jump.edge.returns is not None:
-            speed = abs(float(row.before[names.index("v_n")]))
-            fastest = max(fastest, speed)
-            slow = row.t if speed < SLOW * fastest else -np.inf
-        elif row.t != slow or row.name == REST:
-            slow = -np.inf
-        kept += [row] if slow == -np.inf else []
-    return kept
-
-
-def _jump_columns(trajectory: Trajectory, rows: Sequence[Row]) -> list[Column]:
-    """What jumped; where nothing did, the state goes on and nothing is released or judged."""
-    jumps = [row.jump for row in rows]
-    columns = [
-        _column("event_since", _since(rows), "s", "time since the transition before or the start"),
-        _column("event_released", [j.released if j else 0.0 for j in jumps], "J/m^2", "energy turned into heat"),
-        _column("event_entropy", [j.entropy if j else 0.0 for j in jumps], "J/(m^2 K)", "entropy produced"),
-        _column(
-            "event_verdict",
-            [j.verdict if j else "" for j in jumps],
-            "1",
-            "whether the second law allows it; empty where nothing jumps",
-        ),
-    ]
-    for k, state in enumerate(trajectory.model.system.states):
-        if state.name not in trajectory.model.system.inside:
-            q = state.quantity
-            columns += [
-                _column(f"{q.name}_before", [row.before[k] for row in rows], q.unit, f"{q.long_name} before"),
-                _column(f"{q.name}_after", [row.after[k] for row in rows], q.unit, f"{q.long_name} after"),
-            ]
-    return columns
-
-
-def _since(rows: Sequence[Row]) -> list[float]:
-    """Times since the last jump before each row, or since the start."""
-    last, found = 0.0, []
-    for row in rows:
-        found.append(row.jump.since if row.jump else row.t - last)
-        last = row.t if row.jump else last
-    return found
 
 
 def entropy_destroyed(jumps: Sequence[Jump]) -> float:
@@ -167,15 +139,16 @@ def event_findings(jumps: Sequence[Jump]) -> list[str]:
     for jump in jumps:
         if jump.verdict != ADMISSIBLE and jump.edge.violation != "accept":
             flagged.setdefault((jump.edge.reason, jump.verdict), []).append(jump)
-    return [_finding(reason, verdict, same) for (reason, verdict), same in flagged.items()]
-
-
-def _finding(reason: str, verdict: str, jumps: Sequence[Jump]) -> str:
-    worst = min(jumps, key=lambda jump: jump.entropy)
-    lost, at = f"{worst.entropy:.3g} J/(m^2 K)", f"t = {jumps[0].t:.9g} s"
-    if len(jumps) == 1:
-        return f"{reason} at {at}: {verdict} ({lost})"
-    return f"{reason} {len(jumps)} times, first at {at}: {verdict} (at worst {lost}, at t = {worst.t:.9g} s)"
+    findings = []
+    for (reason, verdict), same in flagged.items():
+        worst = min(same, key=lambda jump: jump.entropy)
+        first, lost = f"t = {same[0].t:.9g} s", f"{worst.entropy:.3g} J/(m^2 K)"
+        if len(same) == 1:
+            findings.append(f"{reason} at {first}: {verdict} ({lost})")
+        else:
+            times, at = f"{len(same)} times, first at {first}", f"t = {worst.t:.9g} s"
+            findings.append(f"{reason} {times}: {verdict} (at worst {lost}, at {at})")
+    return findings
 
 
 def event_waits(trajectory: Trajectory) -> list[str]:

@@ -93,12 +93,11 @@ class SweepSolution(Results):
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the coordinates first."""
         along = quantity_columns(self.sweep.runs, self.inner, self._shape)
-        events = event_columns(self.sweep.runs, self._shape) if self.system.edges else ()
         return (
             *self._coordinates(next((column for column in along if column.name == self.inner), None)),
             *(column for column in along if column.name != self.inner),
             *self._of_runs(),
-            *events,
+            *event_columns(self.sweep.runs, self._shape),
             *self._statistics(),
         )
 

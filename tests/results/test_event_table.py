@@ -8,7 +8,7 @@ import pytest
 import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.results.event_table import event_findings, event_summary
+from surfacechem.results.event_table import event_columns, event_findings, event_summary
 from surfacechem.runs.simulation import Simulation
 
 BENDS = """
@@ -66,6 +66,14 @@ def test_no_number_is_missing_where_nothing_jumps(bends):
     np.testing.assert_allclose(bend.event_since, bend.event_time - data.event_time[0], rtol=1e-15)
     for name in ("phi", "g_n", "T"):
         assert np.array_equal(bend[f"{name}_before"], bend[f"{name}_after"])
+
+
+def test_a_run_without_jumps_has_the_same_columns_beside_one_with_some(bends):
+    both = [bends.trajectory, replace(bends.trajectory, jumps=())]
+    table = {column.name: column.values for column in event_columns(both, {"x": 2})}
+    assert table["event_name"].tolist() == [["release", "mu", "mu", "mu"], ["mu", "mu", "mu", ""]]
+    for name in ("event_released", "event_entropy", "phi_before", "T_after"):
+        assert np.isnan(table[name][1]).tolist() == [False, False, False, True], name
 
 
 def test_findings_that_repeat_are_one_line(cooling):

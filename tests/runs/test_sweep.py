@@ -34,7 +34,7 @@ def bonding():
 
 def test_six_decades_of_loading_rates_meet_the_exact_formulas(spectrum):
     data = spectrum.dataset
-    assert data.sizes == {"rate": 61, "f": 201}
+    assert data.sizes == {"rate": 61, "f": 201, "event": 3}
     assert data["rate"].values[-1] / data["rate"].values[0] == pytest.approx(1e6)
     for rate, one in zip(data["rate"].values, data["rate"], strict=True):
         bond, found = get("bell-ramp")(k_off=0.1, x_off=4e-10, T=300.0, rate=rate), data.sel(rate=one)
