@@ -18,13 +18,15 @@ from numpy.typing import NDArray
 
 from surfacechem.solve.contract import Points
 from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import EPS, SQRT_EPS
 
 Array = NDArray[np.float64]
 
-OPEN = 1e-6
-"""Relative residual above which a balance counts as open at tolerances up to 1e-9; more at looser ones."""
+OPEN, FINEST = 1000.0, SQRT_EPS / 16
+"""Relative residual, in tolerances of the run, above which a balance counts as open: errors of smooth runs stay below a
+hundred tolerances. Tighter runs than FINEST, 9e-10, are judged as this one, since their rounding adds up, too.
+"""
 
-EPSILON = float(np.finfo(float).eps)
 ROUNDINGS = 10
 """Number of last digits that add up in a balance, beside one a step."""
 
@@ -107,7 +109,7 @@ class Audit:
         # What is exchanged may be less than the rounding of a body's heat content.
         known = _relative(np.maximum(np.abs(self.energy) - self.energy_rounding, 0), self.energy_scale)
         open_balances = (("energy", known), ("sites", self.site_error))
-        limit = max(OPEN, OPEN * self.rtol / 1e-9)
+        limit = OPEN * max(self.rtol, FINEST)
         found += [
             f"the balance of {name} is open by {error:.1e}" for name, error in open_balances if not error <= limit
         ]
@@ -127,197 +129,126 @@ def _resolved(residual: Array, scale: float, stored: float, rounding: float) -> 
 
 def audit(trajectory: Trajectory) -> Audit:
     """Audit of a trajectory."""
-    return _Books(trajectory).audit()
+    model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
+    names = [item.name for item in model.system.outputs]
+    E, S = outputs[:, names.index("E_total")], outputs[:, names.index("S_total")]
+    # Transitions at the very start come before the first output.
+    ledger = result.ledger_outputs - result.ledger_outputs[:1]
+
+    def booked(*kinds: str, table: Array = ledger) -> Array:
+        """Columns of the ledger, of accounts of these kinds."""
+        return table[:, [j for j, account in enumerate(model.system.ledger) if account.kind in kinds]]
+
+    def changes(prefix: str) -> Array:
+        """Changes of totals of bodies and interface since the start."""
+        columns = [j for j, name in enumerate(names) if name.startswith(prefix) and name[2:] in ("1", "2", "c")]
+        return outputs[:, columns] - outputs[:1, columns]
+
+    # A brief load may come and go between outputs; the ends of the steps have seen it.
+    exchanged = [changes("U_"), booked("energy supply", "dissipation")]
+    exchanged += [booked("energy supply", "dissipation", table=steps.ledger)] if steps else []
+    turned = _largest(changes("S_"), booked("entropy supply", "entropy production"))
+    energy_stored = max(trajectory.roundings["E_total"] / EPS, _largest(E))
+    entropy_stored = max(trajectory.roundings["S_total"] / EPS, turned, _largest(S))
+    roundings, untimed = ROUNDINGS, 0.0
+    if steps and len(steps.t):
+        roundings += len(steps.t)
+        # Of a history that is steep no more is known than within the last digits of time.
+        later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
+        untimed = _largest(later[:, names.index("E_total")] - trajectory.everywhere["E_total"][len(result.times) :])
+    least, destroyed, together = _production(trajectory, entropy_stored)
+    return Audit(
+        energy=E - E[:1] - booked("energy supply").sum(axis=1),
+        entropy=S - S[:1] - booked("entropy supply").sum(axis=1) - booked("entropy production").sum(axis=1),
+        sites=_sites(trajectory, ledger),
+        energy_scale=_largest(*exchanged),
+        entropy_scale=turned,
+        rtol=trajectory.run.rtol,
+        energy_stored=energy_stored,
+        entropy_stored=entropy_stored,
+        energy_rounding=EPS * energy_stored * roundings + untimed,
+        entropy_rounding=EPS * entropy_stored * roundings,
+        least=least,
+        destroyed=destroyed,
+        destroyed_together=together,
+    )
 
 
-class _Books:
-    def __init__(self, trajectory: Trajectory) -> None:
-        self.trajectory = trajectory
-        self.system = trajectory.model.system
-        self.names = [item.name for item in self.system.outputs]
-        ledger = trajectory.result.ledger_outputs
-        # Transitions at the very start come before the first output.
-        self.ledger = ledger - ledger[:1]
-        self.outputs = trajectory.outputs
+def _sites(trajectory: Trajectory, ledger: Array) -> Array:
+    """Largest residual of the site balances at each output."""
+    system, values = trajectory.model.system, trajectory.everywhere
+    worst = np.zeros(len(ledger))
+    for j, account in enumerate(system.ledger):
+        if account.kind == "bonds":
+            bonds = values[account.law][: len(ledger)]
+            worst = np.maximum(worst, np.abs(bonds - bonds[:1] - ledger[:, j]))
+    return worst
 
-    def column(self, name: str) -> Array:
-        return self.outputs[:, self.names.index(name)]
 
-    def booked(self, kind: str) -> Array:
-        """Ledger columns of a kind, shape (times, accounts)."""
-        columns = [j for j, account in enumerate(self.system.ledger) if account.kind == kind]
-        return self.ledger[:, columns]
+def _production(trajectory: Trajectory, stored: float) -> tuple[dict[str, float], dict[str, float], float]:
+    """Least entropy production of each law over outputs and steps, and the part that it destroys, and all do."""
+    values, least = trajectory.within_bounds, {}
+    for account in trajectory.model.system.ledger:
+        rates = values.get(f"sigma_{account.law}", np.empty(0))
+        if account.kind == "entropy production" and len(rates):
+            # A law that ends the run may have no value there.
+            ended = trajectory.status == "stopped" and len(rates) > 1 and not np.isfinite(rates[-1])
+            least[account.law] = float(np.min(rates[:-1] if ended else rates))
+    destroyed = {law: 0.0 if low >= 0 else _destroyed(trajectory, [law], stored) for law, low in least.items()}
+    together = _destroyed(trajectory, list(least), stored) if any(destroyed.values()) else 0.0
+    return least, destroyed, together
 
-    def between(self) -> Array:
-        """Energies supplied and dissipated by the ends of the steps: a brief load may come and go between outputs."""
-        steps = self.trajectory.result.steps
-        kinds = ("energy supply", "dissipation")
-        columns = [j for j, account in enumerate(self.system.ledger) if account.kind in kinds]
-        return np.zeros((0, 0)) if steps is None else steps.ledger[:, columns]
 
-    def rounding(self) -> float:
-        """Rounding of the total energy at each step, added up, and that of the time in which work was done."""
-        return EPSILON * self.energy_stored * self.roundings + self._untimed()
+def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
+    """Part of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
 
-    @cached_property
-    def energy_stored(self) -> float:
-        """Largest energy in the total, or behind the rounding of its terms [J/m^2]."""
-        return max(self.trajectory.roundings["E_total"] / EPSILON, _largest([self.column("E_total")]))
+    Nothing where it is less than the last digit of the total, which then is the same with it and without.
+    """
+    result, accounts = trajectory.result, trajectory.model.system.ledger
+    points = Points(result.times, result.outputs, trajectory.rates, result.ledger_outputs, segment=result.segment)
+    if result.steps is not None and len(result.steps.t) > 1:
+        points = result.steps
+    ledger = points.ledger.copy()
+    rates = np.array([trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
+    if trajectory.status == "stopped":  # a law that ends there may have no value
+        rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
+        ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:-1])
+    columns = [j for j, a in enumerate(accounts) if a.kind == "entropy production" and a.law in laws]
+    booked, lengths = np.diff(ledger[:, columns].sum(axis=1)), np.diff(points.t)
+    # The end of a step tells of it, but for the first of an arc: between arcs production may jump.
+    seen = rates[1:] * np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, lengths)
+    amount, whole = lost(booked, seen)
+    if amount <= SLACK * trajectory.run.rtol * whole:
+        return 0.0
+    rounded = _rounding_of(trajectory, points, laws, np.flatnonzero((booked < 0) | (seen < 0)))
+    digits = EPS * np.abs(ledger).sum(axis=1)
+    amount, whole = lost(booked, seen, rounded * lengths + digits[1:] + digits[:-1])
+    return 0.0 if amount <= EPS * stored or not whole else float(amount / whole)
 
-    @cached_property
-    def entropy_stored(self) -> float:
-        """Largest entropy in the total, or behind the rounding of its terms [J/(m^2 K)]."""
-        return max(self.trajectory.roundings["S_total"] / EPSILON, self.turned, _largest([self.column("S_total")]))
 
-    def _untimed(self) -> float:
-        """Energy within the last digits of time: of a history that is steep in it no more is known."""
-        steps, model, result = self.trajectory.result.steps, self.trajectory.model, self.trajectory.result
-        if steps is None or not len(steps.t):
-            return 0.0
-        later = model.evaluate(result, steps.t * (1 + EPSILON), steps.y, steps.ydot, steps.segment)
-        now = self.trajectory.everywhere["E_total"][len(result.times) :]
-        return _largest([later[:, self.names.index("E_total")] - now])
-
-    @cached_property
-    def roundings(self) -> int:
-        """Number of last digits that add up."""
-        steps = self.trajectory.result.steps
-        return ROUNDINGS + (0 if steps is None else len(steps.t))
-
-    @cached_property
-    def turned(self) -> float:
-        """Largest entropy that was exchanged or produced [J/(m^2 K)]."""
-        return _largest([self.changes("S_"), self.booked("entropy supply"), self.booked("entropy production")])
-
-    @cached_property
-    def entropy_rounding(self) -> float:
-        """Rounding of the total entropy at each step, added up [J/(m^2 K)]."""
-        return EPSILON * self.entropy_stored * self.roundings
-
-    def changes(self, prefix: str) -> Array:
-        """Changes of the named totals since the start, shape (times, totals)."""
-        columns = [j for j, name in enumerate(self.names) if name.startswith(prefix) and name[2:] in ("1", "2", "c")]
-        return self.outputs[:, columns] - self.outputs[:1, columns]
-
-    def residual(self, total: str, kinds: tuple[str, ...]) -> Array:
-        residual = self.column(total) - self.column(total)[:1]
-        for kind in kinds:
-            residual = residual - self.booked(kind).sum(axis=1)
-        return residual
-
-    def audit(self) -> Audit:
-        exchanged = [self.changes("U_"), self.booked("energy supply"), self.booked("dissipation"), self.between()]
-        least, destroyed, together = self.production()
-        return Audit(
-            energy=self.residual("E_total", ("energy supply",)),
-            entropy=self.residual("S_total", ("entropy supply", "entropy production")),
-            sites=self.sites(),
-            energy_scale=_largest(exchanged),
-            entropy_scale=self.turned,
-            rtol=self.trajectory.run.rtol,
-            energy_stored=self.energy_stored,
-            entropy_stored=self.entropy_stored,
-            energy_rounding=self.rounding(),
-            entropy_rounding=self.entropy_rounding,
-            least=least,
-            destroyed=destroyed,
-            destroyed_together=together,
-        )
-
-    def sites(self) -> Array:
-        accounts = [(j, a.law) for j, a in enumerate(self.system.ledger) if a.kind == "bonds"]
-        states = [state.name for state in self.system.states]
-        y = self.trajectory.result.outputs
-        residuals = np.zeros((len(y), 1 + len(accounts)))
-        for k, (j, name) in enumerate(accounts):
-            bonds = y[:, states.index(name)] if name in states else self.column(name)
-            residuals[:, k] = np.abs(bonds - bonds[:1] - self.ledger[:, j])
-        return np.asarray(residuals.max(axis=1))
-
-    def production(self) -> tuple[dict[str, float], dict[str, float], float]:
-        """Least entropy production of each law over outputs and steps, and the part that it destroys, and all do."""
-        values = self.trajectory.within_bounds
-        laws = [a.law for a in self.system.ledger if a.kind == "entropy production"]
-        columns = {law: self._before_end(values[f"sigma_{law}"]) for law in laws if len(values.get(f"sigma_{law}", ()))}
-        least = {law: float(column.min()) for law, column in columns.items()}
-        destroyed = {law: 0.0 if low >= 0 else self._destroyed([law]) for law, low in least.items()}
-        together = self._destroyed(list(columns)) if any(destroyed.values()) else 0.0
-        return least, destroyed, together
-
-    def _destroyed(self, laws: list[str]) -> float:
-        """Part of the entropy that laws turn over together that they destroy, by the ledger or at the ends of steps.
-
-        Nothing where it is less than the last digit of the total, which then is the same with it and without.
-        """
-        points, ledger = self._points, self._points.ledger.copy()
-        rates = np.array([self.trajectory.within_bounds[f"sigma_{law}"][-len(points.t) :] for law in laws]).sum(axis=0)
-        if self.trajectory.status == "stopped":  # a law that ends there may have no value
-            rates[-1:] = np.nan_to_num(rates[-1:], posinf=0.0, neginf=0.0)
-            ledger[-1:] = np.where(np.isfinite(ledger[-1:]), ledger[-1:], ledger[-2:-1])
-        booked = np.diff(ledger[:, [self._account(law) for law in laws]].sum(axis=1))
-        seen = rates[1:] * self._lengths
-        amount, whole = lost(booked, seen)
-        if amount <= SLACK * self.trajectory.run.rtol * whole:
-            return 0.0
-        rounded = self._rounding_of(laws, np.flatnonzero((booked < 0) | (seen < 0)), len(booked))
-        digits = EPSILON * np.abs(ledger).sum(axis=1)
-        amount, whole = lost(booked, seen, rounded * np.diff(points.t) + digits[1:] + digits[:-1])
-        return 0.0 if amount <= EPSILON * self.entropy_stored else _share(float(amount), float(whole))
-
-    @cached_property
-    def _points(self) -> Points:
-        """The steps, where they are known, else the outputs."""
-        result, rates = self.trajectory.result, self.trajectory.rates
-        if result.steps is not None and len(result.steps.t) > 1:
-            return result.steps
-        return Points(result.times, result.outputs, rates, result.ledger_outputs, segment=result.segment)
-
-    @cached_property
-    def _lengths(self) -> Array:
-        """Lengths of the steps whose ends tell of them: where a stretch ends production may jump."""
-        result, points = self.trajectory.result, self._points
-        return np.where(np.diff(result.segments_at(points.t, points.segment)) > 0, 0.0, np.diff(points.t))
-
-    def _account(self, law: str) -> int:
-        """Column of the ledger that holds the entropy that a law has produced."""
-        accounts = enumerate(self.system.ledger)
-        return next(j for j, a in accounts if a.kind == "entropy production" and a.law == law)
-
-    def _rounding_of(self, laws: list[str], chosen: NDArray[np.int64], count: int) -> Array:
-        """What is rounded of the production of laws during chosen ones of so many steps [W/(m^2 K)]: by how much last
-        digits of all that it depends on change it at the ends of a step, and errors within the tolerance of the states.
-        """
-        model, result, points = self.trajectory.model, self.trajectory.result, self._points
-        ends = np.union1d(chosen, chosen + 1)
-        segment = None if points.segment is None else points.segment[ends]
-        rows = model.inputs(result, points.t[ends], points.y[ends], points.ydot[ends], segment)
-        columns = [self.names.index(f"sigma_{law}") for law in laws]
-        n, known = len(self.system.states), max(EPSILON, SLACK * self.trajectory.run.rtol)
-        part = np.full(rows.shape[1], EPSILON)
-        part[1 : 1 + 2 * n] = known
-        least = np.zeros(rows.shape[1])
-        least[1 : 1 + n] = SLACK * result.problem.atol
-        filler, filled = model.program.filler, model.program.filled(rows.copy())
-        read = filler.reads(rows) if filler else None
-        now = model.output_function(filled)[:, columns]
-        found = EPSILON * np.abs(now)
-        for j in range(rows.shape[1]):
-            if filler and j in filler.positions:
-                continue
-            moved = filled.copy()
-            moved[:, j] += part[j] * np.abs(rows[:, j]) + least[j]
-            if filler and not np.array_equal(filler.reads(moved), read):  # asking what is outside is slow
-                moved = filler(moved)
-            then = model.output_function(moved)[:, columns]
-            found += np.nan_to_num(np.abs(then - now))
-        rates = np.zeros(count + 1)
-        rates[ends] = found.sum(axis=1)
-        return np.maximum(rates[1:], rates[:-1])
-
-    def _before_end(self, values: Array) -> Array:
-        """The values but for that of the last step, where a law that ends there may have none."""
-        ended = self.trajectory.status == "stopped" and len(values) > 1 and not np.isfinite(values[-1])
-        return values[:-1] if ended else values
+def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen: NDArray[np.int64]) -> Array:
+    """Rounding of the production of laws during chosen steps, shape (steps,) [W/(m^2 K)]: by how much last digits of all
+    that it depends on change it at the ends of a step, and errors within the tolerance of the states.
+    """
+    model, result = trajectory.model, trajectory.result
+    ends = np.union1d(chosen, chosen + 1)
+    segment = None if points.segment is None else points.segment[ends]
+    rows = model.inputs(result, points.t[ends], points.y[ends], points.ydot[ends], segment)
+    names = [item.name for item in model.system.outputs]
+    columns = [names.index(f"sigma_{law}") for law in laws]
+    n, part, least = len(model.system.states), np.full(rows.shape[1], EPS), np.zeros(rows.shape[1])
+    part[1 : 1 + 2 * n] = max(EPS, SLACK * trajectory.run.rtol)
+    least[1 : 1 + n] = SLACK * result.problem.atol
+    now = model.output_function(model.program.filled(rows.copy()))[:, columns]
+    found = EPS * np.abs(now)
+    for j in range(rows.shape[1]):
+        moved = rows.copy()
+        moved[:, j] += part[j] * np.abs(rows[:, j]) + least[j]
+        then = model.output_function(model.program.filled(moved))[:, columns]
+        found += np.nan_to_num(np.abs(then - now))
+    rates = np.zeros(len(points.t))
+    rates[ends] = found.sum(axis=1)
+    return np.maximum(rates[1:], rates[:-1])
 
 
 def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any, Any]:
@@ -332,9 +263,5 @@ def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any,
     return np.maximum(*amounts), np.maximum(*wholes)
 
 
-def _share(part: float, whole: float) -> float:
-    return part / whole if whole != 0 else 0.0
-
-
-def _largest(columns: list[Array]) -> float:
-    return max((float(np.max(np.abs(c), initial=0.0)) for c in columns), default=0.0)
+def _largest(*columns: Array) -> float:
+    return max(float(np.max(np.abs(c), initial=0.0)) for c in columns)
