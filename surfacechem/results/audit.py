@@ -227,7 +227,7 @@ def _destroyed(trajectory: Trajectory, laws: list[str], stored: float) -> float:
 
 
 def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen: NDArray[np.int64]) -> Array:
-    """Rounding of the production of laws during chosen steps, shape (steps,) [W/(m^2 K)]: by how much last digits of all
+    """Rounding of the production of laws in chosen steps, shape (steps,) [W/(m^2 K)]: by how much last digits of all
     that it depends on change it at the ends of a step, and errors within the tolerance of the states.
     """
     model, result = trajectory.model, trajectory.result
