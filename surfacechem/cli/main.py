@@ -39,10 +39,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-app.command(epilog=studies.PRECISION_CODES)(studies.precision)
-app.command(epilog=studies.STABILITY_CODES)(studies.stability)
-
-
 def _version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
@@ -286,3 +282,8 @@ def rerun(
         typer.echo(f"{file}: all {len(record.variables)} variables are bit for bit the same")
         if output:
             typer.echo(f"written to {output}")
+
+
+# Last, as `--help` lists the commands in this order.
+app.command(epilog=studies.PRECISION_CODES)(studies.precision)
+app.command(epilog=studies.STABILITY_CODES)(studies.stability)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError, suggestion
 from surfacechem.format.declarations import Context, read
 from surfacechem.format.sections import LINEAR, MOST_AXES, MOST_RUNS, SWEPT, UNTIL, RangeSection, SweepSection
+
+STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
+"""Statistics of the load at rupture, with their words, where runs end at a load."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,29 @@ class Plan:
         """The swept values of each run by path, the last axis fastest."""
         paths = [axis.path for axis in self.axes]
         return [dict(zip(paths, point, strict=True)) for point in product(*(axis.values for axis in self.axes))]
+
+    @property
+    def record(self) -> str:
+        """The plan as a dataset records it."""
+        axes = [{"path": a.path, "values": list(a.values), "logarithmic": a.logarithmic} for a in self.axes]
+        return json.dumps({"axes": axes, "until": list(self.until) if self.until else None})
+
+
+def recorded_plan(record: object) -> Plan:
+    """The plan that a dataset records; InputError where it records none."""
+
+    def numbers(values: Any) -> tuple[float, ...]:
+        if not all(isinstance(value, float | int) for value in values):
+            raise TypeError(values)
+        return tuple(map(float, values))
+
+    try:
+        content = json.loads(str(record))
+        axes = [Axis(str(a["path"]), numbers(a["values"]), a["logarithmic"] is True) for a in content["axes"]]
+        until = content["until"]
+        return Plan(axes, (str(until[0]), numbers(until[1:])[0]) if until else None)
+    except (LookupError, TypeError, ValueError, RecursionError):
+        raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
 
 def plan_of(section: SweepSection, units: Mapping[str, str], until: Mapping[str, float] | None = None) -> Plan:

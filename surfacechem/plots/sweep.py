@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
+from surfacechem.format.plans import STATISTICS, recorded_plan
 from surfacechem.format.sections import MOST_AXES
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_text, varies
-from surfacechem.runs.sweep_dataset import WORDS, recorded_plan
 
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "μ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"))
 
@@ -58,7 +58,7 @@ def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Ca
         if name not in known:
             raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
     load = next((name.removesuffix("_mode") for name in known if name.endswith("_mode")), "")
-    if not variables and {f"{load}_{which}" for which in WORDS} <= set(known):
+    if not variables and {f"{load}_{which}" for which in STATISTICS} <= set(known):
         return [partial(_draw_spectrum, dataset=dataset, load=load)]
     groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset, known) or [["time_reached"]]
     return [partial(_draw_final, dataset=dataset, names=names) for names in groups]
@@ -91,7 +91,7 @@ def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
 def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     """Most probable, median and mean load at rupture, the exact ones as lines."""
     x, (scale, prefixed) = dataset[_axes(dataset)[0]].values, _prefixed(dataset[f"{load}_mean"])
-    for (which, word), colour, marker in zip(WORDS.items(), COLOURS, "osD", strict=False):
+    for (which, word), colour, marker in zip(STATISTICS.items(), COLOURS, "osD", strict=False):
         every = max(1, len(x) // 40)
         for j, (values, label) in enumerate(_curves(dataset, dataset[f"{load}_{which}"].values)):
             (points,) = ax.plot(x[::every], values[::every] / scale, marker, color=colour, markersize=3.5)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
     from surfacechem.runs.check import Group
-    from surfacechem.runs.sweep_dataset import SweepAccuracy, SweepSolution
-    from surfacechem.runs.sweeps import Sweep
+    from surfacechem.runs.sweep_dataset import SweepSolution
+    from surfacechem.runs.sweeps import Sweep, SweepAccuracy
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Run, Trajectory
 

@@ -14,10 +14,11 @@ import numpy as np
 from surfacechem import format as cases
 from surfacechem import solve as solvers
 from surfacechem.errors import InputError, Place
+from surfacechem.format.plans import recorded_plan
 from surfacechem.results.netcdf import reading
 from surfacechem.results.solution import Solution
 from surfacechem.runs.simulation import Simulation
-from surfacechem.runs.sweep_dataset import SweepSolution, recorded_plan
+from surfacechem.runs.sweep_dataset import SweepSolution
 
 A = TypeVar("A")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,7 +31,6 @@ from surfacechem.units import parse
 if TYPE_CHECKING:
     from surfacechem.format.plans import Plan
     from surfacechem.runs.sweep_dataset import SweepSolution
-    from surfacechem.runs.sweeps import Sweep
 
 
 def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
@@ -93,7 +92,7 @@ class Simulation:
         if (freed := self._with_freed(values)) is not self:
             return freed.run(values, settings, error)
         values = {path: value for path, value in values.items() if path not in self.system.constants}
-        chosen, trajectory, cells = self._as_accurate(settings)._resolved(settings, values)
+        chosen, (trajectory,), errors = self._resolved(settings, values)
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
             trajectory, estimate = verified(trajectory)
@@ -101,12 +100,12 @@ class Simulation:
         unused = case.reference.fixed if case.reference and self._departs(values) else case.unused
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
 
-        def cell_errors() -> CellErrors:
-            nonlocal cells
-            cells = cells or chosen._cell_errors(trajectory)
-            return cells
+        def cells() -> CellErrors:
+            if not errors:
+                errors.append(chosen._cell_errors(trajectory))
+            return errors[0]
 
-        found = accuracy(trajectory, case.scene, exact, error, cell_errors, estimate)
+        found = accuracy(trajectory, case.scene, exact, error, cells, estimate)
         if unused and error == "auto":
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
@@ -119,17 +118,13 @@ class Simulation:
             changes=values,
             case_run=case.run,
             error_from=error,
-            notes=spatial.missed(case.scene, cells or CellErrors(), found),
+            notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),
         )
 
     def _departs(self, values: Mapping[str, float]) -> bool:
         """Whether values are other than those of the case."""
         own = self.model.values()
         return any(own[path] != value for path, value in values.items())
-
-    def _as_accurate(self, run: Run) -> Simulation:
-        """The same with cells as accurate as the run is asked to be, where an accuracy chooses them."""
-        return self._with(spatial.tightened(self.case.scene, run.accuracy))
 
     def _with(self, scene: Scene) -> Simulation:
         """The same with the cells of another scene, assembled and compiled once for each choice of them."""
@@ -138,36 +133,44 @@ class Simulation:
             self._grids[key] = Simulation(replace(self.case, scene=scene), self._grids)
         return self._grids[key]
 
-    def _graded(self, points: Sequence[Mapping[str, float]], times: Sequence[float]) -> Simulation:
-        """The same with cells that resolve what runs with these values look at first, if an accuracy chooses."""
-        if spatial.wanted(self.case.scene) is None:
-            return self
-        return self._with(spatial.suited(self.case.scene, spatial.layers(self.system, points, times)))
-
-    def _resolved(self, settings: Run, values: Mapping[str, float]) -> tuple[Simulation, Trajectory, CellErrors | None]:
-        """With the cells that its accuracy needs: the simulation, its run and, where it asks for an accuracy, the
-        errors of the cells.
+    def _resolved(
+        self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None
+    ) -> tuple[Simulation, Sequence[Trajectory], list[CellErrors]]:
+        """The simulation with the cells that its accuracy needs, its run or its runs over a plan, and the errors of the
+        cells of each where an accuracy chooses all of them.
         """
-        chosen = self
-        if spatial.wanted(self.case.scene) is not None:
-            point = values_of(self.system, values)
-            chosen = self._graded([point], [spatial.shortest(self.system, settings, point)])
-        trajectory = chosen._solved(settings, values)
-        if chosen is self:
-            return self, trajectory, None
-        errors = chosen._halved(trajectory, given=False)
-        for _ in range(spatial.TRIALS):
-            finer = spatial.refined(chosen.case.scene, errors, chosen._layers(trajectory))
-            if finer is None:
-                break
-            chosen = self._with(finer)
-            trajectory = chosen._solved(settings, values)
-            errors = chosen._halved(trajectory, given=False)
-        return chosen, trajectory, None if spatial.fixed(self.case.scene) else errors
+        chosen = self._with(spatial.tightened(self.case.scene, settings.accuracy))
+        scene, system = chosen.case.scene, chosen.system
+        if spatial.wanted(scene) is None:
+            return chosen, chosen._solved(settings, values, plan, threads), []
+        from surfacechem.runs import sweeps
 
-    def _solved(self, run: Run, values: Mapping[str, float]) -> Trajectory:
+        points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]
+        runs = sweeps.settings(system, plan, settings, points) if plan else [settings]
+        times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
+        cells: Scene | None = spatial.suited(scene, spatial.layers(system, points, times))
+        for _ in range(1 + spatial.TRIALS):
+            if cells is None:
+                break
+            chosen = self._with(cells)
+            done = chosen._solved(settings, values, plan, threads)
+            errors = [chosen._halved(run, given=False) for run in done]
+            cells = spatial.refined(cells, spatial.worst(errors), chosen._layers(*done))
+        return chosen, done, [] if spatial.fixed(scene) else errors
+
+    def _solved(
+        self, settings: Run, values: Mapping[str, float], plan: Plan | None = None, threads: int | None = None
+    ) -> Sequence[Trajectory]:
+        """The run with these values, or the runs over a plan: a run is a batch of one."""
         try:
-            return self.model.solve(run, values)
+            if plan is None:
+                return [self.model.solve(settings, values)]
+            from surfacechem.runs import sweeps
+
+            key = plan.until[0] if plan.until else ""
+            if key not in self._sweep_models:
+                self._sweep_models[key] = Model(sweeps.prepared(self.system, plan)) if key else self.model
+            return sweeps.solve(self._sweep_models[key], plan, settings, values, threads)
         except InputError as error:
             raise self.case.located(error) from None
 
@@ -189,7 +192,7 @@ class Simulation:
         if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
             return found
         other = self._with(spatial.suited(scene, parts, given=True))
-        held_against = other._solved(trajectory.run, self._changes(trajectory))
+        held_against = other._as_before(trajectory)
         own = other._halved(held_against)
         found = CellErrors(spatial.differences(held_against, trajectory), source="and one with cells that suit")
         return own.added_to(found)
@@ -198,16 +201,15 @@ class Simulation:
         """Errors of the cells from runs with a half and a quarter of them; without ``given`` of those that an accuracy
         chooses only.
         """
-        runs = [trajectory]
-        for divisor in (2, 4):
-            coarser = self._with(spatial.part(self.case.scene, divisor, given))
-            runs.append(coarser._solved(trajectory.run, self._changes(trajectory)))
+        coarser = [self._with(spatial.part(self.case.scene, divisor, given)) for divisor in (2, 4)]
+        runs = [trajectory, *(simulation._as_before(trajectory) for simulation in coarser)]
         near, far = (spatial.differences(*pair) for pair in pairwise(runs))
         return spatial.judged(near, far, trajectory.run.rtol)
 
-    def _changes(self, trajectory: Trajectory) -> dict[str, float]:
-        """The values of a run that another number of cells has, too."""
-        return {path: value for path, value in trajectory.values.items() if path in self._units}
+    def _as_before(self, trajectory: Trajectory) -> Trajectory:
+        """A run with other cells again with these, which share its values but for those of the cells."""
+        values = {path: value for path, value in trajectory.values.items() if path in self._units}
+        return self._solved(trajectory.run, values)[0]
 
     def sweep(
         self,
@@ -227,53 +229,25 @@ class Simulation:
         self, plan: Plan, changes: Mapping[str, float | str] | None = None, threads: int | None = None
     ) -> SweepSolution:
         """Run a plan whose values are in SI."""
-        from surfacechem.runs import sweeping
+        from surfacechem.runs import sweeps
+        from surfacechem.runs.sweep_dataset import SweepSolution
 
         constants = self.system.constants
         values = self._values(changes or {})
+        # A default that is swept needs a symbol, so that the equations are assembled for any other value of it.
         swept = {axis.path: axis.values for axis in plan.axes if axis.path in constants}
-        others = {path: _besides(constants[path][1], xs) for path, xs in swept.items()}
+        others = {
+            path: next((x for x in xs if x != constants[path][1]), math.nextafter(constants[path][1], math.inf))
+            for path, xs in swept.items()
+        }
         if (freed := self._with_freed({**values, **others})) is not self:
             return freed.sweep_plan(plan, values, threads)
         values = {path: value for path, value in values.items() if path not in constants}
-        chosen, done, errors = self._as_accurate(self.case.run)._swept_resolved(plan, values, threads)
-        return sweeping.solution(
-            chosen.case, done, values, threads, lambda: errors or [chosen._cell_errors(run) for run in done]
-        )
-
-    def _swept_resolved(
-        self, plan: Plan, values: Mapping[str, float], threads: int | None
-    ) -> tuple[Simulation, Sweep, list[CellErrors]]:
-        """With cells that are accurate enough for every run, as :meth:`_resolved` has them for one."""
-        from surfacechem.runs import sweeping
-
-        chosen, search = self, spatial.wanted(self.case.scene) is not None
-        if search:
-            points = [values_of(self.system, {**values, **point}) for point in plan.points]
-            runs = sweeping.settings(self.system, plan, self.case.run, points)
-            pairs = zip(runs, points, strict=True)
-            chosen = self._graded(points, [spatial.shortest(self.system, *pair) for pair in pairs])
-        done = chosen._swept(plan, values, threads)
-        errors = [chosen._halved(run, given=False) for run in done] if search else []
-        for _ in range(spatial.TRIALS if search else 0):
-            finer = spatial.refined(chosen.case.scene, spatial.worst(errors), chosen._layers(*done))
-            if finer is None:
-                break
-            chosen = self._with(finer)
-            done = chosen._swept(plan, values, threads)
-            errors = [chosen._halved(run, given=False) for run in done]
-        return chosen, done, [] if spatial.fixed(self.case.scene) else errors
-
-    def _swept(self, plan: Plan, values: Mapping[str, float], threads: int | None) -> Sweep:
-        from surfacechem.runs import sweeping
-
-        key = plan.until[0] if plan.until else ""
-        try:
-            if key not in self._sweep_models:
-                self._sweep_models[key] = Model(sweeping.prepared(self.system, plan)) if key else self.model
-            return sweeping.solve(self._sweep_models[key], plan, self.case.run, values, threads)
-        except InputError as error:
-            raise self.case.located(error) from None
+        chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
+        assert isinstance(done, sweeps.Sweep)
+        cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
+        case, found = chosen.case, sweeps.accuracy(chosen.case, done, threads, cells)
+        return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", found, values)
 
     def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
         from surfacechem.format.plans import plan_of, read_sweep, read_until
@@ -317,11 +291,6 @@ class Simulation:
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
-
-
-def _besides(default: float, values: Sequence[float]) -> float:
-    """The first value that is not the default, else the next number."""
-    return next((value for value in values if value != default), math.nextafter(default, math.inf))
 
 
 def _listed(values: object) -> object:

@@ -11,26 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.errors import InputError
-from surfacechem.format.plans import Axis, Plan
+from surfacechem.format.plans import STATISTICS, Axis, Plan
 from surfacechem.model.system import System
 from surfacechem.results.dataset import Results, quantities, quantity_columns
 from surfacechem.results.event_table import entropy_destroyed, event_columns
 from surfacechem.results.netcdf import Column, versions
-from surfacechem.runs.sweeps import Sweep
+from surfacechem.runs.sweeps import Sweep, SweepAccuracy
 
 Array = NDArray[np.float64]
-
-WORDS = {"mode": "most probable", "median": "median", "mean": "mean"}
-
-
-@dataclass(frozen=True)
-class SweepAccuracy:
-    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
-
-    errors: Array
-    source: str
-    exact: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)
@@ -181,7 +169,7 @@ class SweepSolution(Results):
     def _statistics(self) -> list[Column]:
         columns = []
         exact = self.accuracy.exact if self.accuracy else {}
-        for which, word in WORDS.items() if self.sweep.statistics else ():
+        for which, word in STATISTICS.items() if self.sweep.statistics else ():
             quantity = quantities(self.system)[self.inner]
             found = np.array([getattr(statistics, which) for statistics in self.sweep.statistics])
             text = f"{word} {quantity.long_name} at rupture"
@@ -203,7 +191,7 @@ class SweepSolution(Results):
             error = {"error": worst, "error_source": self.accuracy.source}
         return {
             **self._origin(run),
-            "sweep": json.dumps(_recorded(self.plan)),
+            "sweep": self.plan.record,
             **({"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}),
             "status": self.status,
             "reason": self.ends,
@@ -220,27 +208,3 @@ class SweepSolution(Results):
             "site_error": sweep.worst("site"),
             "versions": versions(),
         }
-
-
-def _recorded(plan: Plan) -> dict[str, object]:
-    axes = [{"path": a.path, "values": list(a.values), "logarithmic": a.logarithmic} for a in plan.axes]
-    return {"axes": axes, "until": list(plan.until) if plan.until else None}
-
-
-def recorded_plan(text: object) -> Plan:
-    """The plan that an attribute ``sweep`` records; InputError where it records none."""
-    try:
-        content = json.loads(str(text))
-        axes = [
-            Axis(str(axis["path"]), _numbers(axis["values"]), axis["logarithmic"] is True) for axis in content["axes"]
-        ]
-        until = content["until"]
-        return Plan(axes, (str(until[0]), _numbers(until[1:])[0]) if until else None)
-    except (LookupError, TypeError, ValueError, RecursionError):
-        raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
-
-
-def _numbers(values: Any) -> tuple[float, ...]:
-    if not all(isinstance(value, float | int) for value in values):
-        raise TypeError(values)
-    return tuple(map(float, values))

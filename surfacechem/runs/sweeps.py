@@ -1,26 +1,45 @@
-"""Sweeps: a grid of parameter values, and the runs over it."""
+"""Sweeps: a grid of parameter values, the runs over it, and how far each of them is from the truth."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
-from surfacechem.format.plans import Plan
+from surfacechem.format import Case
+from surfacechem.format.plans import STATISTICS, Plan
 from surfacechem.model.system import System
+from surfacechem.references.base import SceneView
+from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
+from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
+from surfacechem.results.event_table import event_times
+from surfacechem.results.matching import exact_values, match
 from surfacechem.runs import spectrum
 from surfacechem.runs.spectrum import Statistics
+from surfacechem.scene import Scene
 from surfacechem.solve.run import Model, Run, Trajectory
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepAccuracy:
+    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
+
+    errors: NDArray[np.float64]
+    source: str
+    exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sweep(Sequence[Trajectory]):
     """Runs over a grid, in the order of :attr:`Plan.points`."""
 
     model: Model
@@ -37,7 +56,7 @@ class Sweep:
         """The runs in order."""
         return iter(self.runs)
 
-    def __getitem__(self, i: int) -> Trajectory:
+    def __getitem__(self, i: Any) -> Any:
         """One run."""
         return self.runs[i]
 
@@ -119,3 +138,68 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
             raise InputError(message, path="sweep.until")
         runs.append(replace(run, times=tuple((shape * ((target - start) / slope)).tolist())))
     return runs
+
+
+def accuracy(case: Case, done: Sweep, threads: int | None, cells: Callable[[], Sequence[CellErrors]]) -> SweepAccuracy:
+    """How far each run is from the truth: from the exact solution of the case, else from a second sweep; not a number
+    where that is not known. ``cells`` finds the errors of the cells across bodies of each run.
+    """
+    unused, named = case.unused, case.reference
+    if named is not None and not named.options:
+        try:
+            return _against_exact(case.scene, done, named.name, threads)
+        except InputError as error:
+            unused = f"the exact solution {named.name} is not of this scene: {error.message}"
+    elif named is not None:
+        unused = named.fixed
+    second, left = _second(done, threads), cells()
+    if done.statistics:
+        errors = [_of_statistics(done, i, second.statistics[i]) + found.largest for i, found in enumerate(left)]
+    else:
+        errors = [with_cells(estimated(*pair), found).error for *pair, found in zip(done, second, left, strict=True)]
+    source = ", ".join([second_run(second.run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
+    if unknown := sum(not found.converged for found in left):
+        source += f"; unknown in {unknown} of {len(left)} runs: {UNKNOWN}"
+    return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))))
+
+
+def _second(done: Sweep, threads: int | None) -> Sweep:
+    """The runs at another tolerance, as :meth:`Model.resolve` has each."""
+    rtol = second_tolerance(done.run.rtol)
+    pairs = [(run.run.second(rtol), run.values) for run in done]
+    runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=True)
+    return replace(done, run=done.run.second(rtol), runs=runs)
+
+
+def _against_exact(scene: Scene, done: Sweep, name: str, threads: int | None) -> SweepAccuracy:
+    """Errors of the load at rupture, else of all; InputError where the solution is not that of every run.
+
+    For the loads at rupture that is tested on the outermost runs. A run with one output has nothing to compare but its
+    events, one without any has no error.
+    """
+    begun = [i for i, run in enumerate(done) if len(run.result.times) > 1]
+    if not begun:
+        raise InputError("no run reached a second output.")
+    second = cache(lambda: _second(done, threads))
+    errors = np.full(len(done), np.nan)
+    exact = {which: np.full(len(done), np.nan) for which in STATISTICS if done.statistics}
+    for i, run in enumerate(done):
+        if len(run.result.times) < 2:
+            errors[i] = estimated(run, second()[i]).error if len(run.result.times) else np.nan
+        elif exact:
+            if i in (begun[0], begun[-1]):
+                exact_values(name, {}, scene, run)
+            reference = match(references.get(name), {}, SceneView(scene, run))
+            errors[i] = _of_statistics(done, i, reference)
+            for which, values in exact.items():
+                values[i] = getattr(reference, which)
+        else:
+            errors[i] = against_exact(run, scene, name, {}, second()[i] if event_times(run) else None).error
+    return SweepAccuracy(errors, f"exact solution {name}", exact)
+
+
+def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
+    """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
+    pairs = [(getattr(done.statistics[i], which), getattr(exact, which)) for which in STATISTICS]
+    errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
+    return max(max(errors), ROUNDING)
