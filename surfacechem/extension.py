@@ -12,7 +12,6 @@ import math
 import warnings
 import weakref
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, fields
 from typing import Any, ClassVar
 
 import cantera
@@ -26,7 +25,7 @@ from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
 from surfacechem.mechanism.source import sides
 from surfacechem.mechanism.thermo import KILO
-from surfacechem.mechanism.values import converted
+from surfacechem.mechanism.values import converted, own_parameters
 from surfacechem.quantities import BOLTZMANN, VARIABLES
 
 __all__ = ["LoadedInterface"]
@@ -111,26 +110,16 @@ class LoadedRate(cantera.ExtensibleRate):
             "Ea": _number(node.units, "Ea", constant["Ea"], "J/mol"),
             "coverage": tuple(_coverage_term(node.units, name, item) for name, item in sorted(coverage.items())),
         }
-        values |= self._own(node, own)
+        who = f"a rate of type {self.kind}"
+        values |= own_parameters(
+            self.law, own, node, who, lambda key, spec: _number(node.units, key, node[key], spec.unit)
+        )
         reactants, products, reversible = sides(equation)
         orders = reactants | {str(name): float(order) for name, order in (node.get("orders") or {}).items()}
         change = {name: products.get(name, 0.0) - reactants.get(name, 0.0) for name in (*reactants, *products)}
         structure = {"equation": equation, "orders": orders, "products": products, "change": change}
         values |= {"number": "R", "species": (), "reversible": reversible, **structure}
         return self.law(**values)
-
-    def _own(self, node: Any, own: Mapping[str, str]) -> dict[str, Any]:
-        """Parameters of the load's factor."""
-        specs = dict(self.law.specs())
-        optional = {item.name for item in fields(self.law) if item.default is not MISSING}
-        found = {}
-        for key, name in own.items():
-            if key in node:
-                found[name] = _number(node.units, key, node[key], specs[name].unit)
-            elif name not in optional:
-                message = f"a rate of type {self.kind} needs `{key}`: {specs[name].text} [{specs[name].unit}]."
-                raise InputError(message)
-        return found
 
     def get_parameters(self, node: Any) -> None:
         """Write the entry of the reaction in the units of its file."""

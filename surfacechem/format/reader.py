@@ -331,7 +331,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     With ``evaluate`` what is not lowered is left to Cantera.
     """
     from surfacechem.mechanism import load_mechanism
-    from surfacechem.mechanism.neighbours import Neighbour
+    from surfacechem.mechanism.evaluated import Neighbour
 
     section = named if isinstance(named, MechanismSection) else MechanismSection(file=named)
     file = section.file if Path(section.file).suffix in (".yaml", ".yml") else f"{section.file}.yaml"

@@ -1,24 +1,126 @@
-"""Reactions that are not lowered: Cantera itself gives their rates while a scene runs.
+"""Reactions that are not lowered, and the phases beside a surface: Cantera gives their rates while a scene runs.
 
-Their heat follows from the potential like that of any other reaction, since the thermo of surface species is lowered.
-What reactions take from phases beside the surface brings its enthalpy and its entropy with it, which Cantera gives too.
+The heat of such a reaction follows from the potential like that of any other, since the thermo of surface species is
+lowered. Neighbours, gases and solids, are held at a composition and at the temperature of the interface: what reactions
+take from them, or give to them, leaves them as they are, and brings its enthalpy and its entropy with it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from surfacechem.contracts.terms import option, parameter
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression
 from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
-from surfacechem.mechanism.neighbours import Held
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.mechanism.thermo import KILO
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""
+
+GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
+"""Cantera's models of phases whose pressure matters."""
+
+FARADAY = 9.648533212331001e7
+"""Charge of a kmol of elementary charges [C/kmol]."""
+
+SUM_TOLERANCE = 1e-6
+"""How far mole fractions may miss one."""
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """The state in which a phase beside the surface is held."""
+
+    pressure: float | None = None
+    """[Pa]; None where it is not given."""
+    composition: Mapping[str, float] = field(default_factory=dict)
+    """Mole fractions."""
+    electric_potential: float = 0.0
+    """Against the surface [V]."""
+    place: Place | None = None
+
+
+class Held:
+    """Phases beside a surface at their given states, and what reactions take from them."""
+
+    def __init__(self, surface: Any, reactions: Sequence[int]) -> None:
+        self.phases = list(surface.adjacent.values())
+        self._pressures = [float(phase.P) for phase in self.phases]
+        rows = [surface.kinetics_species_index(name) for phase in self.phases for name in phase.species_names]
+        lost = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
+        self._taken = np.asarray(lost)[np.ix_(rows, list(reactions))].T if rows else np.zeros((len(reactions), 0))
+        self._charged = [FARADAY * phase.electric_potential * phase.charges for phase in self.phases]
+
+    def warm(self, T: float) -> None:
+        """Bring the phases to a temperature [K]."""
+        for phase, pressure in zip(self.phases, self._pressures, strict=True):
+            phase.TP = T, pressure
+
+    def taken(self) -> list[float]:
+        """Enthalpy, then Gibbs energy, that each reaction takes, electric energy included [J/kmol]."""
+        found: list[float] = []
+        for energy in ("partial_molar_enthalpies", "chemical_potentials"):
+            own = [getattr(x, energy) + charged for x, charged in zip(self.phases, self._charged, strict=True)]
+            found.extend(self._taken @ np.concatenate(own))
+        return found
+
+
+def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> None:
+    """Bring the neighbours of a surface to their states; InputError where one is missing, unknown or odd."""
+    for name, state in given.items():
+        if name not in surface.adjacent:
+            message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
+            raise InputError(message, state.place)
+    for name, phase in surface.adjacent.items():
+        state = given.get(name, Neighbour(place=place))
+        gas, known = phase.thermo_model in GASES, phase.species_names
+        missing = "composition" if len(known) > 1 and not state.composition else ""
+        if gas and state.pressure is None:
+            missing = "pressure"
+        if missing:
+            example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
+            message = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
+            raise InputError(message, state.place)
+        for species in state.composition:
+            if species not in known:
+                message = f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
+                raise InputError(message, state.place)
+        total = sum(state.composition.values())
+        if state.composition and abs(total - 1) > SUM_TOLERANCE:
+            message = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
+            raise InputError(message, state.place)
+        if state.composition:
+            phase.X = dict(state.composition)
+        if state.pressure is not None:
+            phase.TP = phase.T, state.pressure
+        phase.electric_potential = state.electric_potential
+
+
+def remarks(surface: Any) -> tuple[str, ...]:
+    """Species that a neighbour does not hold, though reactions give them to it."""
+    back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
+    made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)
+    there = (
+        (name, part)
+        for phase in surface.adjacent.values()
+        for name, part in zip(phase.species_names, phase.X, strict=True)
+    )
+    found = [name for name, part in there if part == 0 and made[surface.kinetics_species_index(name)] > 0]
+    if not found:
+        return ()
+    names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
+    text = (
+        f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "
+        "entropy is counted as at a mole fraction of 1e-300."
+    )
+    return (text,)
 
 
 class EvaluatedReaction(MechanismReaction):
@@ -86,22 +188,19 @@ class SurfaceEngine:
 
         Then the enthalpy and the Gibbs energy [J] that each reaction with neighbours takes from them.
         """
-        if values != self._last[0]:
-            self._last = values, self._evaluate(values)
-        return self._last[1]
-
-    def _evaluate(self, values: Sequence[float]) -> Sequence[float]:
+        if values == self._last[0]:
+            return self._last[1]
         T, amount, *coverages = values
-        if not (T > 0 and amount > 0):
-            return [math.nan] * len(self.gives)
-        self.surface.TP = T, None
-        if self.held is not None:
-            self.held.warm(T)
-        self.surface.site_density = amount * self._sites / MOLECULAR
-        self.surface.set_unnormalized_coverages(coverages)
-        rates = self.surface.net_rates_of_progress
-        found = [float(rates[i]) * MOLECULAR for i in self.positions]
-        if self.held is None:
-            return found
-        taken = (self.held.enthalpies(), self.held.gibbs_energies())
-        return found + [float(energy) / MOLECULAR for energies in taken for energy in energies]
+        found = [math.nan] * len(self.gives)
+        if T > 0 and amount > 0:
+            self.surface.TP = T, None
+            if self.held is not None:
+                self.held.warm(T)
+            self.surface.site_density = amount * self._sites / MOLECULAR
+            self.surface.set_unnormalized_coverages(coverages)
+            rates = self.surface.net_rates_of_progress
+            found = [float(rates[i]) * MOLECULAR for i in self.positions]
+            if self.held is not None:
+                found += [float(energy) / MOLECULAR for energy in self.held.taken()]
+        self._last = values, found
+        return found

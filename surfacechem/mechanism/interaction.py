@@ -18,11 +18,10 @@ Source: Cantera's CoverageDependentSurfPhase; Maxwell's relation of a potential 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, log, where
 from surfacechem.mechanism.source import Source
 from surfacechem.mechanism.thermo import KILO
@@ -143,7 +142,7 @@ class Interaction:
 
 KEY = "coverage-dependencies"
 
-MODEL = "coverage-dependent-surface"
+DEPENDENT = "coverage-dependent-surface"
 """The model of the phase in which species have it."""
 
 CURVES = {
@@ -167,53 +166,6 @@ TOGETHER = (
     *(("enthalpy-low", "enthalpy-high", "enthalpy-change"), ("entropy-low", "entropy-high", "entropy-change")),
 )
 """Keys that need each other."""
-
-
-def check_dependence(source: Source, phase: Any, entry: Any, names: Iterable[str]) -> None:
-    """Raise InputError where the coverage-dependent thermo of a species is not what Cantera takes it for."""
-    node, title = entry.get(KEY), f"species {entry.get('name')}: {KEY}"
-    if node is None:
-        return
-    if phase.get("thermo") != MODEL:
-        message = f"{title}: only a phase with `thermo: {MODEL}` reads this; give the phase that, or remove it."
-        raise InputError(message, source.place(entry, KEY))
-    if not isinstance(node, Mapping) or not all(isinstance(inner, Mapping) for inner in node.values()):
-        raise InputError(f"{title}: write `{{species: {{model: linear, enthalpy: ...}}}}`.", source.place(entry, KEY))
-    for name, inner in node.items():
-        if name not in names:
-            raise InputError(f"{title}: no species '{name}'.{suggestion(str(name), names)}", source.place(node, name))
-        _check_one(source, entry, inner, f"{title}: {name}")
-
-
-def _check_one(source: Source, entry: Any, node: Any, title: str) -> None:
-    model = str(node.get("model"))
-    if model not in CURVES:
-        raise InputError(f"{title}: no model '{model}'.{suggestion(model, CURVES)}", source.place(node, "model"))
-    known = ("model", "units", *CURVES[model], *CAPACITY)
-    counts = "quantity" in {**source.defaults(entry), **(node.get("units") or {})}
-    for key, value in node.items():
-        place = source.place(node, key)
-        if key not in known:
-            raise InputError(f"{title}: unknown key '{key}'.{suggestion(str(key), known)}", place)
-        if key.endswith("-coefficients") and (not isinstance(value, list) or len(value) != COEFFICIENTS):
-            raise InputError(f"{title}: {key} are {COEFFICIENTS} numbers; those that are not there are 0.", place)
-        if not counts and key not in ("model", "units") and not key.endswith(("-change", "-coverages")):
-            _check_bare(source, node, key, title)
-    for group in TOGETHER:
-        given = [key for key in group if key in node]
-        if given and len(given) < len(group):
-            missing = next(key for key in group if key not in node)
-            raise InputError(f"{title}: {given[0]} needs `{missing}` too.", source.place(node, given[0]))
-
-
-def _check_bare(source: Source, node: Any, key: str, title: str) -> None:
-    many = node[key] if isinstance(node[key], list) else [node[key]]
-    if any(isinstance(x, int | float) and x for x in many):
-        message = (
-            f"{title}: {key} without a unit counts in kmol. Say what it counts in, such as "
-            "`units: {energy: eV, quantity: molec}` beside it."
-        )
-        raise InputError(message, source.place(node, key))
 
 
 def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tuple[Interaction, ...]:
@@ -245,7 +197,7 @@ class _Reader:
         found = [float(units.convert_to(x, unit)) / KILO for x in (value if isinstance(value, list) else [value])]
         if not all(map(math.isfinite, found)):
             message = f"species {self.entry['name']}: {KEY}: {key} must be finite, got {value}."
-            raise InputError(message, self.source.place(self.node, key))
+            raise self.source.error(message, self.node, key)
         return found
 
     def number(self, key: str) -> float:

@@ -7,25 +7,31 @@ import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
 from surfacechem.documents import shipped as data
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.evaluated import EvaluatedReaction, NeighbourReaction, SurfaceEngine
-from surfacechem.mechanism.interaction import interactions
-from surfacechem.mechanism.keys import check, has_neighbours
-from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, unpaired
-from surfacechem.mechanism.neighbours import Neighbour, hold, remarks
+from surfacechem.mechanism.evaluated import (
+    EvaluatedReaction,
+    Neighbour,
+    NeighbourReaction,
+    SurfaceEngine,
+    hold,
+    remarks,
+)
+from surfacechem.mechanism.interaction import KEY, interactions
+from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
+from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, Spring, unpaired
 from surfacechem.mechanism.rate_types import kind_of, names
 from surfacechem.mechanism.rates import plain
-from surfacechem.mechanism.remedies import is_evaluated
 from surfacechem.mechanism.source import LIMITS, Source, sides
 from surfacechem.mechanism.thermo import KILO, lower
-from surfacechem.mechanism.values import rate_fields, spring
+from surfacechem.mechanism.values import number, own_parameters
 from surfacechem.scene import BondingVariable, Engine, Sites
 
 NONE: Mapping[str, Neighbour] = {}
@@ -90,22 +96,31 @@ def load_mechanism(
     path = _find(Path(path), place)
     source = Source(name or str(path), document.read(path, name, LIMITS))
     entry = source.phase(phase, place)
-    check(source, entry, evaluate)
+    Check(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
     hold(surface, neighbours, place)
-    parsed = _parsed(surface, source, entry)
-    species = _species(surface, source, entry, any(outside for _, _, outside in parsed))
-    chosen = _bonds(species, bonds, place)
+    kept = _kept(source, entry, surface)
+    species = _species(surface, source, entry, any(outside for _, _, outside in kept))
+    by_name = {item.name: item for item in species}
+    for bond in bonds or ():
+        if bond not in by_name:
+            raise InputError(f"bonds: no species '{bond}' in the mechanism.{suggestion(bond, by_name)}", place)
+    chosen = [by_name[bond] for bond in dict.fromkeys(bonds or ())]
     density = surface.site_density * KILO * AVOGADRO
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
     temperatures = (float(surface.min_temp), float(surface.max_temp))
-    place = _law_place(source, entry, "interface.mechanism")
-    mixture = IdealMixture(species=species, temperatures=temperatures, place=place)
+    mixture_place = source.place(entry, path="interface.mechanism")
+    mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
     reactions: list[RateLaw] = []
-    for number, (reaction, item, outside) in enumerate(parsed, start=1):
-        make = _evaluated if outside else _lowered
-        reactions.append(make(reaction, source, item, f"R{number}", species))
+    for i, (reaction, item, outside) in enumerate(kept, start=1):
+        label = f"R{i}"
+        at = source.place(item, path=f"{REACTIONS}.{label}")
+        if outside:
+            reactions.append(_evaluated(reaction, label, species, at))
+        else:
+            reactions.append(_lowered(reaction, source, item, label, species, at))
+    evaluated = {i: law for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)}
     return Mechanism(
         potentials=(mixture,),
         reactions=tuple(reactions),
@@ -116,20 +131,14 @@ def load_mechanism(
         species={item.name: item.variable for item in species},
         phase=str(entry["name"]),
         temperatures=temperatures,
-        engine=_engine(surface, species, reactions),
+        engine=SurfaceEngine(surface, species, evaluated) if evaluated else None,
         remarks=(*said, *remarks(surface)),
     )
 
 
-def _engine(surface: Any, species: tuple[Species, ...], reactions: Sequence[RateLaw]) -> Engine | None:
-    evaluated = {i: law for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)}
-    return SurfaceEngine(surface, species, evaluated) if evaluated else None
-
-
 def _find(path: Path, place: Place | None) -> Path:
     """The file, or the one of that name that comes with the package."""
-    shipped = data.mechanisms() / path.name
-    for candidate in (path, shipped):
+    for candidate in (path, data.mechanisms() / path.name):
         if candidate.is_file():
             return candidate
     known = [file.name for file in data.mechanisms().glob("*.yaml")]
@@ -152,33 +161,29 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
 
 def _plain_text(source: Source, phase: Any) -> str:
     """The file with our own rate types called Arrhenius, so that Cantera needs no extension to read the rest."""
-    starts = list(accumulate((len(line) for line in source.text.splitlines(keepends=True)), initial=0))
     text = source.text
-    own = [entry for entry in source.reactions(phase) if "type" in entry and not _is_native(str(entry["type"]))]
-    places = {(place.line, place.column): entry for entry in own for place in (source.place(entry, "type"),)}
+    starts = list(accumulate((len(line) for line in text.splitlines(keepends=True)), initial=0))
+    places = {}
+    for entry in source.reactions(phase):
+        law = kind_of(str(entry["type"])) if "type" in entry else None
+        if law is not None and not law.native:
+            place = source.place(entry, "type")
+            places[place.line, place.column] = entry
     for (line, column), entry in sorted(places.items(), reverse=True):  # from the end, so that places stay
         start, kind = starts[line - 1] + column, re.escape(str(entry["type"]))
         renamed, found = re.subn(rf"""\A(\S+\s*:\s*["']?){kind}""", r"\1interface-Arrhenius", text[start:], count=1)
         if not found:
-            raise InputError(f"type: write `type: {entry['type']}` on one line.", source.place(entry, "type"))
+            raise source.error(f"type: write `type: {entry['type']}` on one line.", entry, "type")
         text = text[:start] + renamed
     return text
-
-
-def _is_native(kind: str) -> bool:
-    """Whether Cantera itself knows a rate type, or nobody here does."""
-    law = kind_of(kind)
-    return law is None or law.native
 
 
 def _translated(text: str, source: Source, phase: Any) -> InputError:
     """Cantera's message without its frame, at the line that it names, else at that of the phase."""
     found = re.search(r"[Ee]rror on lines? (\d+)", text)
     noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
-    lines = [line.strip() for line in text.splitlines()]
-    message = (
-        " ".join(line for line in dict.fromkeys(lines) if not noise.search(line)) or "the mechanism cannot be read"
-    )
+    lines = dict.fromkeys(line.strip() for line in text.splitlines())
+    message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
     return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else source.place(phase).line))
 
 
@@ -188,34 +193,31 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
     result = []
     for item in surface.species():
         entry = entries[item.name]
+        title, spring = f"species {item.name}", None
+        if "bond" in entry:
+            bond, keys = entry["bond"], {name.replace("_", "-"): name for name, _ in Spring.specs()}
+            read = partial(number, source, entry, bond, title=f"{title}: bond: ")
+            spring = Spring(**cast(dict[str, Any], own_parameters(Spring, keys, bond, f"{title}: bond", read)))
         try:
             gibbs = lower(item.thermo)
         except InputError as error:  # a number that Cantera's units take out of range
-            raise InputError(f"species {item.name}: thermo: {error.message}", source.place(entry, "thermo")) from None
+            raise source.error(f"{title}: thermo: {error.message}", entry, "thermo") from None
         if gibbs is None:
-            message = f"species {item.name}: thermo of type {type(item.thermo).__name__} is not lowered."
-            raise InputError(message, source.place(entry))
+            raise source.error(f"{title}: thermo of type {type(item.thermo).__name__} is not lowered.", entry)
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         own = interactions(source, entry, names)
-        elastic = spring(source, entry)
-        result.append(Species(item.name, names[item.name], float(item.size), gibbs, elastic, own, fixed))
-    _check_potential(result, entries, source)
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, own, fixed))
+    odd = unpaired(result)
+    if odd is not None:
+        name, other = odd
+        message = (
+            f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would "
+            "come out of a cycle of coverages. Between two species make both linear, without heat capacity, and give "
+            f"{other} the same dependence on {name}, per site."
+        )
+        raise source.error(message, entries[name].get(KEY), other)
     return tuple(result)
-
-
-def _check_potential(species: Sequence[Species], entries: Mapping[str, Any], source: Source) -> None:
-    """Coverage-dependent thermo has to derive from one free energy."""
-    found = unpaired(species)
-    if found is None:
-        return
-    name, other = found
-    message = (
-        f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would come "
-        f"out of a cycle of coverages. Between two species make both linear, without heat capacity, and give {other} "
-        f"the same dependence on {name}, per site."
-    )
-    raise InputError(message, source.place(entries[name].get("coverage-dependencies"), other))
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:
@@ -232,38 +234,25 @@ def identifiers(names: Iterable[str]) -> dict[str, str]:
     return result
 
 
-def _bonds(species: tuple[Species, ...], bonds: Sequence[str] | None, place: Place | None) -> tuple[Species, ...]:
-    by_name = {item.name: item for item in species}
-    for name in bonds or ():
-        if name not in by_name:
-            raise InputError(f"bonds: no species '{name}' in the mechanism.{suggestion(name, by_name)}", place)
-    return tuple(by_name[name] for name in dict.fromkeys(bonds or ()))
+def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool]]:
+    """Every reaction as Cantera and as the file has it, and whether only Cantera can say how fast it is.
+
+    With `reactions: declared-species` Cantera leaves out those of other species.
+    """
+    known = set(surface.kinetics_species_names)
+    own = [
+        entry
+        for entry in source.reactions(phase)
+        for reactants, products, _ in (sides(str(entry["equation"])),)
+        if {*reactants, *products} <= known
+    ]
+    beside, names = has_neighbours(phase), surface.species_names
+    pairs = zip(surface.reactions(), own, strict=True)
+    return [(x, entry, is_evaluated(entry, names, beside) or x.rate.uses_electrochemistry) for x, entry in pairs]
 
 
-def _law_place(source: Source, node: Any, path: str) -> Place:
-    return Place(source.file, source.place(node).line, path)
-
-
-def _parsed(surface: Any, source: Source, phase: Any) -> list[tuple[Any, Any, bool]]:
-    """Every reaction as Cantera and as the file has it, and whether only Cantera can say how fast it is."""
-    beside, own = has_neighbours(phase), surface.species_names
-    pairs = zip(surface.reactions(), _kept(source, phase, surface.kinetics_species_names), strict=True)
-    return [(x, entry, is_evaluated(entry, own, beside) or x.rate.uses_electrochemistry) for x, entry in pairs]
-
-
-def _kept(source: Source, phase: Any, known: Iterable[str]) -> list[Any]:
-    """The entries that Cantera keeps: with `reactions: declared-species` those of other species are left out."""
-    return [entry for entry in source.reactions(phase) if _species_of(entry) <= set(known)]
-
-
-def _species_of(entry: Any) -> set[str]:
-    reactants, products, _ = sides(str(entry["equation"]))
-    return {*reactants, *products}
-
-
-def _evaluated(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
+def _evaluated(reaction: Any, label: str, species: tuple[Species, ...], place: Place) -> RateLaw:
     """The law of a reaction whose rate only Cantera can say."""
-    place = _law_place(source, entry, f"{REACTIONS}.{number}")
     names = dict.fromkeys((*reaction.reactants, *reaction.products))
     whole = _change(reaction, {name: name for name in names})
     change = {s.variable: whole[s.name] for s in species if s.name in whole}
@@ -271,44 +260,42 @@ def _evaluated(reaction: Any, source: Source, entry: Any, number: str, species: 
     if reaction.reversible and elastic:
         message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
         raise InputError(f"{message}does not know. Write two one-way reactions.", place)
-    given: dict[str, Any] = {"whole": whole, "reversible": bool(reaction.reversible), "value": 0.0, "place": place}
+    given: dict[str, Any] = {"number": label, "equation": reaction.equation, "change": change, "whole": whole}
+    given |= {"reversible": bool(reaction.reversible), "value": 0.0, "place": place}
     if len(change) == len(whole):
-        return EvaluatedReaction(number=number, equation=reaction.equation, change=change, **given)
-    return NeighbourReaction(number=number, equation=reaction.equation, change=change, enthalpy=0.0, gibbs=0.0, **given)
+        return EvaluatedReaction(**given)
+    return NeighbourReaction(enthalpy=0.0, gibbs=0.0, **given)
 
 
-def _lowered(reaction: Any, source: Source, entry: Any, number: str, species: tuple[Species, ...]) -> RateLaw:
+def _lowered(
+    reaction: Any, source: Source, entry: Any, label: str, species: tuple[Species, ...], place: Place
+) -> RateLaw:
     """The law of a reaction as a formula."""
-    place = _law_place(source, entry, f"{REACTIONS}.{number}")
-    variables = {item.name: item.variable for item in species}
+    title, variables = f"reaction {reaction.equation}", {item.name: item.variable for item in species}
     law = kind_of(str(entry.get("type") or reaction.rate.type))
     if law is None:
-        message = f"reaction {reaction.equation}: rate type '{reaction.rate.type}' is not lowered."
-        raise InputError(f"{message}{suggestion(reaction.rate.type, names())}", place)
+        guess = suggestion(reaction.rate.type, names())
+        raise InputError(f"{title}: rate type '{reaction.rate.type}' is not lowered.{guess}", place)
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
-    _check_reaction(reaction, forward, place)
-    taking_part = tuple(s for s in species if s.name in {*reaction.reactants, *reaction.products, *reaction.orders})
+    if any(order < 0 for order in forward.values()):
+        raise InputError(f"{title}: a negative order is infinite where the coverage vanishes; remove it.", place)
+    who = f"a rate of type {law.kind.removeprefix('interface-')}"
+    taking_part = {*reaction.reactants, *reaction.products, *reaction.orders}
     try:
         return law(
-            number=number,
+            number=label,
             equation=reaction.equation,
             orders=forward,
             products={variables[name]: nu for name, nu in reaction.products.items()},
             change=_change(reaction, variables),
-            species=taking_part,
+            species=tuple(item for item in species if item.name in taking_part),
             reversible=bool(reaction.reversible),
             place=place,
             **law.parameters_of(reaction, variables, sum(forward.values())),
-            **rate_fields(law, source, entry),
+            **own_parameters(law, law.own_keys(), entry, who, partial(number, source, entry, entry)),
         )
     except InputError as error:  # a number of Cantera's that is out of range
-        raise InputError(f"reaction {reaction.equation}: {error.message}", error.place or place) from None
-
-
-def _check_reaction(reaction: Any, orders: Mapping[str, float], place: Place) -> None:
-    if any(order < 0 for order in orders.values()):
-        message = f"reaction {reaction.equation}: a negative order is infinite where the coverage vanishes; remove it."
-        raise InputError(message, place)
+        raise InputError(f"{title}: {error.message}", error.place or place) from None
 
 
 def _change(reaction: Any, variables: Mapping[str, str]) -> dict[str, float]:

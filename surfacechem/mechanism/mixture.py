@@ -93,10 +93,6 @@ class Species:
         """Name of the amount per current area at full coverage [1/m^2]."""
         return f"n_{self.variable}"
 
-    def standard(self, T: Expression) -> Expression:
-        """Standard Gibbs energy [J] of one molecule."""
-        return BOLTZMANN * self.gibbs(T)
-
 
 class IdealMixture(Potential):
     r"""Free energy of species that share the sites of a surface and mix ideally.
@@ -139,44 +135,39 @@ class IdealMixture(Potential):
             amount = values[species.amount]
             elastic = species.spring.energy(values["g_n"]) if species.spring else 0
             # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
-            total += amount * theta * (species.standard(T) + elastic)
+            total += amount * theta * (BOLTZMANN * species.gibbs(T) + elastic)
             total += amount * BOLTZMANN * T * (mixing(theta) - theta)
         if any(species.interactions for species in self.species):
-            total += _interactions(self.species, values)
+            total += self._interactions(values)
         return total
+
+    def _interactions(self, values: Mapping[str, Expression]) -> Expression:
+        """Free energy of all interactions [J/m^2], each pair counted once."""
+        total: Expression = 0
+        seen: set[frozenset[str]] = set()
+        for item in self.species:
+            for interaction in item.interactions:
+                theta, other = values[item.variable], values[interaction.variable]
+                pair = frozenset((item.name, interaction.on))
+                if interaction.on == item.name:
+                    total += values[item.amount] * interaction.integral(values["T_c"], theta)
+                elif pair not in seen:
+                    total += values[item.amount] * theta * interaction.gibbs(values["T_c"], other)
+                seen.add(pair)
+        return total / AVOGADRO
 
 
 def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
     """The first species whose dependence on another belongs to no potential, and that other; None where all do."""
     by_name = {item.name: item for item in species}
-    for item in species:
-        for interaction in item.interactions:
-            if interaction.on != item.name and not _paired(item, interaction, by_name[interaction.on]):
-                return item.name, interaction.on
+    pairs = [(item, x, by_name[x.on]) for item in species for x in item.interactions if x.on != item.name]
+    for item, interaction, other in pairs:
+        back = next((x for x in other.interactions if x.on == item.name), Interaction(item.name, item.variable))
+        ours, theirs = interaction.slopes, back.slopes
+        if ours is None or theirs is None:
+            return item.name, other.name
+        for slope, same in zip(ours, theirs, strict=True):
+            x, y = slope / item.sites, same / other.sites
+            if abs(x - y) > SAME * max(abs(x), abs(y)):
+                return item.name, other.name
     return None
-
-
-def _paired(item: Species, interaction: Interaction, other: Species) -> bool:
-    ours = interaction.slopes
-    back = next((x for x in other.interactions if x.on == item.name), Interaction(item.name, item.variable))
-    theirs = back.slopes
-    if ours is None or theirs is None:
-        return False
-    pairs = zip((x / item.sites for x in ours), (x / other.sites for x in theirs), strict=True)
-    return all(abs(x - y) <= SAME * max(abs(x), abs(y)) for x, y in pairs)
-
-
-def _interactions(species: Sequence[Species], values: Mapping[str, Expression]) -> Expression:
-    """Free energy of all interactions [J/m^2], each pair counted once."""
-    total: Expression = 0
-    seen: set[frozenset[str]] = set()
-    for item in species:
-        for interaction in item.interactions:
-            theta, other = values[item.variable], values[interaction.variable]
-            pair = frozenset((item.name, interaction.on))
-            if interaction.on == item.name:
-                total += values[item.amount] * interaction.integral(values["T_c"], theta)
-            elif pair not in seen:
-                total += values[item.amount] * theta * interaction.gibbs(values["T_c"], other)
-            seen.add(pair)
-    return total / AVOGADRO

@@ -94,8 +94,10 @@ class Source:
         if not isinstance(self.data, Mapped):
             raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
         self._check(self.data, {"units": (dict,), "phases": (list,), "elements": (list,)})
-        for name in ("phases", "elements"):
-            self._entry_list(name, PHASE if name == "phases" else ENTRY, self.data, name)
+        self.phases = self._entry_list("phases", PHASE)
+        self._entry_list("elements", ENTRY)
+        self.written = str(self.data.get("generator")) == WRITER
+        """Whether Cantera itself has written the file."""
 
     def place(self, node: Any, key: Any = None, path: str = "") -> Place:
         """Place of a mapping or list, or of one of its entries."""
@@ -104,88 +106,69 @@ class Source:
         place = node.places.get(key, node.place)
         return Place(self.file, place.line, path, place.column)
 
+    def error(self, message: str, node: Any, key: Any = None) -> InputError:
+        """An error at a mapping or list of the file, or at one of its entries."""
+        return InputError(message, self.place(node, key))
+
     def _check(self, node: Any, kinds: Mapping[str, tuple[type, ...]]) -> None:
         """InputError where a key does not hold the kind of value that it must."""
         for key, allowed in kinds.items():
             value = node.get(key)
             if key in node and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
                 wanted = " or ".join(KINDS[kind] for kind in allowed if kind in KINDS)
-                raise InputError(f"{key}: this must be {wanted}, not {_shown(value)}.", self.place(node, key))
+                raise self.error(f"{key}: this must be {wanted}, not {_shown(value)}.", node, key)
 
-    def _entry_list(self, name: str, kinds: Mapping[str, tuple[type, ...]], node: Any, key: str) -> list[Any]:
+    def _entry_list(self, name: str, kinds: Mapping[str, tuple[type, ...]]) -> list[Any]:
         """The mappings of a section; InputError at what is none."""
         entries = self.data.get(name)
         if entries is None:
             return []
         if not isinstance(entries, Listed):
-            raise InputError(f"{name}: this must be a list, not {_shown(entries)}.", self.place(self.data, name))
+            raise self.error(f"{name}: this must be a list, not {_shown(entries)}.", self.data, name)
         for i, entry in enumerate(entries):
             if not isinstance(entry, Mapped):
-                message = f"{name}: an entry is a mapping, not {_shown(entry)}."
-                raise InputError(message, self.place(entries, i))
+                raise self.error(f"{name}: an entry is a mapping, not {_shown(entry)}.", entries, i)
             self._check(entry, kinds)
         return list(entries)
 
-    def phases(self) -> list[Any]:
-        """The phase entries."""
-        return list(self.data.get("phases") or [])
-
     def phase(self, name: str | None, place: Place | None) -> Any:
         """The phase of that name, or the only one."""
-        phases = {str(entry.get("name")): entry for entry in self.phases()}
+        phases = {str(entry.get("name")): entry for entry in self.phases}
         if not phases:
             known = [str(key) for key in self.data]
             guess = next(iter(get_close_matches("phases", known, 1)), None)
-            raise InputError(
-                f"no `phases` in the mechanism.{suggestion('phases', known)}", self.place(self.data, guess)
-            )
-        if name is None and len(phases) == 1:
-            return next(iter(phases.values()))
-        if name is None:
+            raise self.error(f"no `phases` in the mechanism.{suggestion('phases', known)}", self.data, guess)
+        if name is None and len(phases) > 1:
             raise InputError(f"the mechanism has several phases, name one.{suggestion('', phases)}", place)
+        name = next(iter(phases)) if name is None else name
         if name not in phases:
             raise InputError(f"{self.file} has no phase '{name}'.{suggestion(name, phases)}", place)
         return phases[name]
 
-    def section(self, name: str, node: Any, key: str) -> list[Any]:
-        """A list of species or reactions in this file."""
-        if name not in self.data:
-            known = [k for k, v in self.data.items() if isinstance(v, list) and k != "phases"]
-            raise InputError(
-                f"no section '{name}' in this file.{suggestion(name, known)} A mechanism is one file.",
-                self.place(node, key, key),
-            )
-        return self._entry_list(name, SPECIES if key == "species" else REACTION, node, key)
-
     def species(self, phase: Any) -> Iterator[Any]:
         """The species entries that the phase may use."""
-        yield from self._entries(phase, "species")
-
-    def all_species(self) -> Iterator[Any]:
-        """The species entries of all phases."""
-        for phase in self.phases():
-            yield from self.species(phase)
+        yield from self._entries(phase, "species", SPECIES)
 
     def reactions(self, phase: Any) -> Iterator[Any]:
         """The reaction entries that the phase may use, in order."""
         if phase.get("reactions", "all") != "none":
-            yield from self._entries(phase, "reactions")
+            yield from self._entries(phase, "reactions", REACTION)
 
-    @property
-    def written(self) -> bool:
-        """Whether Cantera itself has written the file."""
-        return str(self.data.get("generator")) == WRITER
+    def _entries(self, phase: Any, key: str, kinds: Mapping[str, tuple[type, ...]]) -> Iterator[Any]:
+        for name in sections(phase.get(key, "all"), key):
+            if name in self.data:
+                yield from self._entry_list(name, kinds)
+            elif phase.get(key) is not None:
+                known = [k for k, v in self.data.items() if isinstance(v, list) and k != "phases"]
+                message = f"no section '{name}' in this file.{suggestion(name, known)} A mechanism is one file."
+                raise InputError(message, self.place(phase, key, key))
 
     def defaults(self, entry: Any) -> Mapping[str, Any]:
         """Units that a bare number in the entry has; what Cantera itself has written counts in its own."""
         own = entry.get("units") if isinstance(entry, Mapping) else None
         written = CANTERA_UNITS if self.written else {}
-        return {**written, **_mapping(self.data.get("units")), **_mapping(own)}
-
-    def _entries(self, phase: Any, key: str) -> Iterator[Any]:
-        for name in sections(phase.get(key, "all"), key):
-            if name in self.data or phase.get(key) is not None:
-                yield from self.section(name, phase, key)
+        given = [item for item in (self.data.get("units"), own) if isinstance(item, Mapping)]
+        return {key: unit for units in (written, *given) for key, unit in units.items()}
 
 
 def sections(declared: Any, default: str) -> list[str]:
@@ -217,23 +200,16 @@ def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
     words = equation.split()
     arrow = next((word for word in words if word in ARROWS), "")
     middle = words.index(arrow) if arrow else len(words)
-    return _side(words[:middle]), _side(words[middle + 1 :]), arrow != "=>"
-
-
-def _side(words: list[str]) -> dict[str, float]:
-    total: dict[str, float] = {}
-    factor = 1.0
-    for word in words:
-        if re.fullmatch(r"[0-9]*\.?[0-9]+", word):
-            factor = float(word)
-        elif word != "+":
-            total[word] = total.get(word, 0.0) + factor
-            factor = 1.0
-    return total
-
-
-def _mapping(node: Any) -> Mapping[str, Any]:
-    return node if isinstance(node, Mapping) else {}
+    found: list[dict[str, float]] = [{}, {}]
+    for side, part in zip(found, (words[:middle], words[middle + 1 :]), strict=True):
+        factor = 1.0
+        for word in part:
+            if re.fullmatch(r"[0-9]*\.?[0-9]+", word):
+                factor = float(word)
+            elif word != "+":
+                side[word] = side.get(word, 0.0) + factor
+                factor = 1.0
+    return found[0], found[1], arrow != "=>"
 
 
 def _shown(value: Any) -> str:

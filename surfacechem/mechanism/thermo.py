@@ -164,43 +164,28 @@ class StandardGibbs:
         return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
 
 
-def lower(thermo: Any) -> StandardGibbs | None:
-    """Standard Gibbs energy of a Cantera species thermo object; None where its model is not known here."""
-    readers = {
-        "ConstantCp": _from_constant_cp,
-        "NasaPoly2": _from_nasa7,
-        "Nasa9PolyMultiTempRegion": _from_nasa9,
-        "ShomatePoly2": _from_shomate,
-    }
-    reader = readers.get(type(thermo).__name__)
-    return StandardGibbs(reader([float(x) for x in thermo.coeffs], float(thermo.max_temp))) if reader else None
-
-
 KILO = 1000.0
 """Moles in a kmol, in which Cantera counts."""
 
-
-def _from_constant_cp(c: list[float], top: float) -> tuple[Piece, ...]:
-    return (Piece(top, ConstantCp(T0=c[0], h0=c[1] / KILO, s0=c[2] / KILO, cp0=c[3] / KILO)),)
-
-
-def _from_nasa7(c: list[float], top: float) -> tuple[Piece, ...]:
-    return _two(Nasa7, c[0], c[8:15], c[1:8], top)
+TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 8, 1), "ShomatePoly2": (Shomate, 1, 8)}
+"""Cantera's models with two ranges: the form, and where the coefficients of the lower and of the upper range begin."""
 
 
-def _from_shomate(c: list[float], top: float) -> tuple[Piece, ...]:
-    return _two(Shomate, c[0], c[1:8], c[8:15], top)
-
-
-def _two(form: type[Series], middle: float, low: list[float], high: list[float], top: float) -> tuple[Piece, ...]:
-    if low == high:
-        return (Piece(top, _filled(form, low)),)
-    return Piece(middle, _filled(form, low)), Piece(top, _filled(form, high))
-
-
-def _from_nasa9(c: list[float], top: float) -> tuple[Piece, ...]:
-    regions = [c[1 + 11 * i : 12 + 11 * i] for i in range(int(c[0]))]
-    return tuple(Piece(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions)
+def lower(thermo: Any) -> StandardGibbs | None:
+    """Standard Gibbs energy of a Cantera species thermo object; None where its model is not known here."""
+    model, top, c = type(thermo).__name__, float(thermo.max_temp), [float(x) for x in thermo.coeffs]
+    if model == "ConstantCp":
+        h0, s0, cp0 = (x / KILO for x in c[1:])
+        return StandardGibbs((Piece(top, ConstantCp(T0=c[0], h0=h0, s0=s0, cp0=cp0)),))
+    if model == "Nasa9PolyMultiTempRegion":
+        regions = [c[1 + 11 * i : 12 + 11 * i] for i in range(int(c[0]))]
+        return StandardGibbs(tuple(Piece(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions))
+    if model in TWO_RANGES:
+        form, *starts = TWO_RANGES[model]
+        low, high = (c[start : start + 7] for start in starts)
+        below = () if low == high else (Piece(c[0], _filled(form, low)),)
+        return StandardGibbs((*below, Piece(top, _filled(form, high))))
+    return None
 
 
 def _filled(form: type[Series], coefficients: Sequence[float]) -> Series:

@@ -100,7 +100,8 @@ def _section(heading: str, rows: Iterable[Sequence[str]]) -> str:
 
 def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
     text = Source("", curves.mechanism.text)
-    made_of = {str(entry.get("name")): entry.get("composition") or {} for entry in text.all_species()}
+    entries = [entry for phase in text.phases for entry in text.species(phase)]
+    made_of = {str(entry.get("name")): entry.get("composition") or {} for entry in entries}
     yield "", "made of", "sites", "h [kJ/mol]", "s [J/(mol K)]", "g [kJ/mol]"
     for name, value in curves.thermo(temperature).items():
         elements = " ".join(f"{element}{count:g}" for element, count in made_of.get(name, {}).items())
