@@ -50,8 +50,8 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
             yield f"{kind} sink {sink.node}", sink.share
 
 
-def computed(name: str) -> dict[str, float]:
-    """All values of a scene in its modes, away from equilibrium, while rates are drawn at random."""
+def away(name: str) -> tuple[System, dict[Any, Any]]:
+    """A scene in its modes, and a point away from equilibrium, with rates drawn at random."""
     scene, modes = SCENES[name]
     system = assemble(scene())
     draw = random.Random(name)
@@ -60,6 +60,12 @@ def computed(name: str) -> dict[str, float]:
         size = abs(float(point[state.symbol])) or state.scale
         point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
         point[state.dot] = mpmath.mpf(size * draw.uniform(-1, 1))
+    return system, point
+
+
+def computed(name: str) -> dict[str, float]:
+    """All values of a scene there."""
+    system, point = away(name)
     return {key: float(laws.number(system.expand(value), point)) for key, value in parts(system)}
 
 

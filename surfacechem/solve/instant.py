@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.compile.program import Function, compile_function
+from surfacechem.expressions import absolute, magnitude, where
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.solve.bounces import Rebounds
@@ -20,7 +22,6 @@ from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.solve.roundoff import sizes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -95,8 +96,22 @@ class Instant:
         return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
 
     def sizes(self, point: Point) -> Array:
-        """Sizes to which the rounding of each guard is in proportion."""
-        return sizes(self.program, self.strict, self.system, point, self.largest)
+        """Sizes to which the rounding of each guard is in proportion: the largest seen, or what cancels in it."""
+        if not self.strict.any():
+            return self.largest
+        seen, own = self.largest.copy(), self._terms(point.inputs())
+        seen[self.strict] = np.fmax(seen[self.strict], np.where(np.isfinite(own), own, 0.0))
+        return seen
+
+    @cached_property
+    def _terms(self) -> Function:
+        """Magnitudes of the strict guards, which may be zero for long while their terms are large."""
+        sizes = {}
+        for state in self.system.states:
+            size, least = absolute(state.symbol), state.finest or state.scale
+            sizes[state.symbol] = where(size > least, size, least)
+        strict = [edge.guard for edge in self.system.edges if edge.strict]
+        return compile_function(self.system.inputs, [magnitude(self.system.expand(guard), sizes) for guard in strict])
 
     def consistent(self, point: Point) -> Point:
         """The point with the rates and algebraic variables that belong to it."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, Program, compile_function
-from surfacechem.expressions import derivative
+from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.springs import stored
 from surfacechem.model.system import Account, System
@@ -408,21 +408,20 @@ class Jumper:
         work = {**jump.work, **{name: jump.work.get(name, 0.0) + moved for name, moved in done}}
         return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -known else VIOLATES, work=work)
 
-    def _entropy_rounding(self, jump: Jump, noise: float) -> float:
-        """Entropy that the last digits of the states stand for, and the noise of what the guard measures."""
-        point, n = jump.before, len(jump.before.y)
-        nudges = DIGITS * np.abs(point.y)
-        if jump.edge.measure:
-            nudges[self.states.index(jump.edge.measure)] += noise
-        rows = np.repeat(point.inputs()[None], 1 + n, axis=0)
-        rows[1:, 1 : 1 + n] += np.diag(nudges)
-        entropies = self._books(rows)[:, 1]
-        return float(np.sum(np.abs(entropies[1:] - entropies[0])))
+    @cached_property
+    def _magnitudes(self) -> Function:
+        """Magnitudes of what a jump conserves and of the total entropy."""
+        books = [self.system.jump_energy, self.system.find("S_total").expression]
+        return compile_function(self.system.inputs, [magnitude(self.system.expand(item)) for item in books])
 
     def _rounding(self, point: Point, energy: float) -> float:
-        """Energy that the last digits of the states and of the energies themselves stand for [J/m^2]."""
-        rows = np.repeat(point.inputs()[None], 1 + len(point.y), axis=0)
-        states = slice(1, 1 + len(point.y))
-        rows[1:, states] *= 1 + DIGITS * np.eye(len(point.y))
-        energies = self._energy(rows)[:, 0]
-        return float(np.sum(np.abs(energies[1:] - energies[0])) + DIGITS * max(abs(energies[0]), abs(energy)))
+        """Energy that does not count at a point, beside what it was before [J/m^2]."""
+        return DIGITS * max(float(self._magnitudes(point.inputs())[0]), abs(energy))
+
+    def _entropy_rounding(self, jump: Jump, noise: float) -> float:
+        """Entropy that does not count: its rounding, and what the noise of the state that a guard measures makes."""
+        rows = np.repeat(jump.before.inputs()[None], 2, axis=0)
+        if jump.edge.measure:
+            rows[1, 1 + self.states.index(jump.edge.measure)] += noise
+        before, moved = self._books(rows)[:, 1]
+        return float(DIGITS * self._magnitudes(rows[0])[1] + abs(moved - before))

@@ -21,13 +21,13 @@ from surfacechem.model.validity import check_start
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.adapters.rates import output_rates
-from surfacechem.solve.contract import Problem, Result, Solver, Status
+from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Hybrid
 from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import Radau
-from surfacechem.solve.roundoff import awaited, solve, watched
+from surfacechem.solve.roundoff import solve
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
 
@@ -262,7 +262,10 @@ class Model:
             parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
-            margins=tuple(map(watched, self.margins)) + tuple(map(awaited, system.edges)),
+            margins=(
+                *(Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins),
+                *(Margin.bear() if edge.strict else Margin.stop() for edge in system.edges),
+            ),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
