@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping
 from functools import reduce
 from typing import Any, TypeAlias
 
+from surfacechem.tolerances import FRACTION_FLOOR
+
 Expression: TypeAlias = Any
 """A float or a SymEngine expression."""
 
@@ -251,12 +253,6 @@ def log(x: Expression) -> Expression:
 LARGE_EXPONENT = 200.0
 """Exponent above which arsinh(x exp(exponent)) is taken by its logarithm."""
 
-TINY = 1e-300
-"""Magnitudes below this count as this in a logarithm."""
-
-FRACTION_FLOOR = 1e-300
-"""Fractions below this count as this in a logarithm, as Cantera does for vanished species."""
-
 
 def log_fraction(x: Expression) -> Expression:
     """Natural logarithm of a fraction, or of a rate that may vanish, finite at zero."""
@@ -312,7 +308,7 @@ def asinh_exp(x: Expression, exponent: Expression) -> Expression:
 
     plain = symengine.asinh(x * exp(exponent))
     size = absolute(x)
-    far = sign(x) * (log(where(size > TINY, size, TINY + 0 * size)) + math.log(2) + exponent)
+    far = sign(x) * (log(where(size > FRACTION_FLOOR, size, FRACTION_FLOOR + 0 * size)) + math.log(2) + exponent)
     return symengine.Piecewise((plain, exponent < LARGE_EXPONENT), (far, True))
 
 

@@ -51,5 +51,30 @@ NEGLIGIBLE = 1e-3
 TINY = float_info.min / EPS
 """Least size of a divisor, 1e-292: what is smaller by a factor EPS is still a normal number."""
 
+MOMENT = 1e-12
+"""Part of the time that has passed that no run resolves: ROUNDING of what is summed along it, to the next power of ten.
+"""
+
+NOTHING = 1e-9
+"""Amount of a variable, in its SI unit, that means nothing: a billionth of an area or of a fraction, a nanopascal, a
+nanokelvin. No run is asked for more digits than nine, which leaves that of a variable of order one.
+"""
+
+FEWEST = 1e-12
+"""Bonded fraction that is no bond any more: of 1e16 sites on a square metre, one bond on a square centimetre."""
+
+FRACTION_FLOOR = 1e-300
+"""Fractions below this count as this in a logarithm, as Cantera does for vanished species; a product of it with any
+rate above 1e-8 is a normal number.
+"""
+
+LEAST_COVERAGE = TINY / EPS
+"""A vanished coverage counts as this where its logarithm has to cancel: next to it FRACTION_FLOOR is no more than
+rounding, 4.5e-277.
+"""
+
+MICROMETRE = 1e-6
+"""Scale of gaps [m] and of their velocities [m/s]: with EPS they are rounded at 2e-22 m, far below any atom."""
+
 PICOMETRE = 1e-12
 """Length [m] without a meaning for bodies: a hundredth of an atom."""

@@ -64,8 +64,8 @@ class Potential(Law):
     """Area that the energy is per; the assembly multiplies those per current area by the area stretch."""
 
     energy: ClassVar[Callable[..., Expression]]
-    repulsion: ClassVar[Callable[..., Expression]]
-    """Part of the energy whose pressure the contact bears, for a law that attracts bodies which touch; absent where
+    repulsion: ClassVar[Callable[..., Expression] | None] = None
+    """Part of the energy whose pressure the contact bears, for a law that attracts bodies which touch; None where
     a law either presses or pulls, so that its pressure is that of the contact."""
 
 
@@ -82,7 +82,7 @@ class TangentialPotential(Potential):
         "slides, or 'none', as if the tangential gap were zero",
         default="parallel",
     )
-    unbonded: ClassVar[Callable[..., Expression]]
+    unbonded: ClassVar[Callable[..., Expression] | None] = None
     """Fraction of the interface on which friction acts in parallel; all of it where a law does not say."""
 
 
@@ -126,14 +126,14 @@ class Friction(Law):
     """Magnitude of the traction that sticking bears [Pa]; absent where a law does not stick."""
     drive: ClassVar[Callable[..., Expression]]
     """What sliding at a velocity takes, as one number that may stand for the velocity; absent where that serves."""
-    velocity: ClassVar[Callable[..., Expression]]
+    velocity: ClassVar[Callable[..., Expression] | None] = None
     """Its inverse [m/s]."""
     velocity_unit: ClassVar[Callable[..., Expression]]
     """Velocity [m/s] in which that of sliding is counted."""
     driven: ClassVar[Callable[..., Expression]]
     """Traction by that number [Pa]."""
-    transverse: ClassVar[Callable[..., Expression]]
-    """Traction across v, along the interface [Pa]; absent where a law is the same in all directions."""
+    transverse: ClassVar[Callable[..., Expression] | None] = None
+    """Traction across v, along the interface [Pa]; None where a law is the same in all directions."""
     transverse_limit: ClassVar[Callable[..., Expression]]
     """What sticking bears across v alone [Pa], half an axis of an ellipse; absent where a law has no ``transverse``."""
     evolution: ClassVar[Callable[..., Mapping[str, Expression]]]
@@ -155,6 +155,8 @@ class RateLaw(Law):
     """Whether its form keeps phi between zero and one, or below phi_max where it reads the partners n_1 and n_2; what
     any other law carries to a bound is held there."""
     rate: ClassVar[Callable[..., Expression]]
+    envelope: ClassVar[Callable[..., Expression] | None] = None
+    """Largest fraction of bonds that an opening leaves, for a law by which bonds break gradually."""
 
     def stoichiometry(self) -> Mapping[str, int | float]:
         """Change of each bonding variable, in its own amounts, per unit of reaction."""
@@ -243,8 +245,8 @@ class HeatTransfer(Law):
         default="direct",
     )
     conductance: ClassVar[Callable[..., Expression]]
-    resistances: ClassVar[Callable[..., tuple[Expression, Expression, Expression]]]
-    """Resistances of the first wall, the film and the second wall [m^2 K/W]; absent where heat is not made across."""
+    resistances: ClassVar[Callable[..., tuple[Expression, Expression, Expression]] | None] = None
+    """Resistances of the first wall, the film and the second wall [m^2 K/W]; None where heat is not made across."""
 
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """The conductances in parallel that the whole is the sum of, by what carries the heat."""

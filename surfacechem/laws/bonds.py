@@ -13,7 +13,6 @@ from typing import Any
 
 from surfacechem.contracts.terms import RateFactor, RateLaw, Varying, parameter
 from surfacechem.expressions import (
-    FRACTION_FLOOR,
     Expression,
     is_symbolic,
     log,
@@ -25,6 +24,7 @@ from surfacechem.expressions import (
     where,
 )
 from surfacechem.quantities import BOLTZMANN
+from surfacechem.tolerances import FRACTION_FLOOR
 
 Coefficient = tuple[Expression, Expression]
 

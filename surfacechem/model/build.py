@@ -20,20 +20,16 @@ from surfacechem.model.system import Account, Capped, Caution, Margin, Named, Pa
 from surfacechem.model.variables import Parameters, Variables, unit_of
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
+from surfacechem.tolerances import NOTHING
+from surfacechem.tolerances import ROUNDING as DIGITS
 
 MANY = range(2, 1000)
 
 BOTH = "interface", "each body"
 """Ends of the paths that bring heat into both bodies alike."""
 
-NOTHING = 1e-9
-"""Amount, in SI units, by which rounding may carry a variable below zero."""
 STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
 """What to do where a variable that finds its own value has none at the start."""
-DIGITS = 1e-12
-"""Part of its terms by which rounding may carry a sum below zero."""
-
-
 NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 """Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
 
@@ -300,37 +296,45 @@ class Build:
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""
+        ends = f"where the law {law.name()} ends"
         for name in law.positive:
-            value = own[name] if name in own else self.variables.get(name, law)
-            reason = f"{name} reached zero, where the law {law.name()} ends"
             sought = name in self.motion.gap_rates and name not in self.scene.initial
-            remedy = STARTS.get(name, "") if sought else ""
-            self.margins.append(Margin(f"{name} > 0", value, reason, remedy=remedy, path=law.path, domain=True))
+            margin = Margin(f"{name} > 0", self._read(law, name, own), f"{name} reached zero, {ends}", path=law.path)
+            self.margins.append(replace(margin, remedy=STARTS.get(name, "") if sought else "", domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
-            value = own[name] if name in own else self.variables.get(name, law)
-            least = law.least.get(name, 0)
-            slack = NOTHING + self._rounding(value) + DIGITS * absolute(least)
-            reason = f"{name} fell below {least if least != 0 else 'zero'}, where the law {law.name()} ends"
+            value, least = self._read(law, name, own), law.least.get(name, 0)
+            whole, rounding = self.expanded(value), symengine.Integer(0)
+            if whole.is_Add:  # by how much the last digits of its terms change a sum
+                rounding = DIGITS * sum((absolute(term) for term in whole.args), symengine.Integer(0))
+            slack = NOTHING + rounding + DIGITS * absolute(least)
+            reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
-        for name, bend in law.kinks.items():
-            if name in law.least and name not in met:
-                continue  # the law ends there
-            value = own[name] if name in own else self.variables.get(name, law)
-            self.margins.append(Margin(name, value - bend, f"{law.name()} bends at this {name}", False))
-        for name, tops in {**dict.fromkeys(law.positive, ()), **law.peaks}.items():
-            if name not in own and not self.variables.has(name) and name in optional(law.statement):
-                continue
-            value = own[name] if name in own else self.variables.get(name, law)
-            if not symengine.sympify(value).is_Number:
-                self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
-        for name, ends in law.limits.items():
-            value, (low, high) = self.variables.get(name, law), ends
-            slack = NOTHING * max(abs(end) for end in ends if math.isfinite(end))
+        self._narrow_places(law, own, met)
+        for name, (low, high) in law.limits.items():
+            value = self.variables.get(name, law)
+            slack = NOTHING * max(abs(end) for end in (low, high) if math.isfinite(end))
             reason = f"{name} left the range of the law {law.name()}, {low:g} to {high:g}"
             if math.isfinite(low):
                 self.margins.append(Margin(f"{name} >= {low:g}", value - low + slack, reason, domain=True))
             if math.isfinite(high):
                 self.margins.append(Margin(f"{name} <= {high:g}", high + slack - value, reason, domain=True))
+
+    def _read(self, law: Law, name: str, own: Mapping[str, Expression]) -> Expression:
+        """What a law reads by a name: its own, or the scene's."""
+        return own[name] if name in own else self.variables.get(name, law)
+
+    def _narrow_places(self, law: Law, own: Mapping[str, Expression], met: Collection[str]) -> None:
+        """Steps end where a law bends, and where it has a peak that a step might pass over."""
+        for name, bend in law.kinks.items():
+            if name not in law.least or name in met:  # else the law ends there
+                reason = f"{law.name()} bends at this {name}"
+                self.margins.append(Margin(name, self._read(law, name, own) - bend, reason, False))
+        for name, tops in {**dict.fromkeys(law.positive, ()), **law.peaks}.items():
+            if name not in own and not self.variables.has(name) and name in optional(law.statement):
+                continue
+            value = self._read(law, name, own)
+            if not symengine.sympify(value).is_Number:
+                self._narrow(law, name, value, tops if isinstance(tops, Sequence) else (tops,))
 
     def _narrow(self, law: Law, name: str, value: Expression, tops: Sequence[Expression]) -> None:
         """A step ends where a variable passes a narrow place of a law, and where a gap with a mass turns round, which
@@ -338,9 +342,10 @@ class Build:
         """
         reason, moving = f"{law.name()} is narrow near here", symengine.sympify(self.expanded(value)).free_symbols
         found = [Margin(f"{name} at place {i} of {law.name()}", value - top, reason) for i, top in enumerate(tops, 1)]
-        velocities = {state.symbol for state in self.states if state.quantity.unit == "m/s"}
+        states = {state.symbol for state in self.states}
         for gap, rate in self.motion.gap_rates.items():
-            if symengine.Symbol(gap) in moving and symengine.sympify(rate).free_symbols & velocities:
+            # Only a velocity that is a state has inertia, or a resistance of its own, and turns round smoothly.
+            if symengine.Symbol(gap) in moving and symengine.sympify(rate).free_symbols & states:
                 found.append(Margin(f"{gap} turns", rate, reason))
         known = {margin.expression for margin in self.margins}
         self.margins += [replace(item, terminal=False, peak=True) for item in found if item.expression not in known]
@@ -372,11 +377,6 @@ class Build:
             spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
             self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
         return self.variables.get(path, "the interface", "interface")
-
-    def _rounding(self, value: Expression) -> Expression:
-        """By how much the last digits of its terms change a sum."""
-        whole = self.expanded(value)
-        return DIGITS * sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
 
     def expanded(self, expression: Expression) -> Expression:
         """The expression without names of quantities."""

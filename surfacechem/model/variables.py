@@ -151,12 +151,13 @@ class Variables:
         return f"the {words}" if name in words.split() else f"the {words} {name}"
 
     def call(
-        self, law: Law, formula: Callable[..., Expression], extra: Mapping[str, Expression] | None = None
+        self, law: Law, formula: Callable[..., Expression] | None, extra: Mapping[str, Expression] | None = None
     ) -> Expression:
         """Evaluate a bound law's formula on what it asks for; ``extra`` goes before the scene's own variables.
 
         An argument with a default is left out where the scene has no variable of that name.
         """
+        assert formula is not None, f"{law.name()} does not state this"
         own = extra or {}
         names = [name for name in reads(formula) if name in own or self.has(name) or name not in optional(formula)]
         return formula(**{name: own[name] if name in own else self.get(name, law) for name in names})

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.expressions import TINY, depends
+from surfacechem.expressions import depends
 from surfacechem.format import Case
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
@@ -20,6 +20,7 @@ from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.diagnose import STALLED
 from surfacechem.solve.run import Model, Run
+from surfacechem.tolerances import TINY
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""

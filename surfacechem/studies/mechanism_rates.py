@@ -25,8 +25,7 @@ from surfacechem.expressions import Expression, depends, derivative, log, log_su
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import SurfaceReaction
-from surfacechem.model.components.pulled import lengths
-from surfacechem.model.pairs import Opposed, opposed
+from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.detailed_balance import ROUNDED
 

@@ -7,74 +7,129 @@ A reaction that takes :math:`-\nu_j` molecules of the species j of an adjacent p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import symengine
 
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
-from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, Power
+from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.force import RESOLUTION, SHARED
+from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import law_reads
-from surfacechem.model.components.pulled import book_work, by_affinity, dead_load
+from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, departure, opposed, own_departure
 from surfacechem.model.constraints.bound import free_to_react
 from surfacechem.model.constraints.closing import TOUCHING
 from surfacechem.model.constraints.softening import softening, within_reach
-from surfacechem.model.pairs import departure, opposed, own_departure
 from surfacechem.model.parts import Bond
 from surfacechem.model.system import Account, Capped, Caution
 from surfacechem.quantities import Quantity
+from surfacechem.tolerances import MOMENT
+
+NEIGHBOURS = "H_neighbours"
+"""Account of the enthalpy that reactions take from neighbours."""
 
 MARGIN = 4
 """How much faster than bonds count as ruptured they may still break."""
 
 
+@dataclass(frozen=True)
+class Reaction:
+    """A law with symbols for its parameters and its affinity, and what its heat is booked with."""
+
+    label: str
+    law: RateLaw
+    affinity: Expression
+    """Gibbs energy of a reaction [J], with what it takes from neighbours and the work of a prescribed force on it."""
+    account: str
+    """Label of the dissipation: of two one-way reactions one always runs uphill, and only their sum counts."""
+    load: Expression
+    """What a prescribed force adds to the affinity [J]."""
+
+
 def reactions(build: Build) -> Iterator[Power]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
-    change = {name: symengine.Integer(0) for name in build.bonding}
-    laws = {build.label(law): _bound(build, law) for law in build.interface.reactions}
+    laws = {
+        build.label(law): build.variables.bind(law, f"interface.bonding.{law.name()}")
+        for law in build.interface.reactions
+    }
     for law in build.interface.reactions:
         build.law_ranges(law)
     pairs = opposed(laws)
-    together = {label: pair.label for pair in pairs for label in pair.labels}
     load = dead_load(build, laws, pairs)
-    loaded = {name: value + load.get(name, 0) for name, value in mu.items()}
-    pulled = {label: law for label, law in laws.items() if label in together or by_affinity(law)}
-    affinities = {label: _affinity(build, law, loaded if label in pulled else mu) for label, law in laws.items()}
-    others = {label: law for label, law in laws.items() if not hasattr(law, "envelope")}
-    stated = {label: _rate(build, law, affinities[label]) for label, law in others.items()}
-    rates = {label: _resolved(build, others, stated, label) for label in others}
-    forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in others.items()))
-    free = _free(build, forming)
-    rates |= {label: softening(build, law, forming, free) for label, law in laws.items() if label not in others}
-    named: dict[str, Expression] = {}
+    found = [_reaction(build, label, law, mu, load, pairs) for label, law in laws.items()]
+    rates = _rates(build, found)
+    change = {name: symengine.Integer(0) for name in build.bonding}
     dissipated: dict[str, Expression] = {}
-    for label, law in laws.items():
-        nu, affinity = law.stoichiometry(), affinities[label]
-        quantity = Quantity(f"R_{label}", "1/(m^2 s)", f"net rate of {law.title}", tag="e:R")
-        formed = rates[label] * free if "phi" in nu and label in others else rates[label]
-        rate = named[label] = build.name(quantity, formed)
-        # Of two one-way reactions one always runs uphill; what they dissipate together is what counts.
-        owner = together.get(label, label)
-        dissipated[owner] = dissipated.get(owner, 0) - build.stretch * rate * affinity
-        for x, n in nu.items():
+    for reaction in found:
+        rate, law = rates[reaction.label], reaction.law
+        power = build.stretch * rate * reaction.affinity
+        dissipated[reaction.account] = dissipated.get(reaction.account, 0) - power
+        for x, n in law.stoichiometry().items():
             change[x] += n * rate
         _across_an_open_gap(build, law, rate)
-        own_departure(build, label, law, affinity)
-    for owner, power in dissipated.items():
-        yield Power(DISSIPATION, INTERFACE, INTERFACE, power, owner)
-    yield from supplied(build, laws, named)
-    yield from book_work(build, pulled, named, load)
+        own_departure(build, reaction.label, law, reaction.affinity)
+    for account, power in dissipated.items():
+        yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
+    yield from _from_neighbours(build, found, rates)
+    work = [-build.stretch * rates[item.label] * item.load for item in found if item.load != 0]
+    if work:
+        text = "work of the prescribed force on bonds"
+        yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*work), "W_f", text)
     for pair in pairs:
-        departure(build, pair, loaded)
+        departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
     for name, bond in build.bonding.items():
         build.rows.sites(name, change[name], bond.density, build.stretch)
         formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
         build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
-    yield from _prescribed_bonding(build)
+    phi = symengine.Symbol("phi")
+    if "phi" not in build.bonding and depends(build.psi, phi):
+        M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
+        if rate != 0:
+            yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
+
+
+def _reaction(
+    build: Build,
+    label: str,
+    law: RateLaw,
+    mu: Mapping[str, Expression],
+    load: Mapping[str, Expression],
+    pairs: Sequence[Opposed],
+) -> Reaction:
+    nu = law.stoichiometry()
+    account = next((pair.label for pair in pairs if label in pair.labels), label)
+    pulled = account != label or by_affinity(law)
+    potentials = {x: mu[x] + load[x] if pulled and x in load else mu[x] for x in nu}
+    affinity = sum(n * potentials[x] for x, n in nu.items())
+    if law.taken:
+        affinity = affinity - build.variables.call(law, law.taken[1])
+    added = symengine.Add(*(n * load[x] for x, n in nu.items() if pulled and x in load))
+    return Reaction(label, law, affinity, account, added)
+
+
+def _rates(build: Build, found: Sequence[Reaction]) -> dict[str, Expression]:
+    """Net rates by label, as named quantities."""
+    laws = {item.label: item.law for item in found if item.law.envelope is None}
+    stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
+    rates = {label: _resolved(build, laws, stated, label) for label in laws}
+    forming = symengine.Add(*(law.stoichiometry().get("phi", 0) * rates[label] for label, law in laws.items()))
+    # One while the bonding state may change, zero at a bound and beyond the reach of bonds. Only what bonds form by may
+    # carry them beyond; a law with an envelope ends at its bound by itself.
+    free: Expression = symengine.Integer(1)
+    if "phi" in build.bonding and forming != 0:
+        free = within_reach(build) * free_to_react(build, forming)
+    for item in found:
+        if item.label not in laws:
+            rates[item.label] = softening(build, item.law, forming, free)
+        elif "phi" in item.law.stoichiometry():
+            rates[item.label] *= free
+    for item in found:
+        quantity = Quantity(f"R_{item.label}", "1/(m^2 s)", f"net rate of {item.law.title}", tag="e:R")
+        rates[item.label] = build.name(quantity, rates[item.label])
+    return rates
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
@@ -93,13 +148,7 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
     build.cautions.append(Caution(where(g_n > TOUCHING, -formed * rate, 0), text))
 
 
-def _affinity(build: Build, law: RateLaw, mu: Mapping[str, Expression]) -> Expression:
-    """Gibbs energy of a reaction, what it takes from neighbours included."""
-    own = sum(n * mu[x] for x, n in law.stoichiometry().items())
-    return own - affinity_taken(build, law) if law.taken else own
-
-
-def _potential_per_area(build: Build, name: str, symbol: Any) -> Expression:
+def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
     quantity = Quantity(
         "M" if name == "phi" else f"M_{name}", "J/m^2", f"chemical potential of {name} per area", tag="e:SMuc"
     )
@@ -112,20 +161,6 @@ def _chemical_potential(build: Build, name: str, bond: Bond) -> Expression:
         return build.name(Quantity("mu", "J", "chemical potential per bond", tag="e:muc"), M / bond.density)
     quantity = Quantity(f"mu_{name}", "J", f"chemical potential of {name} per site", tag="e:muc")
     return build.name(quantity, M / bond.density, output=False)
-
-
-def _bound(build: Build, law: RateLaw) -> RateLaw:
-    return build.variables.bind(law, f"interface.bonding.{law.name()}")
-
-
-def _free(build: Build, forming: Expression) -> Expression:
-    """One while the bonding state may change, zero at a bound and beyond the reach of bonds.
-
-    Only what bonds form by may carry them beyond; a law with an envelope ends at its bound by itself.
-    """
-    if "phi" not in build.bonding or forming == 0:
-        return symengine.Integer(1)
-    return within_reach(build) * free_to_react(build, forming)
 
 
 def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
@@ -158,7 +193,7 @@ def _resolved(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Exp
         return rate
     others = (absolute(_relaxation(build, own, laws[other], rates[other])) for other in laws if other != label)
     quantity = Quantity(f"steps_{label}", "1", f"relaxations of {law.title} within what time resolves")
-    steps = build.name(quantity, relaxation * (build.t * RESOLUTION / MARGIN), output=False)
+    steps = build.name(quantity, relaxation * (build.t * MOMENT / MARGIN), output=False)
     allowed = 1 + sum(others) * (build.t / MARGIN)
     return rate * where(steps > allowed, allowed / steps, 1)
 
@@ -169,36 +204,16 @@ def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expressi
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
-def _prescribed_bonding(build: Build) -> Iterator[Power]:
-    phi = symengine.Symbol("phi")
-    if "phi" in build.bonding or not depends(build.psi, phi):
-        return
-    M = _potential_per_area(build, "phi", phi)
-    rate = build.rate_of("phi")
-    if rate != 0:
-        yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
-
-
-NEIGHBOURS = "neighbours"
-
-
-def affinity_taken(build: Build, law: RateLaw) -> Expression:
-    """Gibbs energy [J] that one reaction takes from neighbours."""
-    return build.variables.call(law, law.taken[1]) if law.taken else symengine.Integer(0)
-
-
-def supplied(build: Build, laws: Mapping[str, RateLaw], rates: Mapping[str, Expression]) -> Iterator[Power]:
-    """Book the enthalpy and the entropy that reactions take from neighbours; the interface gets the enthalpy."""
+def _from_neighbours(build: Build, found: Sequence[Reaction], rates: Mapping[str, Expression]) -> Iterator[Power]:
+    """The enthalpy and the entropy that reactions take from neighbours."""
     heat, entropy = [], []
-    for label, law in laws.items():
-        if law.taken:
-            h, g = (build.variables.call(law, formula) for formula in law.taken)
-            heat.append(build.stretch * rates[label] * h)
-            entropy.append(build.stretch * rates[label] * (h - g))
-    if not heat:
-        return
-    text = "enthalpy of what reactions take from neighbours"
-    power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
-    T = build.variables.get("T_c", "the neighbours")
-    with_it = symengine.Add(*entropy) / T
-    yield Power(HEAT, OUTSIDE, INTERFACE, power, f"H_{NEIGHBOURS}", text, entropy=with_it)
+    for item in found:
+        if item.law.taken:
+            h, g = (build.variables.call(item.law, formula) for formula in item.law.taken)
+            heat.append(build.stretch * rates[item.label] * h)
+            entropy.append(build.stretch * rates[item.label] * (h - g))
+    if heat:
+        text = "enthalpy of what reactions take from neighbours"
+        power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))
+        S = symengine.Add(*entropy) / build.variables.get("T_c", "the neighbours")
+        yield Power(HEAT, OUTSIDE, INTERFACE, power, NEIGHBOURS, text, entropy=S)

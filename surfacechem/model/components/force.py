@@ -20,18 +20,10 @@ from functools import partial
 import symengine
 
 from surfacechem.expressions import Expression, depends, derivative, positive, where
-from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.build import Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES, Quantity
-
-FEWEST = 1e-12
-"""Bonded fraction below which a shared load does not grow any more."""
-
-RESOLUTION = 1e-12
-"""Bonds that would be gone within this part of the time that has passed have ruptured."""
-
-INSTANT = 1e-100
-"""Time that counts as none [s]."""
+from surfacechem.tolerances import FEWEST, MOMENT, NOTHING, TINY
 
 SHARED = "load shared by all bonds"
 ELASTIC = "bond elasticity"
@@ -82,7 +74,8 @@ def rupture(build: Build) -> None:
         )
         loss = symengine.Add(*losses)
         if loss != 0:
-            left = bonds - RESOLUTION * (build.t + INSTANT) * loss + NOTHING
+            # Bonds that would be gone within what the clock resolves of the time that has passed have ruptured.
+            left = bonds - MOMENT * (build.t + TINY) * loss + NOTHING
             # What is left of hardly any bonds cannot be told from rounding.
             left = where(bonds > FEWEST, left, NOTHING)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"

@@ -19,9 +19,10 @@ from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
-from surfacechem.model.build import BOTH, NOTHING, Build
+from surfacechem.model.build import BOTH, Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
+from surfacechem.tolerances import NOTHING
 
 Conductances = dict[tuple[str, str], list[Expression]]
 """Conductances in parallel between two ends [W/(m^2 K)]."""
@@ -123,7 +124,7 @@ def _two_temperatures(build: Build, law: HeatTransfer) -> None:
 
 def _made_across(law: HeatTransfer) -> bool:
     """Whether a law carries heat through a film in which it is also made, all across."""
-    return law.closure == "medium" and hasattr(law, "resistances")
+    return law.closure == "medium" and law.resistances is not None
 
 
 def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dict[tuple[str, str], Expression]]:

@@ -13,13 +13,14 @@ from surfacechem.contracts.terms import Law, Load, Potential, Spec, UnderPressur
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, positive, where
 from surfacechem.model.automaton import Edge
-from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
 from surfacechem.model.parts import Bond, Energy
 from surfacechem.model.sliding.formulations import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.tolerances import NOTHING
 
 LOADABLE = (
     "phi",
@@ -226,7 +227,7 @@ def _energies(
 
 def _attracts(law: Potential) -> bool:
     """Whether a potential may pull bodies that touch, so that it says what part of it the contact bears."""
-    return hasattr(law, "repulsion")
+    return law.repulsion is not None
 
 
 def _contact_pressure(build: Build, borne: Sequence[Expression]) -> Expression:
@@ -258,7 +259,7 @@ def _reads_net_pressure(law: Law) -> bool:
 def _per_reference_area(
     build: Build,
     law: Potential,
-    formula: Callable[..., Expression],
+    formula: Callable[..., Expression] | None,
     gaps: Mapping[str, Expression] | None = None,
 ) -> Expression:
     """Free energy of a bound law per reference area, as a function of the area stretch where it depends on that."""

@@ -17,8 +17,9 @@ from surfacechem.model.springs import stored
 from surfacechem.model.system import Pace
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
+from surfacechem.tolerances import MICROMETRE
 
-LENGTH = 1e-6
+LENGTH = MICROMETRE
 """Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
 
 AXES = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
@@ -98,7 +99,7 @@ def held_across(build: Build, along: Held) -> Held | None:
         _refuse_restitution(law, "t2")
         return Held(law, "t2", law.path, along)
     given = any(driven(build, name) or name in build.scene.initial for name in ("w_t2", "F_t2", "u_t2", "v_2"))
-    if given or any(hasattr(friction, "transverse") for friction in build.interface.frictions):
+    if given or any(friction.transverse is not None for friction in build.interface.frictions):
         return Held(along.law, "t2", along.by, along)
     return None
 

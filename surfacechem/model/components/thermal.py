@@ -18,12 +18,10 @@ from surfacechem.model.constraints.folds import determinant
 from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.tolerances import NOTHING
 
 _NEWTON = 20
 """Steps to a temperature from an energy that is close to quadratic."""
-
-COLD = 1e-9
-"""Temperature that counts as zero [K]."""
 
 CAPACITY_REMEDY = (
     "The interface's potential takes more capacity than there is. Of a bond energy: kappa_2 (1 - phi_i)^2 must stay "
@@ -204,7 +202,7 @@ def _guess(build: Build) -> float:
 
 
 def _warm(node: Node) -> Margin:
-    return Margin(f"{node.name} > 0", node.T - COLD, f"the temperature {node.name} reached zero")
+    return Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
 
 
 def _temperature_margins(build: Build, node: Node, row: Expression) -> None:

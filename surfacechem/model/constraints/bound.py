@@ -46,7 +46,7 @@ def free_to_react(build: Build, rate: Expression) -> Expression:
     top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
     if top is None or LOGARITHM in build.scene.initial:
         return symengine.Integer(1)
-    laws = [law for law in build.interface.reactions if not hasattr(law, "envelope")]
+    laws = [law for law in build.interface.reactions if law.envelope is None]
     if all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws):
         return symengine.Integer(1)
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}

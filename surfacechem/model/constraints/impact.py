@@ -190,7 +190,7 @@ def _rub(exerted: Expression, modes: Mapping[Expression, Expression], jump: Mapp
 
 def _ratio(build: Build, law: Friction, velocity: str) -> Expression:
     """Impulse of friction over that of the pressure, where sliding slows down under it."""
-    if hasattr(law, "transverse"):
+    if law.transverse is not None:
         raise InputError(
             f"{law.name()}: what an impact takes from sliding is not known where friction differs from direction to "
             f"direction, since it turns within the impact. {SOFTEN}",

@@ -10,10 +10,11 @@ from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import Edge
-from surfacechem.model.build import NOTHING, Build
+from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, held
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES
+from surfacechem.tolerances import NOTHING
 
 MATCH = 1e-6
 """Relative difference of two statements of a strength that rounded input explains."""
@@ -39,7 +40,7 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
 
 def softening_mode(build: Build) -> None:
     """The mode, for the laws that read it."""
-    if not any(hasattr(law, "envelope") for law in build.interface.reactions):
+    if not any(law.envelope is not None for law in build.interface.reactions):
         return
     words = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
     mode = build.mode("debonding", 0.0, words)
@@ -88,7 +89,7 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     """Rate of a bound law with an envelope, where others form bonds, and what starts and ends the loss of bonds."""
     mode = build.find_mode("debonding")
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
-    left = build.variables.call(law, law.envelope)  # type: ignore[attr-defined]
+    left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
     _check(build, law, phi, g_n, peak)
     quantity = VARIABLES["overshoot"]

@@ -52,7 +52,7 @@ def creeping_mass(build: Build) -> Friction | None:
 
 
 def _laws(build: Build) -> list[Friction]:
-    return [law for law in build.interface.frictions if hasattr(law, "velocity")]
+    return [law for law in build.interface.frictions if law.velocity is not None]
 
 
 def _follows_velocity(law: Friction) -> bool:

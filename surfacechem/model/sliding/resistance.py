@@ -25,7 +25,7 @@ def directions(build: Build) -> tuple[Direction, ...]:
     """The directions in which the interface moves, or in which its velocity is prescribed."""
     if build.motion.slips:
         return tuple(slip.d for slip in build.motion.slips)
-    both = build.variables.has("v_2") or any(hasattr(law, "transverse") for law in build.interface.frictions)
+    both = build.variables.has("v_2") or any(law.transverse is not None for law in build.interface.frictions)
     return (ALONG, ACROSS) if both else (ALONG,)
 
 
@@ -37,7 +37,7 @@ def resistance(
         formula = bound.driven if law is build.motion.creeping else bound.statement
         return {ALONG: build.variables.call(bound, formula, own)}
     _refuse_one_component(law)
-    if hasattr(law, "transverse"):
+    if law.transverse is not None:
         formulas = {ALONG: bound.traction, ACROSS: bound.transverse}
         return {d: build.variables.call(bound, formula, own) for d, formula in formulas.items()}
     if build.variables.has("speed"):
@@ -92,7 +92,7 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
 
 
 def _borne(build: Build, bound: Friction, d: Direction, at_rest: Mapping[str, Expression]) -> Expression:
-    two = d is ACROSS and hasattr(bound, "transverse")
+    two = d is ACROSS and bound.transverse is not None
     kinetic = build.variables.call(bound, bound.transverse if two else bound.statement, at_rest)
     if not bound.has_limit:
         return kinetic
@@ -123,4 +123,4 @@ def _caution(build: Build, law: Friction, bound: Friction) -> None:
 
 def formula_along(law: Friction, d: Direction) -> tuple[str, ...]:
     """What a law reads along a direction."""
-    return reads(law.transverse if d is ACROSS and hasattr(law, "transverse") else law.statement)
+    return reads(law.transverse if d is ACROSS and law.transverse is not None else law.statement)

@@ -1,0 +1,203 @@
+r"""One-way laws that undo each other: what they depart from equilibrium by, and the work of a prescribed force.
+
+A force f that a scene prescribes is a dead load. Two reactions that undo each other keep detailed balance under it if
+:math:`k_f/k_r` grows like :math:`e^{f(x_f-x_r)/k_BT}` with the work on the way from one state to the other, between
+which a bond gives way by the difference of its distances to the transition state. So the rates say how far a bond of
+the species k lets the load down,
+
+.. math:: \sum_k \nu_k \ell_k = x_f - x_r, \qquad \Lambda = -f \sum_k N_k \theta_k \ell_k,
+
+and the load's potential belongs to the affinity of the pair, whose reactions take :math:`f\sum_k\nu_k\ell_k` from it.
+So it does to that of every law which goes by the affinity: in equilibrium :math:`d\ln\frac{\phi}{1-\phi}/df=\ell/k_BT`
+of bonds that mix ideally. A law that feels the force while its reverse follows from the affinity has to say its length
+itself. A prescribed traction that bonds share is such a force too, a share each.
+
+Where pairs around a cycle contradict each other, or reactions whose reverse knows no force, the lengths are the closest
+(least squares), and what is left is a departure from equilibrium. A reaction that nothing undoes takes no work: what
+the load does once a bond has let go is not the interface's.
+
+Source: Bell (1978), Science 200, 618, doi 10.1126/science.347575, with the detailed balance of Onsager (1931), Phys.
+Rev. 37, 405, under a load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.contracts.terms import Load, RateLaw, reads
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, depends, derivative, log_sum, where
+from surfacechem.model.build import Build
+from surfacechem.model.components.force import SHARED
+from surfacechem.model.components.mounting import driven
+from surfacechem.model.system import Pair
+from surfacechem.quantities import BOLTZMANN, Quantity
+from surfacechem.tolerances import DIGITS, LEAST_COVERAGE, ROUNDING
+
+Array = NDArray[np.float64]
+
+LARGEST_COVERAGE = 1 - DIGITS
+"""A full coverage counts as this, for the logarithm of what is left."""
+
+
+@dataclass(frozen=True)
+class Opposed:
+    """One-way laws, by label, that change the bonding variables by ``change``, and those that change them back."""
+
+    change: Mapping[str, int | float]
+    forward: Mapping[str, RateLaw]
+    backward: Mapping[str, RateLaw]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of all of them."""
+        return (*self.forward, *self.backward)
+
+    @property
+    def label(self) -> str:
+        """Short name for the quantities that belong to all of them."""
+        return "_".join(self.labels)
+
+    @property
+    def title(self) -> str:
+        """The reaction both ways."""
+        first = next(iter(self.forward.values()))
+        return first.title.replace(" => ", " <=> ")
+
+
+def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
+    """The one-way laws that have a counterpart; all that share a stoichiometry belong together."""
+    groups: list[Opposed] = []
+    one_way = {label: law for label, law in laws.items() if law.one_way}
+    for label, law in one_way.items():
+        change = law.turnover()
+        if not change or any(label in group.labels for group in groups):
+            continue
+        back = {name: -n for name, n in change.items()}
+        forward = {name: other for name, other in one_way.items() if other.turnover() == change}
+        backward = {name: other for name, other in one_way.items() if other.turnover() == back}
+        if backward:
+            groups.append(Opposed(change, forward, backward))
+    return groups
+
+
+def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> None:
+    """Name what the rates of one-way laws lack to balance where the affinity vanishes; rates from outside are not."""
+    if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
+        return
+
+    def log_rate(laws: Iterable[RateLaw]) -> Expression:
+        return log_sum([build.variables.call(law, law.log_rate) for law in laws if law.log_rate is not None])
+
+    affinity = sum(n * mu[name] for name, n in group.change.items())
+    log_ratio = log_rate(group.forward.values()) - log_rate(group.backward.values())
+    _name_departure(build, group.label, f"{group.title} (pair)", log_ratio, affinity)
+
+
+def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> None:
+    """The same for a law that states its rates both ways, where the potential knows of the reaction at all."""
+    known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
+    if law.log_ratio is not None and known:
+        _name_departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
+
+
+def _name_departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> None:
+    T = build.variables.get("T_c", "the equilibrium of a reaction")
+    value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
+    inside = {}  # coverages within bounds where their logarithms and those of their complements exist
+    for bond in build.bonding.values():
+        below = where(bond.symbol < LARGEST_COVERAGE, bond.symbol, LARGEST_COVERAGE)
+        inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
+    quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
+    build.name(quantity, value.subs(inside))
+    build.pairs.append(Pair(quantity.name, title, label))
+
+
+def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
+    """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
+    shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
+    if not (driven(build, "f") or (shares and driven(build, "t_n"))):
+        idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
+        if idle is not None:
+            message = (
+                f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to "
+                "the equilibrium; leave it out."
+            )
+            raise InputError(message, idle.place)
+        return {}
+    for law in laws.values():
+        # A rate that feels the force while its reverse follows from the affinity, without the work.
+        if law.balanced and law.length is None and "f" in reads(law.statement):
+            if _is_held_at_zero(build):
+                return {}
+            known = "x_on" in dict(law.specs())
+            remedy = (
+                "Give `x_on`, 0 m where formation does not feel the force"
+                if known
+                else "Write it as two reactions with `=>`, each with its own distance to the transition state"
+            )
+            message = (
+                f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the "
+                f"force, but how far a bond lets the load down as it forms is not known. {remedy}."
+            )
+            raise InputError(message, law.place)
+    found = lengths(laws, pairs)
+    if not found:
+        return {}
+    f = build.variables.get("f", "the work of the force")
+    load = -f * sum(build.bonding[name].density * build.bonding[name].symbol * found[name] for name in found)
+    return {name: derivative(load, build.bonding[name].symbol) / build.bonding[name].density for name in found}
+
+
+def _is_held_at_zero(build: Build) -> bool:
+    """Whether the case holds the force at zero, where it does no work. Any other force is assembled anew."""
+    load = build.scene.loading.get("f")
+    if not isinstance(load, Load) or getattr(load, "level", None) != 0.0:
+        return False
+    build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
+    return True
+
+
+def by_affinity(law: RateLaw) -> bool:
+    """Whether a law goes by an affinity that the work of a force is part of."""
+    return law.length is not None or "mu" in reads(law.statement)
+
+
+def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
+    """How far a bond of each species lets a load down [m], up to what no pair tells; empty where no pair feels it."""
+    known = [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
+    told = []
+    for pair in pairs:  # of single reactions that the force drives along a distance
+        forward, backward = list(pair.forward.values()), list(pair.backward.values())
+        if len(forward) == len(backward) == 1:
+            x_f, x_r = forward[0].distance, backward[0].distance
+            if x_f is not None and x_r is not None:
+                told.append((forward[0].stoichiometry(), x_f - x_r))
+    known = told + known
+    names = list(dict.fromkeys(name for change, _ in known for name in change))
+    both_ways = [law.stoichiometry() for law in laws.values() if law.balanced and not by_affinity(law)]
+    changes = _matrix(names, [change for change, _ in known])
+    return {
+        name: sum(float(c) * x for c, (_, x) in zip(row, known, strict=True) if abs(c) > ROUNDING)
+        for name, row in zip(names, _inverse(changes, _matrix(names, both_ways)), strict=True)
+    }
+
+
+def _matrix(names: Sequence[str], changes: Sequence[Mapping[str, int | float]]) -> Array:
+    rows = [[change.get(name, 0) for name in names] for change in changes]
+    return np.array(rows, dtype=float).reshape(len(rows), len(names))
+
+
+def _inverse(changes: Array, kept: Array) -> Array:
+    """Lengths per difference of distance, shape (species, pairs), of which none changes in the reactions ``kept``."""
+    if not np.any(kept):
+        return np.asarray(np.linalg.pinv(changes))
+    _, sizes, rows = np.linalg.svd(kept)
+    basis = rows[int(np.sum(sizes > ROUNDING)) :].T
+    left = changes @ basis
+    left[np.abs(left) < ROUNDING] = 0.0
+    return np.asarray(basis @ np.linalg.pinv(left)) if basis.size else np.zeros(changes.T.shape)
