@@ -68,10 +68,13 @@ FRACTION_FLOOR = 1e-300
 rate above 1e-8 is a normal number.
 """
 
-LEAST_COVERAGE = TINY / EPS
-"""A vanished coverage counts as this where its logarithm has to cancel: next to it FRACTION_FLOOR is no more than
-rounding, 4.5e-277.
+LEAST_COVERAGE = 1e-280
+"""A vanished coverage counts as this where its logarithm has to cancel: next to it FRACTION_FLOOR is less than a
+rounding, by four decades.
 """
+
+LARGEST_COVERAGE = 1 - 1e-15
+"""A full coverage counts as this, for the logarithm of what is left: four EPS from one."""
 
 MICROMETRE = 1e-6
 """Scale of gaps [m] and of their velocities [m/s]: with EPS they are rounded at 2e-22 m, far below any atom."""

@@ -36,12 +36,9 @@ from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import driven
 from surfacechem.model.system import Pair
 from surfacechem.quantities import BOLTZMANN, Quantity
-from surfacechem.tolerances import DIGITS, LEAST_COVERAGE, ROUNDING
+from surfacechem.tolerances import LARGEST_COVERAGE, LEAST_COVERAGE, ROUNDING
 
 Array = NDArray[np.float64]
-
-LARGEST_COVERAGE = 1 - DIGITS
-"""A full coverage counts as this, for the logarithm of what is left."""
 
 
 @dataclass(frozen=True)
