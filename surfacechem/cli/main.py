@@ -75,8 +75,8 @@ def run(
 ) -> None:
     """Run a case, write its dataset and print a summary."""
     from surfacechem.results.netcdf import dataset_path
-    from surfacechem.runs.report import run_summary
     from surfacechem.runs.simulation import load
+    from surfacechem.runs.summaries import run_summary
 
     simulation = load(case, changes or ())
     settings = chosen(simulation, solver, rtol, accuracy)
@@ -112,8 +112,8 @@ def sweep(
     """Run a case over values of its parameters and write one dataset."""
     from surfacechem.documents.overrides import assignments
     from surfacechem.results.netcdf import dataset_path
-    from surfacechem.runs.report import sweep_summary
     from surfacechem.runs.simulation import load
+    from surfacechem.runs.summaries import sweep_summary
 
     simulation = load(case, changes or ())
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
@@ -137,8 +137,8 @@ def check(
     """Say a case back in words, without running it."""
     from surfacechem.results.error_estimates import reasons
     from surfacechem.runs.check import cautions, groups, lumping_warnings, warnings
-    from surfacechem.runs.report import check_summary
     from surfacechem.runs.simulation import load
+    from surfacechem.runs.summaries import check_summary
     from surfacechem.solve import AUTO
 
     simulation = load(case, changes or ())

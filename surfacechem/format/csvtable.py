@@ -82,7 +82,7 @@ def table(tree: Tree, unit: str) -> Table:
 
 
 @dataclass(frozen=True)
-class Row:
+class TableLine:
     """A line of the table, with its place."""
 
     cells: Sequence[str]
@@ -96,12 +96,12 @@ class Row:
         return InputError(message, replace(self.place, line=self.line))
 
 
-def _rows(content: Tree) -> list[Row]:
+def _rows(content: Tree) -> list[TableLine]:
     """Lines that are neither empty nor comments; the first is the heading."""
     lines = enumerate(content.text("the table").splitlines(), start=1)
     kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
     rows = [
-        Row([cell.strip() for cell in cells], number, content.place)
+        TableLine([cell.strip() for cell in cells], number, content.place)
         for (number, _), cells in zip(kept, csv.reader(line for _, line in kept), strict=True)
     ]
     if not rows:
@@ -109,7 +109,7 @@ def _rows(content: Tree) -> list[Row]:
     return rows
 
 
-def _column(cell: str, heading: Row) -> tuple[str, str]:
+def _column(cell: str, heading: TableLine) -> tuple[str, str]:
     """Name and unit of a column."""
     found = HEADING.fullmatch(cell)
     if found is None:
@@ -118,7 +118,7 @@ def _column(cell: str, heading: Row) -> tuple[str, str]:
     return found["name"], found["unit"].strip()
 
 
-def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]], heading: Row) -> int:
+def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]], heading: TableLine) -> int:
     """The column that is named, else that of the variable; one of another name is never meant by itself."""
     if named is not None:
         return _index(named.text("column"), columns, heading)
@@ -130,7 +130,7 @@ def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]
     return _index(variable, columns, heading)
 
 
-def _index(name: str, columns: Sequence[tuple[str, str]], heading: Row) -> int:
+def _index(name: str, columns: Sequence[tuple[str, str]], heading: TableLine) -> int:
     names = [known for known, _ in columns]
     if names.count(name) > 1:
         raise heading.error(f"the column {name} is there {names.count(name)} times.")
@@ -139,7 +139,7 @@ def _index(name: str, columns: Sequence[tuple[str, str]], heading: Row) -> int:
     return names.index(name)
 
 
-def _number(row: Row, index: int, columns: Sequence[tuple[str, str]], unit: str, variable: str = "") -> float:
+def _number(row: TableLine, index: int, columns: Sequence[tuple[str, str]], unit: str, variable: str = "") -> float:
     name, given = columns[index]
     cell = row.cells[index]
     whose = f"{variable}, from the column {name}," if variable and variable != name else name

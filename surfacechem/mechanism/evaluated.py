@@ -47,7 +47,7 @@ class Neighbour:
     place: Place | None = None
 
 
-class Held:
+class HeldPhase:
     """Phases beside a surface at their given states, and what reactions take from them."""
 
     def __init__(self, surface: Any, reactions: Sequence[int]) -> None:
@@ -171,7 +171,7 @@ class SurfaceEngine:
         self.surface = surface
         self.positions = list(reactions)
         open_ones = [i for i, law in reactions.items() if isinstance(law, NeighbourReaction)]
-        self.held = Held(surface, open_ones) if open_ones else None
+        self.held = HeldPhase(surface, open_ones) if open_ones else None
         paths = [reactions[i].path for i in open_ones]
         self.gives = (
             *(f"{law.path}.value" for law in reactions.values()),

@@ -34,7 +34,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class Curve:
+class EnergyCurve:
     """A continuous function of one coverage, zero where that is: polynomials from one knot to the next.
 
     ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
@@ -46,12 +46,12 @@ class Curve:
     pieces: tuple[tuple[float, tuple[float, ...]], ...] = ()
 
     @classmethod
-    def polynomial(cls, coefficients: Sequence[float]) -> Curve:
+    def polynomial(cls, coefficients: Sequence[float]) -> EnergyCurve:
         """From the coefficients of the first power and up."""
         return cls(((0.0, (0.0, *coefficients)),) if any(coefficients) else ())
 
     @classmethod
-    def through(cls, coverages: Sequence[float], values: Sequence[float]) -> Curve:
+    def through(cls, coverages: Sequence[float], values: Sequence[float]) -> EnergyCurve:
         """Straight lines through points."""
         lines = []
         for x, y, x_2, y_2 in zip(coverages, values, coverages[1:], values[1:], strict=False):
@@ -107,8 +107,8 @@ class Interaction:
     """The species."""
     variable: str
     """Name of its coverage."""
-    enthalpy: Curve = Curve()
-    entropy: Curve = Curve()
+    enthalpy: EnergyCurve = EnergyCurve()
+    entropy: EnergyCurve = EnergyCurve()
     a: float = 0.0
     b: float = 0.0
 
@@ -204,17 +204,19 @@ class _Reader:
         """One value."""
         return self.numbers(key)[0]
 
-    def curve(self, kind: str, many: str) -> Curve:
+    def curve(self, kind: str, many: str) -> EnergyCurve:
         """The enthalpy or the entropy over the coverage."""
         node = self.node
         if kind in node:
-            return Curve.polynomial(self.numbers(kind))
+            return EnergyCurve.polynomial(self.numbers(kind))
         if f"{kind}-coefficients" in node:
-            return Curve.polynomial(self.numbers(f"{kind}-coefficients"))
+            return EnergyCurve.polynomial(self.numbers(f"{kind}-coefficients"))
         if many in node:
-            return Curve.through([float(x) for x in node[f"{kind}-coverages"]], self.numbers(many))
+            return EnergyCurve.through([float(x) for x in node[f"{kind}-coverages"]], self.numbers(many))
         if f"{kind}-change" in node:
             knot = float(node[f"{kind}-change"])
             middle = self.number(f"{kind}-low") * knot
-            return Curve.through([0.0, knot, 1.0], [0.0, middle, middle + (1 - knot) * self.number(f"{kind}-high")])
-        return Curve()
+            return EnergyCurve.through(
+                [0.0, knot, 1.0], [0.0, middle, middle + (1 - knot) * self.number(f"{kind}-high")]
+            )
+        return EnergyCurve()

@@ -123,7 +123,7 @@ class Shomate(Series):
 
 
 @dataclass(frozen=True)
-class Piece:
+class ThermoRange:
     """A form that holds up to the temperature ``top`` [K], which belongs to this piece if ``closed``."""
 
     top: float
@@ -140,7 +140,7 @@ class StandardGibbs:
     -1600.0
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ThermoRange, ...]
     shift: float = 0.0
     """What is added to it for each kelvin, by a standard state of another coverage than one."""
 
@@ -176,15 +176,15 @@ def lower(thermo: Any) -> StandardGibbs | None:
     model, top, c = type(thermo).__name__, float(thermo.max_temp), [float(x) for x in thermo.coeffs]
     if model == "ConstantCp":
         h0, s0, cp0 = (x / KILO for x in c[1:])
-        return StandardGibbs((Piece(top, ConstantCp(T0=c[0], h0=h0, s0=s0, cp0=cp0)),))
+        return StandardGibbs((ThermoRange(top, ConstantCp(T0=c[0], h0=h0, s0=s0, cp0=cp0)),))
     if model == "Nasa9PolyMultiTempRegion":
         regions = [c[1 + 11 * i : 12 + 11 * i] for i in range(int(c[0]))]
-        return StandardGibbs(tuple(Piece(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions))
+        return StandardGibbs(tuple(ThermoRange(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions))
     if model in TWO_RANGES:
         form, *starts = TWO_RANGES[model]
         low, high = (c[start : start + 7] for start in starts)
-        below = () if low == high else (Piece(c[0], _filled(form, low)),)
-        return StandardGibbs((*below, Piece(top, _filled(form, high))))
+        below = () if low == high else (ThermoRange(c[0], _filled(form, low)),)
+        return StandardGibbs((*below, ThermoRange(top, _filled(form, high))))
     return None
 
 

@@ -9,7 +9,7 @@ from surfacechem.quantities import BOLTZMANN
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
-class LinearAffinity(Reference):
+class LinearAffinitySolution(Reference):
     r"""Two-way bonding whose rate is linear in the affinity, constant temperature.
 
     .. math:: \phi=\phi_{eq}+(\phi_i-\phi_{eq})e^{-\lambda t},\quad \lambda=\frac{c_rK_c}{n_c},\quad
@@ -47,7 +47,7 @@ class LinearAffinity(Reference):
         }
 
 
-class ExponentialAffinity(Reference):
+class ExponentialAffinitySolution(Reference):
     r"""Two-way bonding whose rate is exponential in the affinity, constant temperature.
 
     With the affinity :math:`y=a(\phi_{eq}-\phi)=-\mu_c/(k_BT)`, :math:`a=\frac{K_c}{n_ck_BT}`,

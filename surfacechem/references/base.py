@@ -42,7 +42,7 @@ class Reference(ABC):
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower()
+        cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__.removesuffix("Solution")).lower()
         dataclass(frozen=True, kw_only=True)(cls)
 
     def __post_init__(self) -> None:

@@ -49,7 +49,7 @@ def inverted(image: Callable[[Complex], Complex], t: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Slab:
+class ConductingSlab:
     """A body of capacity C and conductivity k over its thickness, both per area; a lump without conductivity.
 
     Beyond the far side is ``T_far`` behind a conductance; without a capacity the body keeps its temperature.
@@ -87,13 +87,15 @@ class Slab:
         return result
 
 
-def flux(first: Slab, second: Slab, resistance: float, s: Complex) -> Complex:
+def flux(first: ConductingSlab, second: ConductingSlab, resistance: float, s: Complex) -> Complex:
     """Heat flux from the first to the second body."""
     drive = (first.T - second.T) / s + first.open(s) - second.open(s)
     return drive / (first.answer(s) + second.answer(s) + resistance)
 
 
-def temperature(bodies: tuple[Slab, Slab], resistance: float, number: int, x: float, t: Array) -> Array:
+def temperature(
+    bodies: tuple[ConductingSlab, ConductingSlab], resistance: float, number: int, x: float, t: Array
+) -> Array:
     """Temperature of a body at a distance from the contact, at t > 0."""
     body, sign = bodies[number - 1], 1.0 if number == 2 else -1.0
 
@@ -144,11 +146,11 @@ class ConductingSlabs(Reference):
         return {"R": 1.0 / h if h else None, **_of_body(scene, 1), **_of_body(scene, 2)}
 
     @property
-    def bodies(self) -> tuple[Slab, Slab]:
+    def bodies(self) -> tuple[ConductingSlab, ConductingSlab]:
         """Both bodies."""
         return (
-            Slab(self.T_1, self.C_1, self.thickness_1, self.conductivity_1, self.h_far_1, self.T_far_1),
-            Slab(self.T_2, self.C_2, self.thickness_2, self.conductivity_2, self.h_far_2, self.T_far_2),
+            ConductingSlab(self.T_1, self.C_1, self.thickness_1, self.conductivity_1, self.h_far_1, self.T_far_1),
+            ConductingSlab(self.T_2, self.C_2, self.thickness_2, self.conductivity_2, self.h_far_2, self.T_far_2),
         )
 
     def quantities(self, t: Array) -> Quantities:

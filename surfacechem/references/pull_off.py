@@ -24,7 +24,7 @@ PANEL = 0.25
 
 
 @dataclass(frozen=True)
-class Fold:
+class PullOffFold:
     """A state in which the quasi-static gap is lost, and the one it jumps to at the same displacement."""
 
     g: float
@@ -71,7 +71,7 @@ class SpringAndZone:
         return g + self.traction(g) / self.k, 1.0 + slope / self.k
 
     @cached_property
-    def folds(self) -> tuple[Fold, Fold]:
+    def folds(self) -> tuple[PullOffFold, PullOffFold]:
         """The snap apart and the snap together: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
         if self.severity >= 1.0:
             raise InputError("stable for every displacement; there is no jump.")
@@ -88,13 +88,13 @@ class SpringAndZone:
         larger = 1.0 + float(increasing_root(beyond, distance, low, high)[0])
         return self._fold(smaller, larger, math.inf), self._fold(larger, -1.0, smaller)
 
-    def _fold(self, x: float, low: float, high: float) -> Fold:
+    def _fold(self, x: float, low: float, high: float) -> PullOffFold:
         """The jump from the gap at x to the branch between two others."""
         g, t = self.g_0 * (1.0 + x), self.t_max * (1.0 + x) * math.exp(-x)
         w = g + t / self.k
         after = float(self.gap(np.array([w]), self.g_0 * (1.0 + low), self.g_0 * (1.0 + high))[0])
         release = self.energy(g, w) - self.energy(after, w)
-        return Fold(g, w, t, after, float(self.traction(np.array(after))), release)
+        return PullOffFold(g, w, t, after, float(self.traction(np.array(after))), release)
 
 
 class CohesivePullOff(Reference):
@@ -145,12 +145,12 @@ class CohesivePullOff(Reference):
         return self.bodies.severity >= 1.0
 
     @property
-    def opening(self) -> Fold:
+    def opening(self) -> PullOffFold:
         """The jump on opening; InputError if it is stable."""
         return self.bodies.folds[0]
 
     @property
-    def closing(self) -> Fold:
+    def closing(self) -> PullOffFold:
         """The jump on closing; InputError if it is stable."""
         return self.bodies.folds[1]
 
@@ -228,7 +228,7 @@ class OverdampedPullOff(Reference):
         return SpringAndZone(self.k, self.t_max, self.g_0)
 
     @property
-    def fold(self) -> Fold:
+    def fold(self) -> PullOffFold:
         """The fold that is passed."""
         return self.bodies.folds[0]
 

@@ -29,7 +29,7 @@ KINK = "kink of "
 
 
 @dataclass(frozen=True)
-class Event:
+class EventRow:
     """An event with the states at its two sides, and its jump where it is one."""
 
     t: float
@@ -42,15 +42,15 @@ class Event:
     jump: Jump | None = None
 
 
-def events_of(trajectory: Trajectory) -> list[Event]:
+def events_of(trajectory: Trajectory) -> list[EventRow]:
     """Jumps and other events of a run in order of time."""
     margins, events = trajectory.model.margins, trajectory.result.events
     found = [
-        Event(float(t), 0.0, margins[i].name, margins[i].reason, y, y)
+        EventRow(float(t), 0.0, margins[i].name, margins[i].reason, y, y)
         for t, i, y in zip(events.t, events.index, events.y, strict=True)
         if i < len(margins) and not margins[i].peak
     ]
-    found += [Event(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
+    found += [EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
     last, told = 0.0, []
     for event in sorted(found, key=lambda event: event.t):
         told.append(event if event.jump else replace(event, since=event.t - last))
@@ -66,7 +66,9 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
     most = max(map(len, events))
     sizes = {**(axes or {}), "event": most}
 
-    def column(name: str, unit: str, text: str, value: Callable[[Event], float | str], unset: Any = np.nan) -> Column:
+    def column(
+        name: str, unit: str, text: str, value: Callable[[EventRow], float | str], unset: Any = np.nan
+    ) -> Column:
         table = np.full((len(runs), most), unset, dtype=object if unset == "" else float)
         for row, own in zip(table, events, strict=True):
             row[: len(own)] = [value(event) for event in own]
@@ -97,7 +99,7 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
     ]
 
 
-def _state(event: Event, side: str, k: int) -> float:
+def _state(event: EventRow, side: str, k: int) -> float:
     return float(getattr(event, side)[k])
 
 

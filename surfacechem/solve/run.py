@@ -20,7 +20,7 @@ from surfacechem.model.system import System
 from surfacechem.model.validity import check_start
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
-from surfacechem.solve.adapters.rates import output_rates
+from surfacechem.solve.adapters.time_derivatives import output_rates
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point

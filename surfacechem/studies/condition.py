@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.results.accuracy import FLOOR, relative_errors
-from surfacechem.studies.regimes import Exact, Problem, Refused, Stops
+from surfacechem.studies.regimes import Exact, Refused, Stops, Trial
 
 Array = NDArray[np.float64]
 Answer = Mapping[str, Array]
@@ -33,7 +33,7 @@ STRAIGHT = 0.1
 to one digit. Less would ask for shorter steps, in whose slopes there is more rounding."""
 
 
-def condition(problem: Problem, names: Collection[str]) -> float:
+def condition(problem: Trial, names: Collection[str]) -> float:
     """Largest relative change of the named values over that of the data, all of which change at once; not a number
     where the problem has no answer in numbers, or the data are not stated.
 

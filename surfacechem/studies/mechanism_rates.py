@@ -162,7 +162,7 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Cycle:
+class ReactionCycle:
     """Steps that together change nothing, each with how often it is taken; backwards where that is negative."""
 
     steps: Sequence[tuple[Step, int]]
@@ -182,7 +182,7 @@ class Cycle:
         return total
 
 
-def cycles(curves: Curves) -> list[Cycle]:
+def cycles(curves: Curves) -> list[ReactionCycle]:
     """Independent cycles that hold at least one pair or one-way reaction; others agree by construction."""
     paired = {label for pair in curves.pairs for label in pair.labels}
     steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
@@ -191,11 +191,11 @@ def cycles(curves: Curves) -> list[Cycle]:
     for row in _null_space(changes):
         taken = [(step, times) for step, times in zip(steps, row, strict=True) if times]
         if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
-            found.append(Cycle(taken))
+            found.append(ReactionCycle(taken))
     return found
 
 
-def cycle_verdict(cycle: Cycle, curves: Curves, temperatures: Array, forces: Array) -> str:
+def cycle_verdict(cycle: ReactionCycle, curves: Curves, temperatures: Array, forces: Array) -> str:
     """Whether a cycle can come to rest, in words."""
     one_way = {step: times for step, times in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible}
     if one_way and min(one_way.values()) < 0 < max(one_way.values()):

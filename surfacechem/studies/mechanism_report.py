@@ -17,7 +17,7 @@ from surfacechem.mechanism.rates import SurfaceReaction
 from surfacechem.mechanism.source import Source
 from surfacechem.results.detailed_balance import said
 from surfacechem.runs.listing import WIDTH, source
-from surfacechem.runs.report import columns
+from surfacechem.runs.summaries import columns
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
 from surfacechem.units import parse
 

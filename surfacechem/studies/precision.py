@@ -15,13 +15,13 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
 from surfacechem.results.event_table import event_times
-from surfacechem.runs.report import duration
 from surfacechem.runs.simulation import Simulation, load
+from surfacechem.runs.summaries import duration
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.radau.solver import LOOSEST
 from surfacechem.solve.run import Trajectory
 from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_tolerances, filled
-from surfacechem.studies.report import Section, Study, Table, Variable
+from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 from surfacechem.studies.truth import KINDS, MEANING, Errors, Subject, Truth, establish
 
 log = logging.getLogger(__name__)
@@ -60,7 +60,7 @@ tell is left empty.
 
 
 @dataclass
-class Point(Cell):
+class WorkPoint(Cell):
     """One solver at one tolerance: 'finished', 'stopped' by physics as the reference, 'failed', or 'omitted'."""
 
     errors: Errors | None = None
@@ -85,7 +85,7 @@ class Compared:
     variables: Sequence[str]
     truth: Truth | None
     reference: str
-    points: Mapping[tuple[str, float], Point]
+    points: Mapping[tuple[str, float], WorkPoint]
 
     @property
     def name(self) -> str:
@@ -185,22 +185,22 @@ def _compared(
     return Compared(subject, variables, truth, reference, points)
 
 
-def _attempt(subject: Subject, truth: Truth | None, rtol: float, solver: str) -> Point:
+def _attempt(subject: Subject, truth: Truth | None, rtol: float, solver: str) -> WorkPoint:
     if unable := subject.unable(solver):
-        return Point("omitted", unable)
+        return WorkPoint("omitted", unable)
     return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))
 
 
-def _judged(truth: Truth | None, done: Trajectory | Exception) -> Point:
+def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
     if isinstance(done, Exception):
-        return Point("failed", f"{type(done).__name__}: {done}")
+        return WorkPoint("failed", f"{type(done).__name__}: {done}")
     objection = done.reason if done.status == "failed" else ""
     if objection := (truth.objection(done) if truth else objection):
-        return Point("failed", objection)
+        return WorkPoint("failed", objection)
     errors = truth.errors(computed(done), event_times(done)) if truth else None
     if errors and not all(math.isfinite(error) for kind in errors.by_kind.values() for error in kind.values()):
-        return Point("failed", "values are not finite")
-    return Point(done.status, done.reason, errors, audit(done).energy_error)
+        return WorkPoint("failed", "values are not finite")
+    return WorkPoint(done.status, done.reason, errors, audit(done).energy_error)
 
 
 # -- the dataset -------------------------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ def _variables() -> Iterator[Variable]:
     """The variables over case, solver and tolerance, the coordinates first."""
     every = ("case", "solver", "tolerance")
 
-    def of_point(name: str, unit: str, text: str, read: Callable[[Point], float | str]) -> Variable:
+    def of_point(name: str, unit: str, text: str, read: Callable[[WorkPoint], float | str]) -> Variable:
         return Variable(name, every, lambda case, solver, rtol: read(case.points[solver, rtol]), unit, text)
 
     yield Variable("tolerance", ("tolerance",), float, "1", "relative tolerance asked for")
@@ -228,15 +228,15 @@ def _variables() -> Iterator[Variable]:
     yield of_point("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome)
     yield of_point("reason", "1", "why the run ended, failed or was left out", lambda p: p.reason)
     for kind, text in MEANING.items():
-        yield of_point(f"error_{kind}", "1", text, partial(Point.error, kind=kind))
+        yield of_point(f"error_{kind}", "1", text, partial(WorkPoint.error, kind=kind))
     yield of_point("energy_error", "1", "largest energy residual relative to the energy exchanged", lambda p: p.energy)
     yield of_point("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan))
     yield of_point("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan]))
     yield of_point("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan))
-    yield of_point("stepping_seconds", "s", "least time inside the library's own steps", Point.least_stepping)
+    yield of_point("stepping_seconds", "s", "least time inside the library's own steps", WorkPoint.least_stepping)
     yield of_point("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds)))
     for name, text in COUNTS.items():
-        yield of_point(f"count_{name}", "1", text, partial(Point.count, name=name))
+        yield of_point(f"count_{name}", "1", text, partial(WorkPoint.count, name=name))
     for kind in KINDS:
         each = partial(lambda case, s, rtol, name, kind: case.points[s, rtol].error(kind, name), kind=kind)
         yield Variable(f"variable_error_{kind}", (*every, "variable"), each, "1", f"{MEANING[kind]} of each variable")
@@ -245,8 +245,8 @@ def _variables() -> Iterator[Variable]:
 # -- the report --------------------------------------------------------------------------------------------------------
 
 
-def _sections(compared: Sequence[Compared]) -> Iterator[Section]:
-    yield Section("Run time against error", figure=True, details=True)
+def _sections(compared: Sequence[Compared]) -> Iterator[PageSection]:
+    yield PageSection("Run time against error", figure=True, details=True)
     for case in compared:
         yield _of_case(case)
         rows = [
@@ -256,14 +256,14 @@ def _sections(compared: Sequence[Compared]) -> Iterator[Section]:
             for name in case.variables
         ]
         heading = ("solver", "rtol", "variable", "final", "max", "L2")
-        table = Table(heading, rows, "; ".join(MEANING[kind] for kind in KINDS))
-        yield Section(f"{case.name}, variable by variable", tables=[table], details=True)
-    yield Section("How it was measured", METHOD.split("\n\n"), details=True)
+        table = PageTable(heading, rows, "; ".join(MEANING[kind] for kind in KINDS))
+        yield PageSection(f"{case.name}, variable by variable", tables=[table], details=True)
+    yield PageSection("How it was measured", METHOD.split("\n\n"), details=True)
     for case in compared:
-        yield Section(f"Case {case.name}", [case.subject.case.text], details=True)
+        yield PageSection(f"Case {case.name}", [case.subject.case.text], details=True)
 
 
-def _of_case(case: Compared) -> Section:
+def _of_case(case: Compared) -> PageSection:
     lines = [f"reference  {case.reference}"]
     if case.truth:
         uncertain = {kind: case.uncertainty(kind) for kind in KINDS}
@@ -273,13 +273,13 @@ def _of_case(case: Compared) -> Section:
     lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
     points = [point for point in case.points.values() if point.outcome != "omitted"]
     marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
-    tables = [Table(HEADING, [_row(point, case) for point in points], marked=marked)]
+    tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
     failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
-    tables += [Table(("failed", "rtol", "why"), failures)] if failures else []
-    return Section(f"{case.name}: {case.subject.case.title}", lines, tables)
+    tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
+    return PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
 
 
-def _row(point: Point, case: Compared) -> list[str]:
+def _row(point: WorkPoint, case: Compared) -> list[str]:
     """A line of the table: errors, of which those below the uncertainty of the reference say no more than that."""
     seconds = [f(point.seconds or [math.nan]) for f in (min, median, max)]
     times = ["" if math.isnan(t) else duration(t) for t in (*seconds, point.least_stepping())]

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from surfacechem.results.netcdf import CONVENTIONS, Column, replacing, save
-from surfacechem.runs.report import columns
+from surfacechem.runs.summaries import columns
 
 if TYPE_CHECKING:
     import xarray
@@ -48,7 +48,7 @@ SUFFIXES = (".nc", ".svg", ".png", ".html")
 """The files of a study, in the order in which they are written."""
 
 
-class Table(NamedTuple):
+class PageTable(NamedTuple):
     """Rows of texts under a heading; ``marked`` are the numbers of rows that stand out, such as failures."""
 
     heading: Sequence[str]
@@ -57,12 +57,12 @@ class Table(NamedTuple):
     marked: Sequence[int] = ()
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """A part of a report: paragraphs, the figure and tables under a heading; details are for the page only."""
 
     title: str
     paragraphs: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     figure: bool = False
     details: bool = False
 
@@ -73,7 +73,7 @@ class Page:
 
     title: str
     command: str
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     omissions: Sequence[str] = ()
     """What was left out, each with its reason."""
     draw: Callable[[], Figure] | None = None
@@ -150,7 +150,7 @@ class Study:
     variables: Sequence[Variable]
     """The variables of the dataset, the coordinates first."""
     coordinates: Sequence[str]
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     omissions: Sequence[str]
     settings: Mapping[str, str | float | int] = field(default_factory=dict)
     """Global attributes of its own."""

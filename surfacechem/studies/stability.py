@@ -29,8 +29,8 @@ from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.condition import condition, least
 from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, check_tolerances, filled
-from surfacechem.studies.regimes import Exact, Expectation, Problem, Refused, Regime, Stops, chosen
-from surfacechem.studies.report import Section, Study, Table, Variable
+from surfacechem.studies.regimes import Exact, Expectation, Refused, Regime, Stops, Trial, chosen
+from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ class Attempt(Cell):
         return mark if self.outcome == FAILED else f"{mark} {self.digits:.1f}".strip()
 
 
-class Row(NamedTuple):
+class MatrixRow(NamedTuple):
     """Attempts at a regime by solver and value."""
 
     regime: Regime
@@ -140,7 +140,7 @@ def stability(
     for number, regime in enumerate(found, 1):
         values = few(regime.values) if quick else list(regime.values)
         log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
-        rows.append(Row(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
+        rows.append(MatrixRow(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
     options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
     options += ["--rtol", repr(float(rtol))] if rtol != RTOL else []
@@ -167,7 +167,7 @@ def few(values: Sequence[float]) -> list[float]:
 # -- one problem -------------------------------------------------------------------------------------------------------
 
 
-def prepared(problem: Problem, rtol: float = RTOL) -> Callable[[str], Attempt]:
+def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
     """Attempts at a problem by solver; it is read and compiled once."""
     try:
         model = Model(read(problem).system())
@@ -185,7 +185,7 @@ def _at_value(regime: Regime, rtol: float, value: float) -> Callable[[str], Atte
     return prepared(regime.problem(value), rtol)
 
 
-def read(problem: Problem) -> Case:
+def read(problem: Trial) -> Case:
     """The case of a problem with its changes."""
     changes = {**problem.changes, "run": {"times": list(problem.times)}}
     shipped = "\n" not in problem.case
@@ -193,7 +193,7 @@ def read(problem: Problem) -> Case:
     return replace(case, reference=None)  # the regime has its own expectation
 
 
-def _judged(problem: Problem, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
+def _judged(problem: Trial, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
     """What came of a run by the ``known`` condition of its problem."""
     expected = problem.expected
     if isinstance(done, Exception):
@@ -317,7 +317,9 @@ def _variables(first: str) -> Iterator[Variable]:
         yield Variable(name, ("regime", "decade", "solver"), reader, unit, text)
 
 
-def _sections(rows: Sequence[Row], corners: Sequence[Corner], solvers: Sequence[str], rtol: float) -> Iterator[Section]:
+def _sections(
+    rows: Sequence[MatrixRow], corners: Sequence[Corner], solvers: Sequence[str], rtol: float
+) -> Iterator[PageSection]:
     """The report; the terminal shows the summary and the corners."""
     headings = ("condition", "possible", f"at rtol {rtol:g}")
     lines = []
@@ -328,15 +330,15 @@ def _sections(rows: Sequence[Row], corners: Sequence[Corner], solvers: Sequence[
         kept = [_kept([cells[solver, value] for value in values]) for solver in solvers]
         lines.append((regime.name, span, *_condition_texts(worst, rtol), *kept))
     caption = f"Least digits kept over all values, at rtol {rtol:g}, and the largest condition number"
-    summary = Table(("regime", "from .. to", *headings, *solvers), lines, caption)
-    yield Section("Digits kept", [MEANING], [summary], figure=True)
+    summary = PageTable(("regime", "from .. to", *headings, *solvers), lines, caption)
+    yield PageSection("Digits kept", [MEANING], [summary], figure=True)
     if corners:
         heading, caption = ("regime", "points", "not solved", "worst", "where"), "Worst corners that a search has found"
-        yield Section("Corners", tables=[Table(heading, [corner.texts for corner in corners], caption)])
-    yield Section("Every cell", tables=[_details(row, [*headings, *solvers], rtol) for row in rows], details=True)
+        yield PageSection("Corners", tables=[PageTable(heading, [corner.texts for corner in corners], caption)])
+    yield PageSection("Every cell", tables=[_details(row, [*headings, *solvers], rtol) for row in rows], details=True)
 
 
-def _details(row: Row, headings: Sequence[str], rtol: float) -> Table:
+def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
     """Every cell of a regime, with what was said of the first solver's."""
     lines, marked = [], []
     for i, value in enumerate(row.values):
@@ -345,7 +347,7 @@ def _details(row: Row, headings: Sequence[str], rtol: float) -> Table:
         lines.append((*texts, str(first.cost.steps), first.reason))
         marked += [i] if any(cell.outcome in NO_ANSWER for cell in cells) else []
     of_first = (f"steps of {first.solver}", f"{first.solver}: where, or why")
-    return Table((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
+    return PageTable((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
 
 
 def _condition_texts(number: float, rtol: float) -> Sequence[str]:
@@ -363,7 +365,7 @@ def _kept(cells: Sequence[Attempt]) -> str:
     )
 
 
-def _omissions(rows: Sequence[Row], solvers: Sequence[str], searched: bool) -> Iterator[str]:
+def _omissions(rows: Sequence[MatrixRow], solvers: Sequence[str], searched: bool) -> Iterator[str]:
     """What the study could have had and has not, each with its reason."""
     every, taken = sum(len(row.regime.values) for row in rows), sum(len(row.values) for row in rows)
     if taken < every:

@@ -12,7 +12,7 @@ from surfacechem.cli.main import app
 from surfacechem.errors import InputError
 from surfacechem.results.error_estimates import EVENTS, against_tighter, apart, difference, estimated, event_errors
 from surfacechem.results.event_table import event_times
-from surfacechem.runs.report import run_summary, sweep_summary
+from surfacechem.runs.summaries import run_summary, sweep_summary
 
 
 @pytest.fixture(scope="module")

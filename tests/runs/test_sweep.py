@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.format.plans import Axis, Plan
 from surfacechem.references import get
 from surfacechem.runs import rerun
-from surfacechem.runs.report import sweep_summary
+from surfacechem.runs.summaries import sweep_summary
 from surfacechem.solve import run as integrate
 
 RATE = "loading.f.ramp.rate"

@@ -8,11 +8,11 @@ import xarray
 from typer.testing import CliRunner
 
 from surfacechem.cli.main import app
-from surfacechem.runs.report import run_summary
 from surfacechem.runs.simulation import Simulation
+from surfacechem.runs.summaries import run_summary
 from surfacechem.solve import names
 from surfacechem.studies.condition import condition
-from surfacechem.studies.regimes import Exact, Problem, Refused, Stops, regimes
+from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regimes
 from surfacechem.studies.stability import (
     FAILED,
     REFUSED,
@@ -137,7 +137,7 @@ def test_the_condition_number_knows_no_units(size):
         return {"u": data["slope"] * t}
 
     data = {"slope": size}
-    found = condition(Problem("", [1.0, 2.0], Exact(lambda t: line(data, t), data=data, again=line)), ["u"])
+    found = condition(Trial("", [1.0, 2.0], Exact(lambda t: line(data, t), data=data, again=line)), ["u"])
     np.testing.assert_allclose(found, 2.0, rtol=1e-6)
 
 

@@ -90,7 +90,7 @@ Expectation: TypeAlias = Exact | Stops | Refused
 
 
 @dataclass(frozen=True)
-class Problem:
+class Trial:
     """A shipped case by name, or the text of one, with changes by path, and what is expected of its run."""
 
     case: str
@@ -112,13 +112,13 @@ class Regime(ABC):
     """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
 
     def __init_subclass__(cls) -> None:
-        cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
+        cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__.removesuffix("Regime")).lower()
 
     @abstractmethod
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         """The case at one value, and what is expected of it."""
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         """The case at a point of :attr:`space`, of parameters by name."""
         raise NotImplementedError(f"{self.name} has no space to search")
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.references.adiabatic_arrhenius import AdiabaticArrhenius
-from surfacechem.references.affinity import ExponentialAffinity
+from surfacechem.references.affinity import ExponentialAffinitySolution
 from surfacechem.references.bell import BellConstantForce
 from surfacechem.references.bonding import Bonding, EndothermicBonding, ExothermicBonding
 from surfacechem.references.cluster import SharedLoadCluster
 from surfacechem.references.cooling_to_zero import CoolingToZero
 from surfacechem.references.debonding import SuddenDebonding
-from surfacechem.studies.regimes import Array, Exact, Problem, Refused, Regime, Stops
+from surfacechem.studies.regimes import Array, Exact, Refused, Regime, Stops, Trial
 
 LOST = "heat capacity at T was lost"
 N_C = 1e18
@@ -36,7 +36,7 @@ class Endothermic(Regime):
     symbol = "1 - kappa"
     values = (*(2.0**-n for n in (1, 10, 20, 30, 40, 46, 50, 52)), 0.0)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         K_2 = 512.0 * (1.0 - value)
         rate = {"value": N_C / K_2, "times": [{"power": {"exponent": -2}}]}
         changes = {
@@ -46,9 +46,9 @@ class Endothermic(Regime):
             "interface.bonding.linear-affinity.c_r": rate,
         }
         if value == 0.0:
-            return Problem("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
+            return Trial("endothermic-kappa-0p99", [5.0], Refused(LOST), changes)
         exact = EndothermicBonding(C_1=1.0, C_2=1.0, T_0=256.0, K_2=K_2, tau=1.0)
-        return Problem("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact.of(exact), changes)
+        return Trial("endothermic-kappa-0p99", decades(1e-2 * value, 5.0, 25), Exact.of(exact), changes)
 
     def label(self, value: float) -> str:
         return f"2^{math.log2(value):.0f}" if value else "0"
@@ -62,10 +62,10 @@ class ScaleRatio(Regime):
     values = (1e0, 1e3, 1e6, 1e9, 1e12, 1e15, 1e18)
     space: ClassVar = {"tau": (-15.0, 6.0), "C_1": (-6.0, 6.0), "K_0": (-6.0, 6.0), "D": (-9.0, 3.0), "T_i": (0.0, 4.0)}
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return self.corner({"tau": 1e6 / value, "C_1": 1.5, "K_0": 120.0, "D": 1e-3, "T_i": 320.0})
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         """Capacities, energies, heating and times of any size; the interface takes as much heat as it may."""
         tau, C, K, D, T = (point[name] for name in ("tau", "C_1", "K_0", "D", "T_i"))
         exact = Bonding(C_1=C, C_2=0.7, C_c=0.3, T_0=300.0, T_i=T, phi_i=0.1, K_0=K, K_1=60.0, K_2=240.0, tau=tau, D=D)
@@ -78,7 +78,7 @@ class ScaleRatio(Regime):
             "loading.v": 1.0,
             "initial.T": T,
         }
-        return Problem("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact.of(exact), changes)
+        return Trial("generalised-bonding-sliding", decades(1e-2 * tau, 1e6, 25), Exact.of(exact), changes)
 
 
 class Seconds(Regime):
@@ -88,10 +88,10 @@ class Seconds(Regime):
     symbol = "tau [s]"
     values = tuple(10.0**k for k in (-15, -10, -5, 0, 5, 10, 15))
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         exact = ExothermicBonding(C_1=1.0, C_2=1.0, T_0=300.0, K_0=300.0, tau=value)
         changes = {"interface.bonding.linear-affinity.c_r": N_C / 300.0 / value}
-        return Problem("exothermic", [value * k / 4 for k in range(1, 21)], Exact.of(exact), changes)
+        return Trial("exothermic", [value * k / 4 for k in range(1, 21)], Exact.of(exact), changes)
 
 
 class Affinity(Regime):
@@ -102,14 +102,14 @@ class Affinity(Regime):
     values = (1e-6, 1e-3, 1.0, 30.0, 700.0, 1e3, 1e4, 1e6)
     space: ClassVar = {"a": (-8.0, 6.0), "T": (0.0, 4.0), "lambda": (-12.0, 12.0)}
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return self.corner({"a": value, "T": 310.0, "lambda": 1.0})
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         """Affinity, temperature and rate of any size."""
         n, T, rate = 5e17, point["T"], point["lambda"]
         K = point["a"] * n * BOLTZMANN * T
-        exact = ExponentialAffinity(n_c=n, C_r=rate * n * n / K, K_c=K, T=T)
+        exact = ExponentialAffinitySolution(n_c=n, C_r=rate * n * n / K, K_c=K, T=T)
         changes = {
             "bodies.lower.temperature": T,
             "bodies.upper.temperature": T,
@@ -117,7 +117,7 @@ class Affinity(Regime):
             "interface.potential.bond-energy.K_0": K,
             "interface.bonding.exponential-affinity.C_r": rate * n * n / K,
         }
-        return Problem("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact.of(exact), changes)
+        return Trial("exponential-affinity", decades(1e-6 / rate, 5.0 / rate, 22), Exact.of(exact), changes)
 
 
 class Runaway(Regime):
@@ -127,7 +127,7 @@ class Runaway(Regime):
     symbol = "E_a / (R_g T)"
     values = (1.0, 5.0, 10.0, 24.0, 50.0, 100.0, 200.0)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         E_a, A = value * GAS_CONSTANT * 300.0, math.exp(value)
         exact = AdiabaticArrhenius(A=A, E_a=E_a, T_i=300.0, delta_T=80.0)
         changes = {"interface.bonding.arrhenius.A": A, "interface.bonding.arrhenius.E_a": E_a}
@@ -142,7 +142,7 @@ class Runaway(Regime):
             return {"phi": bonds, "T": other.T_i + other.delta_T * bonds}
 
         data = {"A": A, "E_a": E_a, "T_i": 300.0, "delta_T": 80.0}
-        return Problem("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
+        return Trial("adiabatic-arrhenius", times.tolist(), Exact(exact.solution, data=data, again=again), changes)
 
 
 class Cold(Regime):
@@ -152,12 +152,12 @@ class Cold(Regime):
     symbol = "T / T_0"
     values = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         exact = CoolingToZero(C=100.0, T_0=300.0, T_i=300.0, Q=50.0)
         if value == 0.0:
-            return Problem("cooling-to-zero", [2 * exact.end_time], Stops.of("the temperature T reached zero", exact))
+            return Trial("cooling-to-zero", [2 * exact.end_time], Stops.of("the temperature T reached zero", exact))
         last = exact.end_time * (1.0 - value**2)
-        return Problem("cooling-to-zero", [last / 2, last], Exact.of(exact))
+        return Trial("cooling-to-zero", [last / 2, last], Exact.of(exact))
 
 
 # -- bonds under load: exponents beyond what a double holds, and rupture with an infinite slope ------------------------
@@ -169,7 +169,7 @@ IMMEDIATE = 230.0
 """Logarithm of the rate [1/s] beyond which rupture is not resolved in time."""
 
 
-class Bell(Regime):
+class BellRegime(Regime):
     """A force that speeds rupture up by exp(10000): the bonds are gone, without an infinity.
 
     Times are that of rupture, or 1e-100 s where it is shorter: rates beyond exp(300) are taken as immediate.
@@ -180,17 +180,17 @@ class Bell(Regime):
     values = (1e-3, 1.0, 10.0, 100.0, 500.0, 700.0, 1e3, 1e4)
     space: ClassVar = {"exponent": (-3.0, 4.0), "k_off": (-12.0, 12.0)}
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return self.corner({"exponent": value, "k_off": 0.1})
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         """Exponent and rate at rest of any size."""
         force, k = point["exponent"] * FORCE, point["k_off"]
         exact = BellConstantForce(k_off=k, x_off=X, T=T, f=force)
         changes = {"loading.f": force, "interface.bonding.bell.k_off": k}
         span = math.exp(-min(exact.log_rate, IMMEDIATE))
         times = [span * part for part in (0.01, 0.1, 0.5, 1.0, 3.0)]
-        return Problem("bond-constant-force", times, Exact.of(exact), changes)
+        return Trial("bond-constant-force", times, Exact.of(exact), changes)
 
 
 class Rupture(Regime):
@@ -200,13 +200,13 @@ class Rupture(Regime):
     symbol = "load per site x / (k_B T)"
     values = (1e-6, 1e-3, 0.1, 0.5, 1.0, 10.0, 100.0, 500.0)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         sites = 1e14
         exact = SharedLoadCluster(k_off=0.5, x_off=X, T=T, n_c=sites, t_n=value * sites * FORCE)
         changes = {"loading.t_n": value * sites * FORCE}
         if value > 300.0:
-            return Problem("shared-load-rupture", [1.0], Refused("the bonds ruptured"), changes)
-        return Problem("shared-load-rupture", [2.0 * exact.end_time], Stops.of("the bonds ruptured", exact), changes)
+            return Trial("shared-load-rupture", [1.0], Refused("the bonds ruptured"), changes)
+        return Trial("shared-load-rupture", [2.0 * exact.end_time], Stops.of("the bonds ruptured", exact), changes)
 
 
 class Debonding(Regime):
@@ -216,16 +216,16 @@ class Debonding(Regime):
     symbol = "K_0 / (T_0 C)"
     values = (1e-12, 1e-6, 1e-3, 0.1, 0.9, 1.2, 1.2499999, 1.26, 1e6)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         K_0 = value * 600.0
         changes = {"interface.potential.bond-energy.K_0": K_0}
         strength = 38.72983346207417e6
         exact = SuddenDebonding(C=2.0, T_0=300.0, T_i=300.0, K_0=K_0, t_n=strength, k=1e13)
         if value > 1.25:
             impossible = Stops.of("which is impossible", exact, lambda bonds: bonds.t_n / bonds.k / 1e-6)
-            return Problem("debonding-cooling", [10.0], impossible, changes)
+            return Trial("debonding-cooling", [10.0], impossible, changes)
 
         def after(bonds: SuddenDebonding, t: Array) -> dict[str, Array]:
             return {"T": np.where(t < 9.0, 300.0, bonds.final_temperature)}
 
-        return Problem("debonding-cooling", [1.0, 10.0], Exact.of(exact, after, events=1), changes)
+        return Trial("debonding-cooling", [1.0, 10.0], Exact.of(exact, after, events=1), changes)

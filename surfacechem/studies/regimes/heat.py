@@ -10,12 +10,12 @@ import numpy as np
 
 from surfacechem.references.semenov_fold import SemenovFold
 from surfacechem.references.three_temperatures import ThreeTemperatures
-from surfacechem.studies.regimes import Exact, Problem, Refused, Regime, Stops
+from surfacechem.studies.regimes import Exact, Refused, Regime, Stops, Trial
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 
 
-def three_temperatures(parameters: Mapping[str, float]) -> Problem:
+def three_temperatures(parameters: Mapping[str, float]) -> Trial:
     """Two bodies and a medium, from its layer to the end."""
     p = {**BODIES, **parameters}
     exact = ThreeTemperatures(T_1=290.0, T_2=350.0, T_c=300.0, **p)
@@ -31,7 +31,7 @@ def three_temperatures(parameters: Mapping[str, float]) -> Problem:
     }
     layer = p["C_c"] / (p["h_1"] + p["h_2"])
     times = [float(t) for t in np.geomspace(min(layer, 1.0), 10.0, 25)]
-    return Problem("three-temperatures", times, Exact.of(exact), changes)
+    return Trial("three-temperatures", times, Exact.of(exact), changes)
 
 
 class Capacity(Regime):
@@ -41,18 +41,18 @@ class Capacity(Regime):
     symbol = "C_c [J/(m^2 K)]"
     values = (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return three_temperatures({"C_c": value})
 
 
-class Conductance(Regime):
+class ConductanceRegime(Regime):
     """Conductances until the two bodies are in perfect contact."""
 
     title = "Conductances to perfect contact"
     symbol = "h [W/(m^2 K)]"
     values = (1e0, 1e4, 1e8, 1e12, 1e16, 1e20)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return three_temperatures({"h_1": value, "h_2": value})
 
 
@@ -71,11 +71,11 @@ class Stiffness(Regime):
         "D_0": (-6.0, 6.0),
     }
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         spread = math.sqrt(value)
         return three_temperatures({"C_1": spread, "C_2": 1.0, "C_c": 1.0 / spread, "h_1": 1.0, "h_2": 1.0, "D_0": 1e-3})
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         return three_temperatures(point)
 
 
@@ -111,16 +111,16 @@ class LostCapacity(Regime):
     symbol = "C_eff [J/(m^2 K)]"
     values = (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
         if value < 0:
-            return Problem(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
+            return Trial(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
         settled = Exact(
             lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
             data={"T_1": 300.0, "T_2": 300.0},
             again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
         )
-        return Problem(MEDIUM, [1.0], settled, changes)
+        return Trial(MEDIUM, [1.0], settled, changes)
 
 
 FILM = (
@@ -147,12 +147,12 @@ class Ignition(Regime):
     values = (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1)
     CRITICAL = 50.0 / (math.e * 0.05)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         heat = (1.0 - value) * self.CRITICAL
         changes = {
             "interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}
         }
         if value < 0:
-            return Problem(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
+            return Trial(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
         exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
-        return Problem(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
+        return Trial(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)

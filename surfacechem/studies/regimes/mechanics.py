@@ -13,24 +13,24 @@ from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.film import ClosingFilm
 from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.regimes import Array, Exact, Problem, Regime, Stops
+from surfacechem.studies.regimes import Array, Exact, Regime, Stops, Trial
 
 SHORTEST = 1e-5
 
 
-class Film(Regime):
+class FilmRegime(Regime):
     """A sheared film closes: heat grows like the logarithm of the gap, until time cannot tell the gap from zero."""
 
     title = "Film that closes"
     symbol = "gap / initial gap"
     values = (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         exact = ClosingFilm(eta=1e-2, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
         if value == 0.0:
-            return Problem("closing-film", [20.0], Stops.of("g_n reached zero", exact))
+            return Trial("closing-film", [20.0], Stops.of("g_n reached zero", exact))
         last = 10.0 * (1.0 - value)
-        return Problem("closing-film", [last / 2, last], Exact.of(exact))
+        return Trial("closing-film", [last / 2, last], Exact.of(exact))
 
 
 PENALTY = """\
@@ -48,17 +48,17 @@ run: {until: 1 s}
 """
 
 
-class Penalty(Regime):
+class PenaltyRegime(Regime):
     """A contact that becomes rigid: the gap k w / (k + E_n) vanishes and its traction stays."""
 
     title = "Contact stiffness to rigid"
     symbol = "E_n [Pa/m]"
     values = (1e0, 1e8, 1e12, 1e16, 1e20, 1e28, 1e38)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
         changes = {"interface.potential.normal-stiffness.E_n": value}
-        return Problem(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
+        return Trial(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
 
 
 class Chatter(Regime):
@@ -69,10 +69,10 @@ class Chatter(Regime):
     values = (1e3, 1.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
     space: ClassVar = {"V": (-15.0, 3.0), "m": (-6.0, 6.0), "k": (3.0, 13.0)}
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         return self.corner({"V": value, "m": 10.0, "k": 1e8})
 
-    def corner(self, point: Mapping[str, float]) -> Problem:
+    def corner(self, point: Mapping[str, float]) -> Trial:
         """Speed, mass and stiffness of any size; outputs in the middle of three sticks."""
         exact = StickSlip(t_s=6e4, t_k=4e4, **point)
         if exact.stick_time < SHORTEST * exact.slip_time:
@@ -89,7 +89,7 @@ class Chatter(Regime):
             found = cycle.solution(t)
             return {"u_t": found["u_t"], "v": np.zeros_like(t), "t_t": found["spring_traction"]}
 
-        return Problem("stick-slip", times, Exact.of(exact, at_rest, also=["t_t"], events=6), changes)
+        return Trial("stick-slip", times, Exact.of(exact, at_rest, also=["t_t"], events=6), changes)
 
 
 class Stop(Regime):
@@ -99,14 +99,14 @@ class Stop(Regime):
     symbol = "v_0 [m/s]"
     values = (1e-15, 1e-10, 1e-5, 1.0, 1e3, 1e6)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         exact = CoulombStop(m=5.0, mu=0.25, p=3e4, v_i=value, C=100.0, T_0=300.0, T_i=300.0)
         end = exact.stop_time
         times = [end * part for part in (0.25, 0.5, 0.9, 1.1, 2.0)]
-        return Problem("coulomb-stop", times, Exact.of(exact, events=1), {"initial.v": value})
+        return Trial("coulomb-stop", times, Exact.of(exact, events=1), {"initial.v": value})
 
 
-class Fold(Regime):
+class FoldRegime(Regime):
     """A damped gap beside the place where its equilibrium was lost: the closer, the longer it lingers in a bottleneck,
     within which it is compared.
     """
@@ -115,7 +115,7 @@ class Fold(Regime):
     symbol = "distance / fold"
     values = (1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 
-    def problem(self, value: float) -> Problem:
+    def problem(self, value: float) -> Trial:
         gap = {"t_max": 1e6, "g_0": 1e-8, "k": 1e13, "c": 2e5}
         exact = OverdampedPullOff(**gap, delta_w=value * OverdampedPullOff(**gap, delta_w=1.0).fold.w)
         gaps = exact.fold.g + exact.width * np.linspace(-3.0, 3.0, 7)
@@ -134,4 +134,4 @@ class Fold(Regime):
 
         data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
         passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
-        return Problem("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
+        return Trial("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
