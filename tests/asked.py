@@ -12,7 +12,7 @@ from tables import errors
 from tables_mechanics import columns, expected, parameters, rows
 
 import surfacechem
-from surfacechem.format import names
+from surfacechem.documents import shipped
 from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.model.assemble import assemble
 from surfacechem.results import error_estimates
@@ -199,7 +199,11 @@ def of_motion(name: str, accuracy: float) -> Achieved:
 
 EXACT: dict[str, Callable[[float], Achieved]] = {
     **{name: partial(of_table, name) for name in TABLES},
-    **{f"case {name}": partial(of_case, name) for name in names() if surfacechem.format.load(name).reference},
+    **{
+        f"case {path.stem}": partial(of_case, path.stem)
+        for path in sorted(shipped.cases().glob("*.yaml"))
+        if "\nreference:" in path.read_text()
+    },
     **{name: partial(of_motion, name) for name in MOTION},
 }
 """Every exact solution by name: what an accuracy that is asked for gives."""
