@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scenes import bodies
 from scipy.integrate import solve_ivp
+from zoo import pairwise
 
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
@@ -263,10 +264,8 @@ ADHERING = {
 }
 
 
-@pytest.mark.parametrize("frictions", RESISTING)
-@pytest.mark.parametrize("moved", MOVED)
-@pytest.mark.parametrize("adhesion", ADHERING)
-def test_friction_never_lowers_the_peak_of_shear(adhesion, moved, frictions):
+@pytest.mark.parametrize(("moved", "adhesion", "frictions"), pairwise([*MOVED], [*ADHERING], [*RESISTING]))
+def test_friction_never_lowers_the_peak_of_shear(moved, adhesion, frictions):
     loading, mount = MOVED[moved]
     remembers = frictions == "remembers"
     if remembers and (mount is None or moved.startswith("dead")):

@@ -271,7 +271,8 @@ def test_an_interface_of_hardly_any_capacity_between_conducting_bodies(C_c):
     assert run.audit.energy_error < 1e-9
 
 
-def test_an_accuracy_out_of_reach_is_said():
+def test_an_accuracy_out_of_reach_is_said(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(spatial, "MOST_CHOSEN", 128)
     text = TWO.format(first="T", second="T", lower=LOWER + ", cells: {accuracy: 1e-9}", upper=UPPER + ", cells: 4",
                       heat="", initial="profile_1: 400 K, profile_2: 300 K")  # fmt: skip
     warnings = Simulation(load_text(text)).run().warnings
@@ -383,8 +384,9 @@ def test_an_exact_solution_of_another_scene_is_not_used():
         "the heat capacity of glass varies": ["bodies.glass.capacity=quadratic"],
         "the conductivity of glass varies": [f"bodies.glass.conduction.conductivity={varying}"],
     }
+    cells = [f"bodies.{name}.conduction.cells={{accuracy: 1e-2}}" for name in ("epoxy", "glass")]
     for reason, change in cases.items():
-        source = surfacechem.run("sudden-contact", [*change, "run.until=1 s"]).accuracy.source
+        source = surfacechem.run("sudden-contact", [*cells, *change, "run.until=1 s"]).accuracy.source
         assert reason in source
         assert "half of the cells" in source
 
@@ -509,7 +511,7 @@ def assert_known(seed: int, scenes: int) -> None:
 
 
 def test_random_slabs_are_as_accurate_as_they_say():
-    assert_known(seed=1, scenes=16)
+    assert_known(seed=1, scenes=9)
 
 
 @pytest.mark.slow
