@@ -7,7 +7,7 @@ from hypothesis import settings
 settings.register_profile("surfacechem", deadline=None)
 settings.load_profile("surfacechem")
 
-EVERY_CASE = ("test_cases", "test_dataset", "test_golden")
+EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")
 """Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
 
 

@@ -13,17 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
-import scenes
-import scenes_mechanics
 import thermodynamics as laws
+from zoo import MEMBERS, Member
 
-from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 
 TABLE = Path(__file__).with_suffix(".json")
-SCENES = {scene.__name__: (scene, {}) for scene in scenes.ALL} | {
-    f"{m.__name__} {list(modes.values())}": (m.scene, modes) for m in scenes_mechanics.ALL for modes in m.modes
-}
 
 
 def parts(system: System) -> Iterator[tuple[str, Any]]:
@@ -50,12 +45,10 @@ def parts(system: System) -> Iterator[tuple[str, Any]]:
             yield f"{kind} sink {sink.node}", sink.share
 
 
-def away(name: str) -> tuple[System, dict[Any, Any]]:
+def away(member: Member) -> tuple[System, dict[Any, Any]]:
     """A scene in its modes, and a point away from equilibrium, with rates drawn at random."""
-    scene, modes = SCENES[name]
-    system = assemble(scene())
-    draw = random.Random(name)
-    point = laws.start_point(system, 0, modes)
+    system, draw = member.system, random.Random(member.name)
+    point = laws.start_point(system, 0, member.modes)
     for state in system.states:
         size = abs(float(point[state.symbol])) or state.scale
         point[state.symbol] += mpmath.mpf(size * draw.uniform(0.01, 0.05))
@@ -63,11 +56,12 @@ def away(name: str) -> tuple[System, dict[Any, Any]]:
     return system, point
 
 
-def computed(name: str) -> dict[str, float]:
+def computed(member: Member) -> dict[str, float]:
     """All values of a scene there."""
-    system, point = away(name)
+    system, point = away(member)
     return {key: float(laws.number(system.expand(value), point)) for key, value in parts(system)}
 
 
 if __name__ == "__main__":
-    TABLE.write_text("{\n" + ",\n".join(f"{json.dumps(n)}: {json.dumps(computed(n))}" for n in SCENES) + "\n}\n")
+    rows = [f"{json.dumps(m.name)}: {json.dumps(computed(m))}" for m in MEMBERS.values() if "scene" in m.tags]
+    TABLE.write_text("{\n" + ",\n".join(rows) + "\n}\n")

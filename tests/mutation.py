@@ -33,8 +33,8 @@ LONGEST = 600
 """Seconds after which a mutant that hangs counts as noticed."""
 
 OF_BALANCES = [
-    ["balances", "equation_values"],
-    ["thermodynamics", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "bonds"],
+    ["balances"],
+    ["zoo", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "bonds"],
     ["tables", "tables_bonds", "tables_mechanics"],
     ["paces", "events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],

@@ -1,6 +1,5 @@
 """What the documentation shows is true: its Python runs, its commands print what it says, its cases load."""
 
-import ast
 import doctest
 import os
 import re
@@ -149,28 +148,6 @@ def test_a_law_is_known_once_its_class_is_in_the_file(tmp_path):
         done = subprocess.run(process, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert expected in done.stdout
-
-
-def test_the_page_on_events_names_every_transition():
-    """Those that the assembly spells out, and those of the shipped cases."""
-    calls = (node for path in (ROOT / "surfacechem" / "model").rglob("*.py") for node in ast.walk(parsed(path)))
-    spelt = {
-        call.args[0].value
-        for call in calls
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Edge"
-        if isinstance(call.args[0], ast.Constant)
-    }
-    assert {"soften", "tear", "rejoin", "open"} <= spelt
-    systems = [surfacechem.load(name).system for name in names()]
-    happen = {item.name for system in systems for item in system.edges}
-    assert {"loosen", "debond", "snap"} <= happen
-    page = (ROOT / "docs" / "events.md").read_text(encoding="utf-8")
-    told = set(re.findall(r"`([^`]+)`", " ".join(re.findall(r"^\| (`.*?) \|", page, re.MULTILINE))))
-    assert {name for name in spelt | happen if not name.startswith("end of ")} <= told
-
-
-def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def test_links_of_the_readme_exist():

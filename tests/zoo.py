@@ -14,7 +14,7 @@ import pytest
 import scenes
 import scenes_mechanics
 
-from surfacechem.format import names
+from surfacechem.documents.shipped import cases
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 from surfacechem.results import spatial
@@ -61,9 +61,12 @@ def _members() -> Iterator[Member]:
         yield Member(scene.__name__, scene, {}, frozenset({"scene", "at rest"}))
     for moving in scenes_mechanics.ALL:
         for modes in moving.modes:
-            yield Member(f"{moving.__name__} {list(modes.values())}", moving.scene, modes, frozenset({"scene", "moving"}))
-    for name in names():
-        yield Member(name, OfCase(name), {}, frozenset({"case"}))
+            yield Member(
+                f"{moving.__name__} {list(modes.values())}", moving.scene, modes, frozenset({"scene", "moving"})
+            )
+    for path in sorted(cases().glob("*.yaml")):
+        mechanism = {"mechanism"} if "  mechanism:" in path.read_text() else set()
+        yield Member(path.stem, OfCase(path.stem), {}, frozenset({"case", *mechanism}))
 
 
 MEMBERS = {(member.name if "scene" in member.tags else f"case {member.name}"): member for member in _members()}

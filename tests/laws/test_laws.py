@@ -7,11 +7,14 @@ import math
 import random
 
 import law_values
+import mpmath
 import pytest
 import symengine
+import thermodynamics
 
 from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Load, RateLaw, Varying, reads
 from surfacechem.errors import InputError
+from surfacechem.expressions import derivative
 from surfacechem.laws import FAMILIES, find, laws
 from surfacechem.quantities import VARIABLES
 
@@ -47,6 +50,24 @@ def test_every_formula_keeps_its_approved_values(name):
     assert found.keys() == APPROVED[name].keys()
     for formula, values in found.items():
         assert values == pytest.approx(APPROVED[name][formula], rel=1e-11, abs=0), formula
+
+
+@pytest.mark.parametrize("name", law_values.every())
+def test_derivatives_of_every_formula_are_its_slopes(name):
+    """By differences in 60 digits."""
+    law = law_values.every()[name]
+    for seed in range(2):
+        draw = random.Random(f"{name}{seed}")
+        made = law_values.instance(law, draw)
+        for _formula, method in law_values.formulas(made):
+            symbols = {x: symengine.Symbol(x) for x in inspect.signature(method).parameters}
+            point = {s: mpmath.mpf(law_values.argument(made, x, draw)) for x, s in symbols.items()}
+            for expression in law_values.parts(method(**symbols) if symbols else ()):
+                value = abs(thermodynamics.number(expression, point))
+                for x in symbols.values():
+                    found = thermodynamics.number(derivative(expression, x), point)
+                    rounding = 1e-12 * value / abs(point[x])  # of constants that differentiation multiplies
+                    assert mpmath.almosteq(found, thermodynamics.slope(expression, x, point), 1e-12, rounding)
 
 
 @each_law

@@ -2,8 +2,11 @@
 
 from fractions import Fraction
 
+import mpmath
 import pytest
+import scenes
 import symengine
+import thermodynamics as laws
 
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.loading import Ramp
@@ -48,3 +51,14 @@ def test_the_power_of_elastic_tractions_leaves_the_balance_of_energy():
     system = assemble(Scene(bodies, Interface("T", potentials), [], loading, None, 300.0, {"T": 300.0}))
     read = {str(x) for x in system.expand(system.rows["T"]).free_symbols}
     assert read <= {"T", "dT_dt", "T_0", "C_1", "C_2"}
+
+
+def test_maxwell_relations():
+    """The mixed derivatives of one potential agree: dt_n/dphi = dM/dg_n, dS/dg_n = -dt_n/dT, dS/dphi = -dM/dT."""
+    system = assemble(scenes.coupled())
+    g, phi, T = (symengine.Symbol(name) for name in ("g_n", "phi", "T_c"))
+    t_n, M, S = (system.find(name).expression for name in ("t_n", "M", "S_c"))
+    point = laws.consistent_point(system, 0) | {g: mpmath.mpf(1e-6), symengine.Symbol("g_t"): mpmath.mpf(1e-7)}
+    for left, right in [(t_n.diff(phi), M.diff(g)), (S.diff(g), -t_n.diff(T)), (S.diff(phi), -M.diff(T))]:
+        assert laws.number(left, point) != 0
+        assert laws.closes([left], [right], point)

@@ -96,23 +96,6 @@ def test_a_file_that_breaks_the_conventions_is_noticed(written, suite, tmp_path,
     assert any(complaint in message for message in complaints(suite, tmp_path / "broken.nc"))
 
 
-@pytest.mark.parametrize("name", names())
-def test_opens_plainly_and_is_the_dataset_in_memory(written, name):
-    memory, file = written(name)
-    with xarray.open_dataset(file) as opened:
-        xarray.testing.assert_identical(opened, memory)
-
-
-@pytest.mark.parametrize("name", names())
-def test_every_variable_has_a_unit_and_a_meaning(written, name):
-    _, file = written(name)
-    with xarray.open_dataset(file) as data:
-        for variable in data.variables.values():
-            assert variable.attrs["units"]
-            assert variable.attrs["long_name"]
-        assert all(isinstance(value, str | float | int | np.number) for value in data.attrs.values())
-
-
 def test_says_what_was_run_and_how_it_went(solution):
     attributes = solution.dataset.attrs
     assert attributes["status"] == "finished"

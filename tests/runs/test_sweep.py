@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray
-from case_runs import load, solved
 from test_references import bell, build, table
 from typer.testing import CliRunner
 
@@ -12,7 +11,6 @@ from surfacechem import format as cases
 from surfacechem import plots
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.format.plans import Axis, Plan
 from surfacechem.references import get
 from surfacechem.runs import rerun
 from surfacechem.runs.summaries import sweep_summary
@@ -100,29 +98,6 @@ def test_a_run_of_a_sweep_is_the_run_by_itself(bonding):
         assert data.attrs[name] == data[name].values.max() < 1e-8
     assert not data["destroys_entropy"].any()
     assert one["time_reached"] == single.attrs["time_reached"]
-
-
-@pytest.mark.parametrize("name", cases.names())
-def test_a_case_is_the_same_as_a_sweep_of_one(name):
-    """Status, events, balances, error and every other variable that a sweep has."""
-    simulation, solution = load(name), solved(name)
-    values = solution.trajectory.values
-    path = next(path for path in simulation.system.changeable if path in values)
-    swept = simulation.sweep_plan(Plan([Axis(path, (values[path],))]))
-    (axis,) = swept.axes
-    one = {c.name: c.values[0] for c in swept.columns if c.dimensions[0] == axis != c.name}
-    alone = solution.attributes | {c.name: c.values for c in solution.columns}
-    alone |= {"steps": alone["count_steps"], "destroys_entropy": alone["entropy_violations"] != "none"}
-    left = {"entropy_destroyed"}
-    if simulation.case.reference and simulation.case.reference.options:
-        left |= {"error"}  # an exact solution with values of its own is of the case alone
-    assert {"status", "reason", "energy_error", "site_error", "error", *simulation.system.rows} <= one.keys() | set(
-        simulation.system.inside
-    )
-    for variable in one.keys() - left:
-        expected = np.asarray(alone[variable])
-        ours = np.asarray(one[variable])[tuple(slice(size) for size in expected.shape)]
-        np.testing.assert_array_equal(ours, expected, err_msg=variable)
 
 
 def test_the_number_of_threads_changes_nothing(bonding):
