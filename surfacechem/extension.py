@@ -27,6 +27,7 @@ from surfacechem.mechanism.source import sides
 from surfacechem.mechanism.thermo import KILO
 from surfacechem.mechanism.values import converted, own_parameters
 from surfacechem.quantities import BOLTZMANN, VARIABLES
+from surfacechem.tolerances import TINY
 
 __all__ = ["LoadedInterface"]
 
@@ -36,8 +37,8 @@ MOLECULAR = KILO * AVOGADRO
 LARGEST = 700.0
 """Affinity over k_B T above which its exponential counts as this one's."""
 
-FLOOR = 1e-100
-"""Coverages below this count as this where mass action has to be divided out."""
+FLOOR = TINY ** (1 / 3)
+"""Coverages below this count as this where mass action of up to third order has to be divided out."""
 
 
 class LoadedInterface(cantera.Interface):

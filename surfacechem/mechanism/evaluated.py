@@ -79,28 +79,32 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> N
             message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
             raise InputError(message, state.place)
     for name, phase in surface.adjacent.items():
-        state = given.get(name, Neighbour(place=place))
-        gas, known = phase.thermo_model in GASES, phase.species_names
-        missing = "composition" if len(known) > 1 and not state.composition else ""
-        if gas and state.pressure is None:
-            missing = "pressure"
-        if missing:
-            example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
-            message = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
+        _hold(phase, given.get(name, Neighbour(place=place)))
+
+
+def _hold(phase: Any, state: Neighbour) -> None:
+    """Bring a phase to its state."""
+    gas, name, known = phase.thermo_model in GASES, phase.name, phase.species_names
+    missing = "composition" if len(known) > 1 and not state.composition else ""
+    if gas and state.pressure is None:
+        missing = "pressure"
+    if missing:
+        example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
+        message = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
+        raise InputError(message, state.place)
+    for species in state.composition:
+        if species not in known:
+            message = f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
             raise InputError(message, state.place)
-        for species in state.composition:
-            if species not in known:
-                message = f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
-                raise InputError(message, state.place)
-        total = sum(state.composition.values())
-        if state.composition and abs(total - 1) > SUM_TOLERANCE:
-            message = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
-            raise InputError(message, state.place)
-        if state.composition:
-            phase.X = dict(state.composition)
-        if state.pressure is not None:
-            phase.TP = phase.T, state.pressure
-        phase.electric_potential = state.electric_potential
+    total = sum(state.composition.values())
+    if state.composition and abs(total - 1) > SUM_TOLERANCE:
+        message = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
+        raise InputError(message, state.place)
+    if state.composition:
+        phase.X = dict(state.composition)
+    if state.pressure is not None:
+        phase.TP = phase.T, state.pressure
+    phase.electric_potential = state.electric_potential
 
 
 def remarks(surface: Any) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import Any
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, DEPENDENT, KEY, TOGETHER
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
-from surfacechem.mechanism.rates import InterfaceArrhenius, SurfaceReaction
+from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.mechanism.source import Source, chosen, sections, sides
 from surfacechem.mechanism.values import leading
 
@@ -155,23 +155,7 @@ class Check:
         self._keys(source.data, FILE | declared, "the file")
         self._units(source.data)
         self._phase()
-        entries = list(source.species(phase))
-        for entry in entries:
-            # A neighbour's species are Cantera's affair; but one without a name may be the surface's own, misspelt.
-            if not self.beside or "name" not in entry:
-                self._species(entry)
-        known = [str(entry.get("name")) for entry in entries]
-        self.names = chosen(phase.get("species", "all"), known)
-        for name in self.names:
-            if name not in known:
-                raise source.error(f"species: no species '{name}'.{suggestion(name, known)}", phase, "species")
-        own = [entry for entry in entries if entry.get("name") in self.names]
-        for entry in own if self.beside else ():
-            self._species(entry)
-        for entry in own if self.beside else entries:
-            self._composition(entry)
-        for entry in own:
-            self._dependence(entry)
+        self._all_species(list(source.species(phase)))
         state = phase.get("state")
         if isinstance(state, Mapping):
             self._keys(state, STATE | (WRITTEN_STATE if source.written else set()), "state")
@@ -182,6 +166,23 @@ class Check:
                 self._evaluated(entry)
             else:
                 self._reaction(entry)
+
+    def _all_species(self, entries: list[Any]) -> None:
+        """Every species; those of neighbours are Cantera's affair, but one without a name may be a misspelt one."""
+        known = [str(entry.get("name")) for entry in entries]
+        self.names = chosen(self.phase.get("species", "all"), known)
+        own = [entry for entry in entries if entry.get("name") in self.names]
+        for entry in entries:
+            if not self.beside or "name" not in entry or entry["name"] in self.names:
+                self._species(entry)
+        for name in self.names:
+            if name not in known:
+                message = f"species: no species '{name}'.{suggestion(name, known)}"
+                raise self.source.error(message, self.phase, "species")
+        for entry in own if self.beside else entries:
+            self._composition(entry)
+        for entry in own:
+            self._dependence(entry)
 
     def _phase(self) -> None:
         phase, error = self.phase, self.source.error
@@ -255,6 +256,7 @@ class Check:
         self._known(node, self.names, title)
         for name, inner in node.items():
             self._one_dependence(entry, inner, f"{title}: {name}")
+            self._together(inner, f"{title}: {name}")
 
     def _one_dependence(self, entry: Any, node: Any, title: str) -> None:
         error, model = self.source.error, str(node.get("model"))
@@ -268,18 +270,21 @@ class Check:
             if key.endswith("-coefficients") and (not isinstance(value, list) or len(value) != COEFFICIENTS):
                 message = f"{title}: {key} are {COEFFICIENTS} numbers; those that are not there are 0."
                 raise error(message, node, key)
-            counted = key not in ("model", "units") and not key.endswith(("-change", "-coverages"))
-            if counted and self._unitless(node, key, given, AMOUNT):
+            pure = key in ("model", "units") or key.endswith(("-change", "-coverages"))
+            if not pure and self._unitless(node, key, given, AMOUNT):
                 message = (
                     f"{title}: {key} without a unit counts in kmol. Say what it counts in, such as "
                     "`units: {energy: eV, quantity: molec}` beside it."
                 )
                 raise error(message, node, key)
+
+    def _together(self, node: Any, title: str) -> None:
+        """Keys that need each other."""
         for group in TOGETHER:
-            there = [key for key in group if key in node]
-            if there and len(there) < len(group):
-                missing = next(key for key in group if key not in node)
-                raise error(f"{title}: {there[0]} needs `{missing}` too.", node, there[0])
+            missing = set(group) - set(node)
+            if missing and len(missing) < len(group):
+                first, needed = (next(key for key in group if (key in missing) == lacks) for lacks in (False, True))
+                raise self.source.error(f"{title}: {first} needs `{needed}` too.", node, first)
 
     def _reaction(self, entry: Any) -> None:
         title = f"reaction {entry.get('equation')}"
@@ -295,14 +300,10 @@ class Check:
                 raise self.source.error(message, entry, key)
         known = self._equation(entry, self.names, title)
         for key, inner in law.keys.items():
-            node = entry.get(key)
-            if key == KEY:
-                self._coverages(entry, inner, known, title)
-            elif inner and key in entry and not isinstance(node, Mapping):
-                message = f"{title}: write `{key}: {{{', '.join(inner)}}}`, not {node!r}."
+            if inner and key != KEY and key in entry and not isinstance(entry[key], Mapping):
+                message = f"{title}: write `{key}: {{{', '.join(inner)}}}`, not {entry[key]!r}."
                 raise self.source.error(message, entry, key)
-            elif inner and isinstance(node, Mapping):
-                self._keys(node, inner, f"{title}: {key}")
+        self._inside(entry, law.keys, known, title)
         if known:
             self._known(entry.get("orders"), known, f"{title}: orders")
         if "rate-constant" in law.keys:
@@ -311,7 +312,7 @@ class Check:
         for key, name in law.own_keys().items():
             self._own_number(entry, key, title, specs[name].unit, entry)
 
-    def _rate_type(self, entry: Any, title: str) -> type[SurfaceReaction]:
+    def _rate_type(self, entry: Any, title: str) -> type[InterfaceArrhenius]:
         """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
         kind = str(entry.get("type", "Arrhenius"))
         law = kind_of(kind)
@@ -337,10 +338,7 @@ class Check:
         if not _is_foreign(entry):
             inner = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
             self._keys(entry, {*REACTION, *inner}, title)
-            for key, allowed in inner.items():
-                if key != KEY and allowed and isinstance(entry.get(key), Mapping):
-                    self._keys(entry[key], allowed, f"{title}: {key}")
-            self._coverages(entry, inner[KEY], self.names, title)
+            self._inside(entry, inner, self.names, title)
         self._equation(entry, known, title)
 
     def _equation(self, entry: Any, known: list[str], title: str) -> list[str]:
@@ -364,16 +362,18 @@ class Check:
             raise error(f"{title}: both sides are the same, so that nothing changes.", entry, "equation")
         return known
 
-    def _coverages(self, entry: Any, inner: Iterable[str], known: list[str], title: str) -> None:
-        node = entry.get(KEY)
-        if not isinstance(node, Mapping):
-            return
-        if known:
-            self._known(node, known, f"{title}: {KEY}")
-        for name, terms in node.items():
-            if isinstance(terms, Mapping):
-                self._keys(terms, inner, f"{title}: {KEY}: {name}")
-                self._bare(terms, "E", title, entry)
+    def _inside(self, entry: Any, inner: Mapping[str, Iterable[str]], known: list[str], title: str) -> None:
+        """The keys inside those of a rate, which are coefficients, and dependences on coverages by species."""
+        for key, allowed in inner.items():
+            node = entry.get(key)
+            if key != KEY and allowed and isinstance(node, Mapping):
+                self._keys(node, allowed, f"{title}: {key}")
+            elif key == KEY and isinstance(node, Mapping):
+                self._known(node, known or node, f"{title}: {KEY}")
+                for name, terms in node.items():
+                    if isinstance(terms, Mapping):
+                        self._keys(terms, allowed, f"{title}: {KEY}: {name}")
+                        self._bare(terms, "E", title, entry)
 
     def _arrhenius(self, entry: Any, title: str) -> None:
         rate = entry.get("rate-constant")
@@ -466,6 +466,6 @@ class Check:
             raise self.source.error(message, node, key)
 
 
-def _own(law: type[SurfaceReaction]) -> set[str]:
+def _own(law: type[InterfaceArrhenius]) -> set[str]:
     """Keys that a reaction has because of its rate type."""
     return {*law.keys, *law.own_keys()}

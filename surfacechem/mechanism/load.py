@@ -101,11 +101,7 @@ def load_mechanism(
     hold(surface, neighbours, place)
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
-    by_name = {item.name: item for item in species}
-    for bond in bonds or ():
-        if bond not in by_name:
-            raise InputError(f"bonds: no species '{bond}' in the mechanism.{suggestion(bond, by_name)}", place)
-    chosen = [by_name[bond] for bond in dict.fromkeys(bonds or ())]
+    chosen = _bonds(species, bonds or (), place)
     density = surface.site_density * KILO * AVOGADRO
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
@@ -220,6 +216,15 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
     return tuple(result)
 
 
+def _bonds(species: tuple[Species, ...], bonds: Sequence[str], place: Place | None) -> list[Species]:
+    """The species that count as bonds, once each."""
+    by_name = {item.name: item for item in species}
+    for name in bonds:
+        if name not in by_name:
+            raise InputError(f"bonds: no species '{name}' in the mechanism.{suggestion(name, by_name)}", place)
+    return [by_name[name] for name in dict.fromkeys(bonds)]
+
+
 def identifiers(names: Iterable[str]) -> dict[str, str]:
     """A unique valid name of a coverage for each species.
 
@@ -280,8 +285,13 @@ def _lowered(
     if any(order < 0 for order in forward.values()):
         raise InputError(f"{title}: a negative order is infinite where the coverage vanishes; remove it.", place)
     who = f"a rate of type {law.kind.removeprefix('interface-')}"
+    read = partial(number, source, entry, entry)
     taking_part = {*reaction.reactants, *reaction.products, *reaction.orders}
     try:
+        own: dict[str, Any] = {
+            **law.parameters_of(reaction, variables, sum(forward.values())),
+            **own_parameters(law, law.own_keys(), entry, who, read),
+        }
         return law(
             number=label,
             equation=reaction.equation,
@@ -291,8 +301,7 @@ def _lowered(
             species=tuple(item for item in species if item.name in taking_part),
             reversible=bool(reaction.reversible),
             place=place,
-            **law.parameters_of(reaction, variables, sum(forward.values())),
-            **own_parameters(law, law.own_keys(), entry, who, partial(number, source, entry, entry)),
+            **own,
         )
     except InputError as error:  # a number of Cantera's that is out of range
         raise InputError(f"{title}: {error.message}", error.place or place) from None

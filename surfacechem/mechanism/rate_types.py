@@ -14,7 +14,7 @@ from surfacechem.expressions import Expression, log, log_fraction, log_sum, wher
 from surfacechem.laws import bonds
 from surfacechem.laws.kinetics import ExponentialAffinity, LinearAffinity, autocatalysis
 from surfacechem.mechanism.mixture import Formula
-from surfacechem.mechanism.rates import GONE, InterfaceArrhenius, SurfaceReaction, floored, plain
+from surfacechem.mechanism.rates import GONE, InterfaceArrhenius, floored, plain
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 
 PREFIX = "interface-"
@@ -190,9 +190,9 @@ class InterfaceKamalSourour(InterfaceArrhenius):
 
 
 @cache
-def kinds() -> dict[str, type[SurfaceReaction]]:
+def kinds() -> dict[str, type[InterfaceArrhenius]]:
     """Every rate type that is lowered, by Cantera's name: those of this module, and one for each factor of a load."""
-    known: list[type[SurfaceReaction]] = [
+    known: list[type[InterfaceArrhenius]] = [
         InterfaceArrhenius,
         InterfaceLinearAffinity,
         InterfaceExponentialAffinity,
@@ -202,11 +202,11 @@ def kinds() -> dict[str, type[SurfaceReaction]]:
         if inspect.isclass(factor) and issubclass(factor, RateFactor) and factor is not RateFactor:
             own = {"kind": PREFIX + factor.rate_type, "__doc__": factor.__doc__, "__module__": __name__}
             name = f"Interface{factor.__name__.removesuffix('Factor')}"
-            known.append(cast(type[SurfaceReaction], type(name, (LoadedReaction, factor), own)))
+            known.append(cast(type[InterfaceArrhenius], type(name, (LoadedReaction, factor), own)))
     return {law.kind: law for law in known}
 
 
-def kind_of(name: str) -> type[SurfaceReaction] | None:
+def kind_of(name: str) -> type[InterfaceArrhenius] | None:
     """The rate type that a mechanism calls by that name; Cantera puts the prefix where it is missing."""
     plain_name = "Arrhenius" if name == "elementary" else name
     return kinds().get(plain_name) or kinds().get(PREFIX + plain_name)

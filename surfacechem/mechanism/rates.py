@@ -6,8 +6,8 @@ is one by its ``rate_type``; any other is a subclass with Cantera's name of the 
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -44,7 +44,7 @@ class CoverageTerm:
         energy: Expression = 0
         for coefficient in reversed(self.E):
             energy = theta * (energy + coefficient)
-        value = self.a * LN10 * theta - energy / (GAS_CONSTANT * T)
+        value = self.a * math.log(10) * theta - energy / (GAS_CONSTANT * T)
         if self.m:
             value += self.m * log(floored(theta))
         return value
@@ -57,9 +57,6 @@ def floored(theta: Expression, floor: float = COVERAGE_FLOOR) -> Expression:
     (0.5, 1e-20)
     """
     return where(theta > floor, theta, floor + 0 * theta)
-
-
-LN10 = 2.302585092994046
 
 
 class MechanismReaction(RateLaw):
@@ -84,55 +81,90 @@ class MechanismReaction(RateLaw):
         return {name: plain(nu) for name, nu in self.change.items() if nu}
 
 
-class SurfaceReaction(MechanismReaction):
-    r"""Mass action on a surface, per current area.
+class InterfaceArrhenius(MechanismReaction):
+    r"""Mass action on a surface with a modified Arrhenius coefficient, per current area.
 
     .. math:: R = k(T) \left[ \prod_k n_k^{\,r_k}
               - e^{(\Delta g + \Delta w) / k_B T} \prod_k (n_k^\circ)^{-\nu_k} \prod_k n_k^{\,p_k} \right],
               \quad n_k = n_k^\circ \theta_k
 
+    .. math:: k = A\,T^b \exp\left( -\frac{E_a}{R_g T} \right)
+              \prod_k 10^{a_k \theta_k}\,\theta_k^{m_k} \exp\left( -\frac{E_k(\theta_k)}{R_g T} \right)
+
     r are the orders, p the coefficients of the products, :math:`\nu = p - r`, and :math:`n_k^\circ = N_k / J_c` the
     amount of species k per current area at full coverage; w is the elastic energy of bonds across the gap. The bracket
-    vanishes where the reaction's affinity does.
+    vanishes where the reaction's affinity does. Other rate types are subclasses with another ``coefficient``.
+
+    Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; Cantera's interface-Arrhenius with
+    its coverage dependencies. Admissible where it is reversible; an irreversible reaction needs mu <= 0.
     """
 
-    kind: ClassVar[str] = ""
+    kind: ClassVar[str] = "interface-Arrhenius"
     """Cantera's name of the rate type."""
-    keys: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    keys: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "rate-constant": ("A", "b", "Ea"),
+        "coverage-dependencies": ("a", "m", "E"),
+    }
     """Keys of a reaction of this type beside those that every reaction may have, with the keys inside."""
-    native: ClassVar[bool] = False
+    native: ClassVar[bool] = True
     """Whether Cantera knows the type without an extension."""
 
     orders: Mapping[str, float] = option("forward order of each coverage")
     products: Mapping[str, float] = option("product coefficient of each coverage")
     species: tuple[Species, ...] = option("the species that take part")
     reversible: bool = option("whether the reverse follows from the thermo", default=True)
-
-    @classmethod
-    @abstractmethod
-    def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
-        """Own fields of the class, in SI units per molecule, from a Cantera reaction of total order ``order``."""
-
-    def with_parts(self, bind: Bind) -> Self:
-        """With symbols for the parameters of the species that take part."""
-        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
+    A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
+    b: float = parameter("1", "temperature exponent", default=0.0)
+    Ea: float = parameter("J/mol", "activation energy", default=0.0)
+    coverage: tuple[CoverageTerm, ...] = option("dependence on coverages", default=())
 
     @classmethod
     def own_keys(cls) -> dict[str, str]:
         """Keys of the reaction in a mechanism file that Cantera does not know, each with the field that it gives."""
         return {}
 
-    @abstractmethod
-    def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
-        """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
+    @classmethod
+    def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
+        """A, b, Ea and the coverage terms, in SI units per molecule, from a Cantera reaction of that total order."""
+        rate, terms = reaction.rate, []
+        for name, term in sorted(rate.coverage_dependencies.items()):
+            energies = term["E"] if isinstance(term["E"], list | tuple) else [term["E"]]
+            E = tuple(float(energy) / KILO for energy in energies)
+            terms.append(CoverageTerm(variables[name], float(term["a"]), float(term["m"]), E))
+        return {
+            "A": rate.pre_exponential_factor * (KILO * AVOGADRO) ** (1 - order),
+            "b": rate.temperature_exponent,
+            "Ea": rate.activation_energy / KILO,
+            "coverage": tuple(terms),
+        }
 
-    def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
-        """Logarithm of the rate coefficient; to be overridden where the coefficient may vanish."""
-        return log(self.coefficient(values, 0))
+    def with_parts(self, bind: Bind) -> Self:
+        """With symbols for the parameters of the species that take part."""
+        return self.bind({"species": tuple(item.bound(bind) for item in self.species)})
+
+    def refine(self, name: str, spec: Spec) -> Spec:
+        """The unit of A follows from the order of this reaction."""
+        return replace(spec, unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
 
     def own_reads(self) -> tuple[str, ...]:
         """Variables that the coefficient reads beside the temperature."""
-        return ()
+        return tuple(term.variable for term in self.coverage)
+
+    def exponent(self, values: Mapping[str, Expression]) -> Expression:
+        """Exponent of the rate coefficient."""
+        T = values["T_c"]
+        value = -self.Ea / (GAS_CONSTANT * T)
+        for term in self.coverage:
+            value += term.exponent(values[term.variable], T)
+        return value
+
+    def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
+        """Rate coefficient times exp(shift), with one exponential so that neither factor can overflow."""
+        return scaled_exp(self.A * values["T_c"] ** self.b, self.exponent(values) + shift)
+
+    def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
+        """Logarithm of the rate coefficient."""
+        return log(self.A) + self.b * log(values["T_c"]) + self.exponent(values)
 
     @property
     def balanced(self) -> bool:
@@ -164,19 +196,17 @@ class SurfaceReaction(MechanismReaction):
         """Logarithm of the rate where the reaction is irreversible."""
         return None if self.reversible else self.log_forward
 
-    def _formula(self, evaluate: Any) -> Formula:
-        names = (name for item in self.species for name in (item.variable, item.concentration))
-        gap = ("g_n",) if self.reversible and self._stretches() else ()
-        around = (x.variable for item in self._changing() for x in item.interactions) if self.reversible else ()
-        return Formula(("T_c", *gap, *names, *around, *self.own_reads()), evaluate)
+    def _formula(self, evaluate: Callable[[Mapping[str, Expression]], Expression]) -> Formula:
+        # The affinity reads the gap that stretches what changes, and the coverages around it.
+        changing = self._changing() if self.reversible else []
+        gap = ("g_n",) if any(item.spring for item in changing) else ()
+        own = (name for item in self.species for name in (item.variable, item.concentration))
+        around = (x.variable for item in changing for x in item.interactions)
+        return Formula(("T_c", *gap, *own, *around, *self.own_reads()), evaluate)
 
-    def _changing(self) -> tuple[Species, ...]:
+    def _changing(self) -> list[Species]:
         """The species that the reaction makes or uses up."""
-        return tuple(item for item in self.species if self.change.get(item.variable))
-
-    def _stretches(self) -> bool:
-        """Whether the reaction changes the number of elastic bonds."""
-        return any(item.spring for item in self._changing())
+        return [item for item in self.species if self.change.get(item.variable)]
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
         return self.coefficient(values, 0) * self._amounts(values, self.orders, -1)
@@ -225,67 +255,6 @@ class SurfaceReaction(MechanismReaction):
             elif order:
                 product *= power(values[item.concentration] * theta, plain(order))
         return product
-
-
-class InterfaceArrhenius(SurfaceReaction):
-    r"""Modified Arrhenius rate of a surface reaction.
-
-    .. math:: k = A\,T^b \exp\left( -\frac{E_a}{R_g T} \right)
-              \prod_k 10^{a_k \theta_k}\,\theta_k^{m_k} \exp\left( -\frac{E_k(\theta_k)}{R_g T} \right)
-
-    Source: Kee, Coltrin, Glarborg & Zhu, Chemically Reacting Flow (2018), ch. 11; Cantera's interface-Arrhenius with
-    its coverage dependencies. Admissible where it is reversible; an irreversible reaction needs mu <= 0.
-    """
-
-    kind = "interface-Arrhenius"
-    keys: ClassVar = {"rate-constant": ("A", "b", "Ea"), "coverage-dependencies": ("a", "m", "E")}
-    native = True
-
-    A: float = parameter("m^(2n-2)/s", "pre-exponential factor at 1 K, per molecule; n is the total order")
-    b: float = parameter("1", "temperature exponent", default=0.0)
-    Ea: float = parameter("J/mol", "activation energy", default=0.0)
-    coverage: tuple[CoverageTerm, ...] = option("dependence on coverages", default=())
-
-    @classmethod
-    def parameters_of(cls, reaction: Any, variables: Mapping[str, str], order: float) -> Mapping[str, Any]:
-        """A, b, Ea and the coverage terms."""
-        rate = reaction.rate
-        return {
-            "A": rate.pre_exponential_factor * (KILO * AVOGADRO) ** (1 - order),
-            "b": rate.temperature_exponent,
-            "Ea": rate.activation_energy / KILO,
-            "coverage": tuple(
-                _coverage_term(variables[name], terms) for name, terms in sorted(rate.coverage_dependencies.items())
-            ),
-        }
-
-    def refine(self, name: str, spec: Spec) -> Spec:
-        """The unit of A follows from the order of this reaction."""
-        return replace(spec, unit=unit_of_rate(sum(self.orders.values()))) if name == "A" else spec
-
-    def own_reads(self) -> tuple[str, ...]:
-        return tuple(term.variable for term in self.coverage)
-
-    def exponent(self, values: Mapping[str, Expression]) -> Expression:
-        """Exponent of the rate coefficient."""
-        T = values["T_c"]
-        value = -self.Ea / (GAS_CONSTANT * T)
-        for term in self.coverage:
-            value += term.exponent(values[term.variable], T)
-        return value
-
-    def log_coefficient(self, values: Mapping[str, Expression]) -> Expression:
-        """Logarithm of the rate coefficient."""
-        return log(self.A) + self.b * log(values["T_c"]) + self.exponent(values)
-
-    def coefficient(self, values: Mapping[str, Expression], shift: Expression) -> Expression:
-        """The rate coefficient times exp(shift)."""
-        return scaled_exp(self.A * values["T_c"] ** self.b, self.exponent(values) + shift)
-
-
-def _coverage_term(variable: str, terms: Mapping[str, Any]) -> CoverageTerm:
-    energies = terms["E"] if isinstance(terms["E"], list | tuple) else [terms["E"]]
-    return CoverageTerm(variable, float(terms["a"]), float(terms["m"]), tuple(float(e) / KILO for e in energies))
 
 
 def unit_of_rate(order: float) -> str:

@@ -24,7 +24,7 @@ from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
 from surfacechem.mechanism.mixture import IdealMixture, Species
-from surfacechem.mechanism.rates import SurfaceReaction
+from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.detailed_balance import ROUNDED
@@ -50,10 +50,10 @@ class Curves:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, SurfaceReaction)}
+        self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, InterfaceArrhenius)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
         # Every number of a law is a symbol: the logarithm of one that is zero is infinite only when it is evaluated.
-        self._bound: dict[str, SurfaceReaction] = {}
+        self._bound: dict[str, InterfaceArrhenius] = {}
         self._numbers: dict[Expression, float] = {}
         for label, law in self.laws.items():
             symbols = {name: symengine.Symbol(f"{label}.{name}") for name, _ in law.specs()}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
-from surfacechem.mechanism.rates import SurfaceReaction
+from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.mechanism.source import Source
 from surfacechem.results.detailed_balance import said
 from surfacechem.runs.listing import WIDTH, source
@@ -167,7 +167,7 @@ def power_of_ten(logarithm: float) -> str:
     return f"{math.exp(logarithm - exponent * math.log(10)):.3g}e{exponent:+03d}"
 
 
-def _source(law: type[SurfaceReaction]) -> str:
+def _source(law: type[InterfaceArrhenius]) -> str:
     text = f"{law.kind}: {source(law)}".replace("``", "")
     return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
 
