@@ -58,7 +58,7 @@ class Moments:
     def margins(self) -> Array:
         """Guards of the edges at the state last put, infinite where they are not in play."""
         now, playing = self.evaluation.margins(), self.instant.in_play(self.here())
-        self.instant.see(now, playing)
+        self.instant.see(self.evaluation.y)
         return np.where(playing, now, np.inf)[self.instant.first :]
 
     def soonest(self) -> float:

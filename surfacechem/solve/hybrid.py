@@ -126,8 +126,7 @@ class Hybrid:
         self.exchanged = np.maximum(self.exchanged, np.abs(instant.booked))
         self._steps += result.counters.steps
         self._written += len(result.times)
-        if len(result.margins):
-            instant.see(result.margins, instant.in_play(start))
+        instant.see(np.vstack((start.y, result.y, *(() if result.steps is None else (result.steps.y,)))))
         if instant.rebounds.missed(result):
             instant.status, instant.reason = Status.FAILED, MISSED
             return None

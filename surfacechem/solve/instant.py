@@ -10,10 +10,11 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+import symengine
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Function, compile_function
-from surfacechem.expressions import absolute, magnitude, where
+from surfacechem.expressions import magnitude
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.solve.bounces import Rebounds
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOISE = 1e-13
-"""Guards below this part of the largest seen count as zero."""
+"""Guards below this part of their magnitude count as zero: some hundred roundings, those of a step onto it included."""
 
 REACHED = 1e-14
 """Part of the time within which two moments are one."""
@@ -39,7 +40,7 @@ AT_ONCE = 12
 """Edges at one moment from which on they are chatter."""
 
 SHARPENED = 1e-9
-"""Part of a run after which the largest guards seen may be forgotten again: a choice, far above the rounding of time
+"""Part of a run after which the peaks of the states may be forgotten again: a choice, far above the rounding of time
 and far below what is of interest. What follows itself without end within it is chatter even where it would calm down.
 """
 
@@ -47,7 +48,7 @@ NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any dis
 
 
 class Instant:
-    """The present moment of a run: what has jumped so far, and how large the guards have been."""
+    """The present moment of a run: what has jumped so far, and how large the states have been."""
 
     def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
         self.system, self.jumper, self.program = system, jumper, problem.program
@@ -58,7 +59,7 @@ class Instant:
         """Times [s] between which the run goes; what is brief is so against them."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
-        self.largest = np.zeros(len(problem.margins))
+        self.peaks = np.zeros(problem.program.n)
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(system, first)
@@ -72,7 +73,7 @@ class Instant:
         self._resolved = 0
         """Number of edges before the last chatter that was resolved."""
         self._sharpened = -np.inf
-        """Time [s] at which the largest guards seen were last forgotten."""
+        """Time [s] at which the peaks of the states were last forgotten."""
         self.status = Status.FINISHED
         self.reason = ""
         """Why the run ends here, in words, where it does."""
@@ -83,35 +84,28 @@ class Instant:
         """Which guards are in play in the modes of a point."""
         return np.array(self.system.in_play(point.parameters), dtype=bool)
 
-    def see(self, guards: Array, playing: Mask) -> None:
-        """Keep the largest guards seen while in play."""
-        self.largest = np.maximum(self.largest, np.where(playing, np.abs(guards), 0.0))
-        for alike in self._alike:
-            self.largest[alike] = self.largest[alike].max()
-
-    @cached_property
-    def _alike(self) -> list[list[int]]:
-        """Guards that measure the same in different modes."""
-        measures = [edge.measure for edge in self.system.edges]
-        return [[self.first + j for j, other in enumerate(measures) if other == name] for name in {*measures} - {""}]
+    def see(self, y: Array) -> None:
+        """Keep the largest states seen, shape (..., states)."""
+        self.peaks = np.fmax(self.peaks, np.fmax.reduce(np.abs(y.reshape(-1, len(self.peaks))), axis=0, initial=0.0))
 
     def sizes(self, point: Point) -> Array:
-        """Sizes to which the rounding of each guard is in proportion: the largest seen, or what cancels in it."""
-        if not self.strict.any():
-            return self.largest
-        seen, own = self.largest.copy(), self._terms(point.inputs())
-        seen[self.strict] = np.fmax(seen[self.strict], np.where(np.isfinite(own), own, 0.0))
-        return seen
+        """Magnitudes of the guards at the peaks of the states, to which their rounding is in proportion.
+
+        What is left of a state that was large is known no better than it was then.
+        """
+        if self.program.margins is None:
+            return np.zeros(0)
+        found = self._magnitudes(np.concatenate((point.inputs(), np.maximum(self.peaks, np.abs(point.y)))))
+        return np.where(np.isfinite(found), found, 0.0)
 
     @cached_property
-    def _terms(self) -> Function:
-        """Magnitudes of the strict guards, which may be zero for long while their terms are large."""
-        sizes = {}
-        for state in self.system.states:
-            size, least = absolute(state.symbol), state.finest or state.scale
-            sizes[state.symbol] = where(size > least, size, least)
-        strict = [edge.guard for edge in self.system.edges if edge.strict]
-        return compile_function(self.system.inputs, [magnitude(self.system.expand(guard), sizes) for guard in strict])
+    def _magnitudes(self) -> Function:
+        """Running error bounds of limits and edges, of the inputs and the peaks of the states."""
+        system = self.system
+        peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
+        guards = [m.expression for m in system.moving_margins()] + [edge.guard for edge in system.edges]
+        bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
+        return compile_function([*system.inputs, *peaks.values()], bounds)
 
     def consistent(self, point: Point) -> Point:
         """The point with the rates and algebraic variables that belong to it."""
@@ -138,9 +132,9 @@ class Instant:
         while not self._chatters(point.t) or self._calmed(point):
             seen = self.consistent(point) if self.jumper.guards_read_rates else point
             now, playing = guards(seen.inputs()), self.in_play(point)
-            self.see(now, playing)
-            due = self._due(now[self.first :], playing[self.first :], point)
-            if self.jumps and (closed := self._closed(now, playing, due is not None)):
+            sizes = self.sizes(point)
+            due = self._due(now[self.first :], playing[self.first :], sizes[self.first :], point)
+            if self.jumps and (closed := self._closed(now, playing, sizes, due is not None)):
                 margin = self.system.moving_margins()[closed[0]]
                 self.status, self.reason = Status.EVENT, self.system.reason(margin, self.jumps[-1].after.inputs())
                 return None
@@ -154,10 +148,10 @@ class Instant:
         self._end_of_chatter(self.jumps[-1])
         return None
 
-    def _due(self, now: Array, playing: Mask, point: Point) -> int | None:
+    def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
         """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
-        small = NOISE * self.sizes(point)[self.first :]
-        drift = np.maximum(DRIFT * self.rtol * self.largest[self.first :], small)
+        small = NOISE * sizes
+        drift = np.maximum(DRIFT * self.rtol * sizes, small)
         closed = playing & (now < -drift)
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
@@ -176,18 +170,18 @@ class Instant:
         found = {state.symbol for state in self.system.states if state.algebraic}
         return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
 
-    def _closed(self, now: Array, playing: Mask, due: bool) -> list[int]:
+    def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
         """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
         margins = self.system.moving_margins()[: self.first]
-        least = [0.0 if m.domain else -NOISE * size for m, size in zip(margins, self.largest, strict=False)]
+        least = [0.0 if m.domain else -NOISE * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
-        closed += [i for i in self.limits if playing[i] and now[i] <= NOISE * self.largest[i]]
+        closed += [i for i in self.limits if playing[i] and now[i] <= NOISE * sizes[i]]
         return [i for i in closed if not (due and self._of_modes[i])]
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""
-        largest, drift = float(self.largest[self.first + index]), DRIFT * self.rtol
+        largest, drift = float(self.sizes(point)[self.first + index]), DRIFT * self.rtol
         balanced = BALANCED if self.system.edges[index].times else drift
         slack = Slack(NOISE * largest, drift * largest, balanced, self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
@@ -219,7 +213,7 @@ class Instant:
         Rebounds that follow each other faster than time can tell have come to rest.
         """
         if point.t > self._sharpened + SHARPENED * self.end:
-            self._sharpened, self._resolved, self.largest = point.t, len(self.jumps), np.zeros_like(self.largest)
+            self._sharpened, self._resolved, self.peaks = point.t, len(self.jumps), np.zeros_like(self.peaks)
             return True
         rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
         if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == point.t:
