@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import Any
 
 import numpy as np
 
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.solve.adapters.crossings import crossings
-from surfacechem.solve.contract import Array
+from surfacechem.solve.adapters.cantera_network import last_step
+from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
+from surfacechem.solve.contract import Array, Margin
 
 FIRST = 1e-9
 """First look ahead after a start, as part of what is integrated: the integrator starts with shorter steps still."""
@@ -51,8 +52,7 @@ class Watch:
         """Time up to which the next event is known [s]."""
         self.event: Event | None = None
         self._before: list[Array] = []
-        self._origin = 0.0
-        self._rows = np.zeros((1, 0))
+        self._steps: list[DenseStep] = []
 
     def restart(self) -> None:
         """The integrator starts anew from here."""
@@ -72,54 +72,30 @@ class Watch:
         now = float(self.net.time)
         self.started, self.event = True, None
         self.known = max([now, *(item.asked for item in self.interfaces)])
-        self._origin, self._rows = now, self._polynomial()
-        for item, before in zip(self.interfaces, self._before, strict=True):
-            self._first(item, before, now)
+        self._steps = [self._step_of(item, now) for item in self.interfaces]
+        for item, step, before in zip(self.interfaces, self._steps, self._before, strict=True):
+            guards = Guards.of([Margin.stop()] * len(before), item.scene.transitions)
+            guards.start(before)
+            present = item.scene.transitions(now, step.y(now))
+            t, fired = now, np.flatnonzero(guards.crossed(present)).tolist()
+            if not fired:
+                guards.start(present)
+                t, fired = first_crossing(step, guards, np.isfinite(present), 0.0)
+            if fired and (self.event is None or t < self.event.t):
+                self.event = Event(t, item, fired[0])
 
     def book(self, start: float, end: float) -> None:
         """Integrate the ledgers over a part of the step, which the integrator does not see where nothing else moves."""
-        for item in self.interfaces:
+        for item, step in zip(self.interfaces, self._steps, strict=True):
             frequency = max((item.scene.values[path] for path in item.scene.model.system.cycles), default=0.0)
             panels = 1 + int(PANELS_OF_A_PERIOD * frequency * (end - start))
             edges = np.linspace(start, end, panels + 1)
             for low, high in pairwise(edges):
                 times = (low + high) / 2 + (high - low) / 2 * NODES
-                rates = [item.ledger_rates(t, self._at(item, t)) for t in times.tolist()]
+                rates = [item.ledger_rates(t, step.y(t)) for t in times.tolist()]
                 item.ledger = item.ledger + (high - low) / 2 * (WEIGHTS @ np.array(rates))
 
-    def _at(self, item: InterfaceReactor, t: float) -> Array:
-        """Variables of an interface within the step."""
-        return np.asarray(_value(self._rows[:, self._columns(item)], t - self._origin) * item.unit)
-
-    def _first(self, item: InterfaceReactor, before: Array, now: float) -> None:
-        def margins(t: float) -> Array:
-            return item.scene.transitions(t, self._at(item, t))
-
-        passed = np.flatnonzero((before > 0) & (margins(now) <= 0)).tolist()
-        zeros = dict.fromkeys(passed, now) or crossings(
-            margins, np.sign(margins(now)), np.full(len(before), -1), now, self.known
-        )
-        if zeros:
-            first = min(zeros, key=lambda i: zeros[i])
-            if self.event is None or zeros[first] < self.event.t:
-                self.event = Event(zeros[first], item, first)
-
-    def _polynomial(self) -> Array:
-        """Coefficients of the powers of the time from now, shape (powers, variables)."""
-        rows, factorial = [], 1.0
-        for k in range(int(self.net.solver_stats["last_order"]) + 1):
-            factorial *= max(k, 1)
-            rows.append(np.asarray(self.net.get_derivative(k)) / factorial)
-        return np.array(rows)
-
-    def _columns(self, item: InterfaceReactor) -> slice:
-        reactors = list(self.net.reactors)
-        first = sum(reactor.n_vars for reactor in reactors[: reactors.index(item)])
-        return slice(first, first + item.n_vars)
-
-
-def _value(rows: Array, s: float) -> Array:
-    value = np.zeros(rows.shape[1])
-    for row in rows[::-1]:
-        value = row + s * value
-    return value
+    def _step_of(self, item: InterfaceReactor, now: float) -> DenseStep:
+        """What is left of the step from now, with the variables of an interface."""
+        first = sum(reactor.n_vars for reactor in takewhile(lambda reactor: reactor is not item, self.net.reactors))
+        return last_step(self.net, now, self.known, item.unit, slice(first, first + item.n_vars))

@@ -20,13 +20,12 @@ from surfacechem.model.system import System
 from surfacechem.model.validity import check_start
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
-from surfacechem.solve.adapters.time_derivatives import output_rates
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
 from surfacechem.solve.hybrid import Hybrid
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.radau.solver import Radau
+from surfacechem.solve.radau.solver import Radau, output_rates
 from surfacechem.solve.roundoff import solve
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start

@@ -18,9 +18,8 @@ from solver_problems import (
 
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
-from surfacechem.solve.adapters.time_derivatives import output_rates
 from surfacechem.solve.contract import Margin, Problem, Status
-from surfacechem.solve.radau.solver import Radau, consistent, solve_many
+from surfacechem.solve.radau.solver import Radau, consistent, output_rates, solve_many
 from surfacechem.solve.radau.tables import COLLOCATION, GAMMA, INVERSE, NODES, PAIR_VALUES, STAGES
 
 radau = Radau()

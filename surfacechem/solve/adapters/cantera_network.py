@@ -12,16 +12,14 @@ from typing import Any, Self
 import cantera
 import numpy as np
 
+from surfacechem.solve.adapters.dense_step import DenseStep
 from surfacechem.solve.adapters.evaluation import Evaluation
-from surfacechem.solve.adapters.reduced import Reduced
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
+from surfacechem.tolerances import NOISE, TINY
 
 LONGEST = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
-
-SMALLEST = 1e-290
-"""Absolute tolerances below this count as this."""
 
 CONTENTS = """
 phases:
@@ -130,7 +128,7 @@ class _SystemReactor(HeldReactor):
         super().__init__(surface)
         self.view = view
         self.evaluation = Evaluation(view.problem.program, view.guess, view.parameters)
-        self.unit = np.maximum(Reduced(view).atol, SMALLEST)
+        self.unit = np.maximum(view.atol, TINY)
         self.scaled = x / self.unit
         self.names = tuple(f"x{i}" for i in range(len(x)))
 
@@ -147,41 +145,42 @@ class _SystemReactor(HeldReactor):
         return np.asarray(self.evaluation.ydot[self.evaluation.free] / self.unit)
 
 
-TINIEST = 1e-15
-"""Part of the end of a run that a step may go beyond it."""
+def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = slice(None)) -> DenseStep:
+    """The step that a network has taken last, from the derivatives of its integrator's polynomial at the present time;
+    with variables that it counts in units.
+    """
+    now, rows, factorial = float(net.time), [], 1.0
+    for k in range(int(net.solver_stats["last_order"]) + 1):
+        factorial *= max(k, 1)
+        rows.append(np.asarray(net.get_derivative(k))[columns] / factorial)
+
+    def y(t: float) -> Array:
+        value = np.zeros_like(rows[0])
+        for row in rows[::-1]:
+            value = row + (t - now) * value
+        return value * unit
+
+    return DenseStep(start, end, y)
 
 
 class _Stretch(Method):
     def __init__(self, view: View, t: float, end: float, y: Array) -> None:
-        self.reactor = _SystemReactor(contents(), view, Reduced(view).start(y))
+        self.reactor = _SystemReactor(contents(), view, y[view.differential])
         self.net = cantera.ReactorNet([self.reactor])
         self.net.rtol, self.net.atol = view.problem.rtol, 1.0
         self.net.initial_time = t
         self.longest = min(LONGEST * (end - t), view.problem.spacing)
         self.t, self.end = t, end
-        self.polynomial = np.zeros((1, len(self.reactor.names)))
 
-    def advance(self) -> float:
+    def advance(self) -> DenseStep:
+        before = self.t
         try:
             # Cantera knows no time to stop at: a step beyond it would not have felt what is there.
-            self.net.max_time_step = min(self.longest, max(self.end - self.t, TINIEST * self.end))
+            self.net.max_time_step = min(self.longest, max(self.end - self.t, NOISE * self.end))
             self.t = float(self.net.step())
-            order = int(self.net.solver_stats["last_order"])
-            factorial = 1.0
-            rows = []
-            for k in range(order + 1):
-                factorial *= max(k, 1)
-                rows.append(np.asarray(self.net.get_derivative(k)) / factorial)
+            return last_step(self.net, before, self.t, self.reactor.unit)
         except (cantera.CanteraError, ArithmeticError) as error:
             raise StepError(str(error)) from error
-        self.polynomial = np.array(rows)
-        return self.t
-
-    def at(self, t: float) -> Array:
-        value = np.zeros(self.polynomial.shape[1])
-        for row in self.polynomial[::-1]:
-            value = row + (t - self.t) * value
-        return value * self.reactor.unit
 
     @property
     def factorizations(self) -> int:

@@ -6,30 +6,29 @@ from typing import Any
 import numpy as np
 from scipy.integrate import BDF, LSODA, OdeSolver, Radau
 
-from surfacechem.solve.adapters.reduced import Reduced
+from surfacechem.solve.adapters.dense_step import DenseStep
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array
+from surfacechem.tolerances import EPS
 
-SMALLEST_RTOL = 100 * np.finfo(float).eps
+SMALLEST_RTOL = 100 * EPS
 """SciPy raises smaller tolerances to this with a warning."""
 
 
 class _Stretch(Method):
     def __init__(self, kind: type[OdeSolver], view: View, t: float, end: float, y: Array) -> None:
-        system = Reduced(view)
         options: dict[str, Any] = {
             "rtol": max(view.problem.rtol, SMALLEST_RTOL),
-            "atol": system.atol,
-            "jac": system.jacobian,
+            "atol": view.atol,
+            "jac": view.reduced_jacobian,
             "max_step": view.problem.spacing,
         }
         try:
-            self.solver = kind(system.rates, t, system.start(y), end, **options)
+            self.solver = kind(view.reduced_rates, t, y[view.differential], end, **options)
         except (ValueError, ArithmeticError) as error:
             raise StepError(str(error)) from error
-        self.dense: Any = None
 
-    def advance(self) -> float:
+    def advance(self) -> DenseStep:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             try:
@@ -38,11 +37,8 @@ class _Stretch(Method):
                 raise StepError(str(error)) from error
         if self.solver.status == "failed":
             raise StepError(str(message))
-        self.dense = self.solver.dense_output()
-        return float(self.solver.t)
-
-    def at(self, t: float) -> Array:
-        return np.asarray(self.solver.y if t == self.solver.t else self.dense(t))
+        inside, end, last = self.solver.dense_output(), float(self.solver.t), self.solver.y
+        return DenseStep(float(self.solver.t_old), end, lambda t: np.asarray(last if t == end else inside(t)))
 
     @property
     def factorizations(self) -> int:

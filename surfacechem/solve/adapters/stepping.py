@@ -4,15 +4,16 @@ contract.
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from surfacechem.solve.adapters.crossings import crossings
+from surfacechem.solve.adapters.dense_step import NODES, DenseStep, Guards, StepLedger, first_crossing
 from surfacechem.solve.adapters.evaluation import Evaluation
-from surfacechem.solve.adapters.step_ledger import NODES, StepLedger
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
+from surfacechem.tolerances import SQRT_EPS, ULPS
 
 MISSED = 100.0
 """Errors in units of the tolerance beyond which a step has not seen what lies before an event."""
@@ -31,7 +32,10 @@ class NoStateError(Exception):
 
 @dataclass
 class View:
-    """The problem as a library sees it in one segment: x = differential or all variables."""
+    """The problem as a library sees it in one segment: x = differential or all variables.
+
+    For libraries that know no algebraic variables it is reduced to x' = f(t, x) of the differential ones.
+    """
 
     problem: Problem
     parameters: Array
@@ -45,15 +49,17 @@ class View:
     def __post_init__(self) -> None:
         """Its buffer serves all states of the segment."""
         self.evaluation = Evaluation(self.problem.program, self.guess, self.parameters)
+        self.differential = ~self.problem.program.algebraic_mask
+        self.atol = self.problem.atol[self.differential]
 
     def inputs(self, t: float, y: Array, ydot: Array) -> Array:
         return self.problem.program.filled(np.concatenate(([t], y, ydot, self.parameters)))
 
-    def complete(self, t: float, differential: Array) -> tuple[Array, Array]:
-        """State and derivative with the algebraic variables found from the equations."""
+    def complete(self, t: float, x: Array) -> tuple[Array, Array]:
+        """State and derivative from the differential variables, the algebraic ones found from the equations."""
         evaluation = self.evaluation
-        evaluation.guess = self.guess[self.problem.program.algebraic_mask]
-        if not evaluation.put(t, differential):
+        evaluation.guess = self.guess[~self.differential]
+        if not evaluation.put(t, x):
             return np.full_like(evaluation.y, np.nan), np.full_like(evaluation.y, np.nan)
         self.guess = evaluation.y.copy()
         return self.guess, evaluation.ydot.copy()
@@ -71,17 +77,28 @@ class View:
         self.jacobians += 1
         return self.problem.program.derivatives(self.inputs(t, y, ydot))
 
+    def reduced_rates(self, t: float, x: Array) -> Array:
+        """The right-hand side f of the reduced system."""
+        self.residuals += 1
+        return self.complete(t, x)[1][self.differential]
+
+    def reduced_jacobian(self, t: float, x: Array) -> Array:
+        """df/dx, from G_x dx + G_u du = 0 with u the derivatives and algebraic variables."""
+        y, ydot = self.complete(t, x)
+        by_state, by_rate = self.matrices(t, y, ydot)
+        unknown = np.where(self.differential, by_rate, by_state)
+        try:
+            return np.asarray(-np.linalg.solve(unknown, by_state[:, self.differential])[self.differential])
+        except np.linalg.LinAlgError:
+            return np.full((len(x), len(x)), np.nan)
+
 
 class Method(ABC):
     """One library method running over one stretch without breakpoints."""
 
     @abstractmethod
-    def advance(self) -> float:
-        """Take one step of the library's choice; returns the time reached."""
-
-    @abstractmethod
-    def at(self, t: float) -> Array:
-        """The variables inside the last step."""
+    def advance(self) -> DenseStep:
+        """Take one step of the library's choice."""
 
     @property
     def factorizations(self) -> int:
@@ -99,42 +116,6 @@ class Method(ABC):
         return 0
 
 
-@dataclass
-class Progress:
-    """What a run has produced so far."""
-
-    problem: Problem
-    started: float
-    t: float
-    y: Array
-    ydot: Array
-    ledger: Array
-    margins: Array
-    sides: Array
-    outputs: list[Array] = field(default_factory=list)
-    events: list[tuple[int, float, Array, Array, Array]] = field(default_factory=list)
-    steps: list[tuple[float, Array, Array, Array]] = field(default_factory=list)
-    count: int = 0
-    residuals: int = 0
-    jacobians: int = 0
-    factorizations: int = 0
-    rejected: int = 0
-    stepping: float = 0.0
-    """Time inside the library's own steps [s]."""
-    aim: float | None = None
-    """Where a step has to end, since one that went beyond has not seen what lies before."""
-
-    def restart_sides(self, fired: set[int]) -> None:
-        self.sides = np.sign(self.margins)
-        self.sides[list(fired)] = 0.0
-
-    def over_budget(self) -> Status | None:
-        if self.count >= self.problem.max_steps:
-            return Status.MAX_STEPS
-        limit = self.problem.max_seconds
-        return Status.STOPPED if limit is not None and time.monotonic() - self.started > limit else None
-
-
 class SteppingSolver(Solver):
     """A solver made of a library's single steps."""
 
@@ -150,202 +131,196 @@ class SteppingSolver(Solver):
         """Start the library's method at a consistent state."""
 
     def solve(self, problem: Problem) -> Result:
-        program = problem.program
-        empty = np.zeros(0)
-        progress = Progress(
-            problem,
-            time.monotonic(),
-            float(problem.segments[0]),
-            problem.y0,
-            np.zeros(program.n),
-            np.zeros(program.n_ledger),
-            empty,
-            empty,
-        )
-        status = Status.FINISHED
+        run, status = _Run(self, problem), Status.FINISHED
         for parameters, end in zip(problem.parameters, problem.segments[1:], strict=True):
-            view = View(problem, parameters, progress.y)
+            run.enter(parameters)
             try:
-                status = self._segment(view, progress, float(end))
+                status = run.through_segment(float(end))
             except NoStateError:
                 status = Status.NO_CONSISTENT_STATE
             except StepError:
-                status = Status.STEP_UNDERFLOW if np.all(np.isfinite(progress.y)) else Status.NOT_FINITE
-            progress.residuals += view.residuals
-            progress.jacobians += view.jacobians
+                status = Status.STEP_UNDERFLOW if np.all(np.isfinite(run.y)) else Status.NOT_FINITE
+            run.residuals += run.view.residuals
+            run.jacobians += run.view.jacobians
             if status != Status.FINISHED:
                 break
-        return _result(progress, status)
+        return run.result(status)
 
-    def _state(self, view: View, method: Method, t: float) -> tuple[Array, Array]:
-        """State and derivative inside the last step."""
-        x = method.at(t)
-        if not self.keeps_algebraic:
-            return view.complete(t, x)
-        view.guess = x
-        return view.complete(t, x[~view.problem.program.algebraic_mask])
 
-    def _ledger(self, view: View, progress: Progress, method: Method, reached: float) -> StepLedger:
-        """The ledger along the part of the last step that counts."""
-        start, size = progress.t, reached - progress.t
-        first = view.ledger_rates(start, progress.y, progress.ydot)
-        if not len(first):
-            return StepLedger(start, size, progress.ledger, np.zeros((len(NODES), 0)))
-        inside = [start + size * float(node) for node in NODES[1:]]
-        rates = [view.ledger_rates(t, *self._state(view, method, t)) for t in inside]
-        return StepLedger(start, size, progress.ledger, np.array([first, *rates]))
+class _Run:
+    """A run in the making: where it stands, and what it has produced so far."""
 
-    def _segment(self, view: View, progress: Progress, end: float) -> Status:
-        fired: set[int] = set()
-        while progress.t < end:
-            start = progress.t
-            progress.y, progress.ydot = view.complete(start, progress.y[~view.problem.program.algebraic_mask])
-            if not np.all(np.isfinite(progress.y)):
+    def __init__(self, solver: SteppingSolver, problem: Problem) -> None:
+        program = problem.program
+        self.solver, self.problem = solver, problem
+        self.started = time.monotonic()
+        self.t, self.y, self.ydot = float(problem.segments[0]), problem.y0, np.zeros(program.n)
+        self.ledger, self.margins = np.zeros(program.n_ledger), np.zeros(0)
+        self.guards = Guards.of(problem.margins, self._guards, problem.seen)
+        self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
+        self.outputs: list[Array] = []
+        self.events: list[tuple[int, float, Array, Array, Array]] = []
+        self.steps: list[tuple[float, Array, Array, Array]] = []
+        self.count = self.residuals = self.jacobians = self.factorizations = self.rejected = 0
+        self.stepping = 0.0
+        """Time inside the library's steps [s]."""
+        self.aim: float | None = None
+        """Where an event is expected that the library's step has passed over: the next steps end there."""
+
+    def enter(self, parameters: Array) -> None:
+        """Begin a segment."""
+        self.view = View(self.problem, parameters, self.y)
+
+    def through_segment(self, end: float) -> Status:
+        """Go on to the end of a segment, with a fresh start of the library after each event on the way."""
+        fired: list[int] = []
+        while self.t < end:
+            start = self.t
+            self.y, self.ydot = self.view.complete(start, self.y[self.view.differential])
+            if not np.all(np.isfinite(self.y)):
                 raise NoStateError
-            progress.margins = view.margins(start, progress.y, progress.ydot)
-            progress.restart_sides(fired)
-            _start_tables(progress)
-            stop = end if progress.aim is None or progress.aim <= start else progress.aim
-            method = self.begin(view, start, stop, progress.y, progress.ydot)
+            self.margins = self.view.margins(start, self.y, self.ydot)
+            self.guards.start(self.margins, fired)
+            if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
+                self.outputs.append(np.concatenate((self.y, self.ledger)))
+            if self.problem.record_steps and not self.steps:
+                self.steps.append((start, self.y, self.ydot, self.ledger))
+            stop = end if self.aim is None or self.aim <= start else self.aim
+            method = self.solver.begin(self.view, start, stop, self.y, self.ydot)
             try:
-                fired = self._stretch(view, progress, method, stop)
+                fired = self._to_event(method, stop)
             finally:
-                progress.factorizations += method.factorizations
-                progress.jacobians += method.own_jacobians
-                progress.rejected += method.rejected
-            if any(view.problem.margins[i].terminal for i in fired):
+                self.factorizations += method.factorizations
+                self.jacobians += method.own_jacobians
+                self.rejected += method.rejected
+            if any(self.problem.margins[i].terminal for i in fired):
                 return Status.EVENT
-            over = progress.over_budget()
-            if over is not None and progress.t < end:
+            over = self._over_budget()
+            if over is not None and self.t < end:
                 return over
         return Status.FINISHED
 
-    def _stretch(self, view: View, progress: Progress, method: Method, end: float) -> set[int]:
-        """Step until an event, the end of the segment or of the budget; returns the margins that fired."""
-        start = progress.t
-        while progress.t < end and progress.over_budget() is None:
+    def _over_budget(self) -> Status | None:
+        if self.count >= self.problem.max_steps:
+            return Status.MAX_STEPS
+        limit = self.problem.max_seconds
+        return Status.STOPPED if limit is not None and time.monotonic() - self.started > limit else None
+
+    def _to_event(self, method: Method, end: float) -> list[int]:
+        """Step until an event, the end or the budget's; returns the margins that fired."""
+        start = self.t
+        while self.t < end and self._over_budget() is None:
             before = time.perf_counter()
-            reached = min(method.advance(), end)
-            progress.stepping += time.perf_counter() - before
-            if not reached > progress.t:
+            step = method.advance()
+            reached = min(step.end, end)
+            self.stepping += time.perf_counter() - before
+            if not reached > self.t:
                 raise StepError("the step size fell to zero")
-            if progress.t == start:
-                self._check_first(view, progress, method, reached)
-            fired: set[int] = set()
-            if view.problem.margins:
-                reached, fired = self._find_event(view, progress, method, reached)
-                if fired and progress.aim is None and not self._seen(view, progress, method, reached):
-                    progress.aim = reached
-                    return set()
-            along = self._ledger(view, progress, method, reached)
-            self._write_outputs(view, progress, method, along)
-            y, ydot = self._state(view, method, reached)
-            ledger = along.at(reached)
-            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(ledger))):
-                raise StepError("a state is not finite")
-            if progress.aim is not None and progress.aim <= progress.t:
-                progress.aim = None
-            progress.t, progress.y, progress.ydot, progress.ledger = reached, y, ydot, ledger
-            progress.margins = view.margins(reached, y, ydot)
-            progress.count += 1
-            if view.problem.record_steps:
-                progress.steps.append((reached, y, ydot, ledger))
-            progress.events.extend((i, reached, y, ydot, ledger) for i in sorted(fired))
+            if self.t == start:
+                self._check_first(step, reached)
+            fired: list[int] = []
+            if self.problem.margins:
+                within = DenseStep(self.t, reached, step.y)
+                # Guards that are zero at one instant are so up to the error of the library's polynomial.
+                resolution = min(self.problem.rtol, SQRT_EPS) * (reached - self.t) + ULPS * abs(reached)
+                reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
+                if fired and self.aim is None and not self._has_seen(step, reached):
+                    self.aim = reached
+                    return []
+            self._accept(step, reached, fired)
             if fired:
                 return fired
-        return set()
+        return []
 
-    def _check_first(self, view: View, progress: Progress, method: Method, reached: float) -> None:
+    def _accept(self, step: DenseStep, reached: float, fired: Iterable[int]) -> None:
+        """Move on to a time within the step, with its outputs and events."""
+        ledger = StepLedger(self.t, reached - self.t, self.ledger, np.zeros((len(NODES), 0)))
+        first = self.view.ledger_rates(self.t, self.y, self.ydot)
+        if len(first):
+            inside = [self.view.ledger_rates(t, *self._state(step, t)) for t in self._nodes(reached)]
+            ledger = StepLedger(self.t, reached - self.t, self.ledger, np.array([first, *inside]))
+        for t in self.problem.times[len(self.outputs) :]:
+            if t > reached:
+                break
+            row = np.concatenate((self._state(step, float(t))[0], ledger.at(t)))
+            if not np.all(np.isfinite(row)):
+                raise StepError("an output is not finite")
+            self.outputs.append(row)
+        (y, ydot), q = self._state(step, reached), ledger.at(reached)
+        if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(q))):
+            raise StepError("a state is not finite")
+        if self.aim is not None and self.aim <= self.t:
+            self.aim = None
+        self.t, self.y, self.ydot, self.ledger = reached, y, ydot, q
+        self.margins = self.view.margins(reached, y, ydot)
+        self.count += 1
+        if self.problem.record_steps:
+            self.steps.append((reached, y, ydot, q))
+        self.events.extend((i, reached, y, ydot, q) for i in fired)
+
+    def _nodes(self, reached: float) -> list[float]:
+        """Quadrature points up to a time within the step, but the first."""
+        return [self.t + (reached - self.t) * float(node) for node in NODES[1:]]
+
+    def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
+        """State and derivative inside the last step."""
+        x = step.y(t)
+        if not self.solver.keeps_algebraic:
+            return self.view.complete(t, x)
+        self.view.guess = x
+        return self.view.complete(t, x[self.view.differential])
+
+    def _guards(self, t: float, x: Array) -> Array:
+        """Margins from the library's variables; without a search for the rest where nothing of it is read."""
+        program = self.problem.program
+        if program.plain_margins and not program.algebraic_mask.any():
+            return self.view.margins(t, x, np.zeros_like(x))
+        return self.view.margins(t, *self._state(DenseStep(t, t, lambda _: x), t))
+
+    def _check_first(self, step: DenseStep, reached: float) -> None:
         """A first step far longer than the layer it starts in may end in another solution, unseen by its own test."""
-        y, _ = self._state(view, method, reached)
-        moved = np.abs(progress.ydot) * (reached - progress.t)
-        seen = np.abs(progress.y) + np.abs(y) + view.problem.atol
-        if np.any((moved > LONGEST_FIRST * seen)[~view.problem.program.algebraic_mask]):
+        y, _ = self._state(step, reached)
+        moved = np.abs(self.ydot) * (reached - self.t)
+        seen = np.abs(self.y) + np.abs(y) + self.problem.atol
+        if np.any((moved > LONGEST_FIRST * seen)[self.view.differential]):
             raise StepError("the first step is longer than the layer it starts in")
 
-    def _margins(self, view: View, method: Method, t: float) -> Array:
-        program = view.problem.program
-        if program.plain_margins and not program.algebraic_mask.any():
-            y = method.at(t)
-            return view.margins(t, y, np.zeros_like(y))
-        y, ydot = self._state(view, method, t)
-        return view.margins(t, y, ydot)
-
-    def _find_event(self, view: View, progress: Progress, method: Method, reached: float) -> tuple[float, set[int]]:
-        directions = np.array([float(margin.direction) for margin in view.problem.margins])
-        if view.problem.in_play is not None:  # no direction counts for what is not in play
-            directions[~np.array(view.problem.in_play)] = np.nan
-        zeros = crossings(lambda t: self._margins(view, method, t), progress.sides, directions, progress.t, reached)
-        if zeros:
-            first = min(zeros.values())
-            near = 1e-9 * (reached - progress.t) + 4e-16 * abs(first)
-            return first, {i for i, zero in zeros.items() if zero <= first + near}
-        return reached, set()
-
-    def _seen(self, view: View, progress: Progress, method: Method, reached: float) -> bool:
+    def _has_seen(self, step: DenseStep, reached: float) -> bool:
         """Whether the rates up to an event inside the last step add up to its increment; a step that is tested at its
         end alone passes over a peak on the way.
         """
-        size = reached - progress.t
-        inside = [progress.t + size * float(node) for node in NODES[1:]]
-        rates = np.array([progress.ydot, *(self._state(view, method, t)[1] for t in inside)])
-        y, problem = self._state(view, method, reached)[0], view.problem
-        missed = np.abs(StepLedger(progress.t, size, progress.y, rates).at(reached) - y)
-        allowed = MISSED * (problem.rtol * np.maximum(np.abs(y), np.abs(progress.y)) + problem.atol)
-        return bool(np.all((missed <= allowed)[~problem.program.algebraic_mask]))
+        rates = np.array([self.ydot, *(self._state(step, t)[1] for t in self._nodes(reached))])
+        y = self._state(step, reached)[0]
+        missed = np.abs(StepLedger(self.t, reached - self.t, self.y, rates).at(reached) - y)
+        allowed = MISSED * (self.problem.rtol * np.maximum(np.abs(y), np.abs(self.y)) + self.problem.atol)
+        return bool(np.all((missed <= allowed)[self.view.differential]))
 
-    def _write_outputs(self, view: View, progress: Progress, method: Method, along: StepLedger) -> None:
-        times, reached = view.problem.times, along.start + along.size
-        while len(progress.outputs) < len(times) and times[len(progress.outputs)] <= reached:
-            t = float(times[len(progress.outputs)])
-            y, _ = self._state(view, method, t)
-            ledger = along.at(t)
-            if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ledger))):
-                raise StepError("an output is not finite")
-            progress.outputs.append(np.concatenate((y, ledger)))
+    def result(self, status: Status) -> Result:
+        """What the contract asks for."""
+        problem, program = self.problem, self.problem.program
+        n, q = program.n, program.n_ledger
 
+        def points(rows: Sequence[tuple[float, Array, Array, Array]]) -> list[Array]:
+            columns = zip(*rows, strict=True) if rows else ((),) * 4
+            return [
+                np.array(c).reshape(len(rows), *size) for c, size in zip(columns, ((), (n,), (n,), (q,)), strict=True)
+            ]
 
-def _start_tables(progress: Progress) -> None:
-    """The initial state as first output and first step."""
-    times = progress.problem.times
-    if not progress.outputs and len(times) and times[0] <= progress.t:
-        progress.outputs.append(np.concatenate((progress.y, progress.ledger)))
-    if progress.problem.record_steps and not progress.steps:
-        progress.steps.append((progress.t, progress.y, progress.ydot, progress.ledger))
-
-
-def _rows(rows: list[tuple[float, Array, Array, Array]], problem: Problem) -> tuple[Array, Array, Array, Array]:
-    widths = (problem.program.n, problem.program.n, problem.program.n_ledger)
-    t = np.array([row[0] for row in rows])
-    y, ydot, ledger = (
-        np.array([row[1 + i] for row in rows]).reshape(len(rows), width) for i, width in enumerate(widths)
-    )
-    return t, y, ydot, ledger
-
-
-def _result(progress: Progress, status: Status) -> Result:
-    problem, n = progress.problem, progress.problem.program.n
-    outputs = np.array(progress.outputs).reshape(-1, n + problem.program.n_ledger)
-    index = np.array([event[0] for event in progress.events], dtype=np.int64)
-    return Result(
-        problem=problem,
-        status=status,
-        t=progress.t,
-        y=progress.y,
-        ydot=progress.ydot,
-        ledger=progress.ledger,
-        margins=progress.margins,
-        times=problem.times[: len(outputs)],
-        outputs=outputs[:, :n],
-        ledger_outputs=outputs[:, n:],
-        events=Events(*_rows([event[1:] for event in progress.events], problem), index=index),
-        counters=Counters(
-            steps=progress.count,
-            rejected=progress.rejected,
-            residuals=progress.residuals,
-            jacobians=progress.jacobians,
-            factorizations=progress.factorizations,
-        ),
-        steps=Points(*_rows(progress.steps, problem)) if problem.record_steps else None,
-        stepping=progress.stepping,
-    )
+        outputs = np.array(self.outputs).reshape(-1, n + q)
+        index = np.array([event[0] for event in self.events], dtype=np.int64)
+        return Result(
+            problem=problem,
+            status=status,
+            t=self.t,
+            y=self.y,
+            ydot=self.ydot,
+            ledger=self.ledger,
+            margins=self.margins,
+            times=problem.times[: len(outputs)],
+            outputs=outputs[:, :n],
+            ledger_outputs=outputs[:, n:],
+            events=Events(*points([event[1:] for event in self.events]), index=index),
+            counters=Counters(self.count, self.rejected, self.residuals, self.jacobians, self.factorizations),
+            steps=Points(*points(self.steps)) if problem.record_steps else None,
+            stepping=self.stepping,
+        )

@@ -6,9 +6,10 @@ import numpy as np
 from sksundae.cvode import CVODE
 from sksundae.ida import IDA
 
-from surfacechem.solve.adapters.reduced import Reduced
+from surfacechem.solve.adapters.dense_step import DenseStep
 from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolver, View
 from surfacechem.solve.contract import Array, Problem
+from surfacechem.tolerances import ROUNDING
 
 
 class _Stretch(Method):
@@ -32,7 +33,7 @@ class _Stretch(Method):
             raise StepError(str(answer.message))
         return answer
 
-    def advance(self) -> float:
+    def advance(self) -> DenseStep:
         before = self.t
         # After an interpolation the library first returns to where it was.
         for _attempt in range(2):
@@ -40,13 +41,13 @@ class _Stretch(Method):
             self.t, self.x = float(answer.t), np.array(answer.y)
             if self.t > before:
                 break
-        return self.t
+        return DenseStep(before, self.t, self._at)
 
-    def at(self, t: float) -> Array:
+    def _at(self, t: float) -> Array:
         if t == self.t:
             return self.x
         answer = self._call(lambda: self.integrator.step(t, method="normal", tstop=self.end))
-        if not abs(answer.t - t) <= 1e-12 * abs(t):
+        if not abs(answer.t - t) <= ROUNDING * abs(t):
             raise StepError(f"asked for t = {t}, given t = {answer.t}")
         return np.array(answer.y)
 
@@ -62,23 +63,22 @@ class CVODESolver(SteppingSolver):
     name = "cvode"
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
-        system = Reduced(view)
 
         def rates(t: float, x: Array, out: Array) -> None:
-            out[:] = system.rates(t, x)
+            out[:] = view.reduced_rates(t, x)
 
         def jacobian(t: float, x: Array, _rates: Array, out: Array) -> None:
-            out[:] = system.jacobian(t, x)
+            out[:] = view.reduced_jacobian(t, x)
 
         library = CVODE(
             rates,
             rtol=view.problem.rtol,
-            atol=system.atol,
+            atol=view.atol,
             jacfn=jacobian,
             max_num_steps=100_000,
             max_step=_longest(view.problem),
         )
-        return _Stretch(library, t, end, system.start(y))
+        return _Stretch(library, t, end, y[view.differential])
 
 
 class IDASolver(SteppingSolver):

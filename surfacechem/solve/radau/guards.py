@@ -23,6 +23,7 @@ from surfacechem.solve.radau.work import (
     M_FIRST_SIDE,
     M_HIGH,
     M_LARGEST,
+    M_LAST_SIDE,
     M_LOW,
     M_NOW,
     M_PROBE,
@@ -206,6 +207,7 @@ def falls_from_start(w: Any, m: int) -> bool:
 def update_sides(w: Any) -> None:
     """Move on to the margins of now: their sides, the largest seen, and what was before."""
     copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+    copy(w.margin[M_SIDE], w.margin[M_LAST_SIDE])
     for m in range(w.margin.shape[1]):
         value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
         w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
@@ -545,6 +547,12 @@ def find_event(w: Any, h: float) -> float:
     if end <= 0.0:
         return h if end == 0.0 else AT_START
     first, earliest = _first(w, h)
+    before = 0.0
+    for x in SCANNED[w.count[MEMBER]]:
+        before = x if x < end else before
+    if earliest < before:
+        # A lowest point shows one point later: the sides that hold there are those of the point before it.
+        copy(w.margin[M_LAST_SIDE], w.margin[M_SIDE])
     worst = 1.0 if w.kinds[first, 2] == 1 else np.inf
     size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
     if size == 0.0:

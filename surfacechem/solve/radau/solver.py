@@ -298,3 +298,13 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
     stepper.run_batch()(0, len(ends), search_batch(program, ends, table, counts))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)
+
+
+def output_rates(result: Result) -> Array:
+    """Derivatives at the outputs, from the equations: the polynomial's own derivative is one order less accurate."""
+    problem = result.problem
+    if not len(result.times):
+        return np.empty_like(result.outputs)
+    segment = result.segments_at(result.times, result.segment)
+    guess = np.zeros_like(result.outputs)
+    return consistent(problem.program, result.times, result.outputs, guess, problem.parameters[segment]).ydot

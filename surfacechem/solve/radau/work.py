@@ -55,11 +55,11 @@ first."""
 Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.arange(8)
 """Rows of the vectors of length n_ledger."""
 (
-    M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH, M_FIRST, M_FIRST_SIDE,
-) = np.arange(11)  # fmt: skip
+    M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH, M_FIRST, M_FIRST_SIDE, M_LAST_SIDE,
+) = np.arange(12)  # fmt: skip
 """Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero; value and side at the
-start of the step."""
+start of the step; side at the point before."""
 (
     BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
 ) = np.arange(12)  # fmt: skip
@@ -302,7 +302,7 @@ def lay_out(batch: Any, cursor: Any) -> Work:
         _take(cursor, (8, n_ledger), np.float64),
         _take(cursor, (n, 9), np.float64),
         _take(cursor, (n_ledger, 9), np.float64),
-        _take(cursor, (M_FIRST_SIDE + 1, n_margins), np.float64),
+        _take(cursor, (M_LAST_SIDE + 1, n_margins), np.float64),
         _take(cursor, (n_margins,), np.int64),
     )
 

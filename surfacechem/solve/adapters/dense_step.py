@@ -1,0 +1,166 @@
+"""A step of an integrator of any library, the first crossing of a guard inside it, and the ledger along it."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from surfacechem.solve.contract import Array, Margin
+from surfacechem.tolerances import DIGITS, NOISE, SQRT_EPS, TINY
+
+POINTS = 16
+"""Points of a step at which guards are looked at; zeros in pairs between two of them show in a lowest point."""
+
+
+@dataclass(frozen=True)
+class DenseStep:
+    """A step from ``start`` to ``end`` [s], with the variables at any time in it."""
+
+    start: float
+    end: float
+    y: Callable[[float], Array]
+
+
+@dataclass
+class Guards:
+    """Functions of time and variables that act where they cross zero, each with the side of zero it is on.
+
+    A side is 1 or -1; it is 0 for a guard that starts at zero or has just fired, until it has left zero. ``largest`` is
+    the largest size of each so far, in proportion to which it is zero; ``now`` are the values that were met last.
+    """
+
+    values: Callable[[float, Array], Array]
+    directions: Array
+    strict: NDArray[np.bool_]
+    largest: Array
+    sides: Array = field(init=False)
+    now: Array = field(init=False)
+
+    @classmethod
+    def of(
+        cls, kinds: Sequence[Margin], values: Callable[[float, Array], Array], seen: Array | None = None
+    ) -> "Guards":
+        """Those of a problem, which may have been ``seen`` as large as this before."""
+        directions = np.array([float(kind.direction) for kind in kinds])
+        strict = np.array([kind.strict for kind in kinds], dtype=bool)
+        return cls(values, directions, strict, np.zeros(len(kinds)) if seen is None else seen.copy())
+
+    def start(self, now: Array, fired: Iterable[int] = ()) -> None:
+        """Begin on the sides of these values, but for what has just fired."""
+        self.largest = np.fmax(self.largest, np.abs(now))
+        self.sides = np.sign(now)
+        self.sides[list(fired)] = 0.0
+        self.now = now
+
+    def follow(self, now: Array) -> None:
+        """Go on to these values, across none of which a guard has fired."""
+        self.largest = np.fmax(self.largest, np.abs(now))
+        left = np.abs(now) > np.where((self.sides != 0.0) & ~self.strict, 0.0, NOISE * self.largest)
+        self.sides = np.where(left, np.sign(now), self.sides)
+        self.now = now
+
+    def crossed(self, now: Array) -> NDArray[np.bool_]:
+        """Which of these values lie across zero in a direction that counts; strict ones by more than their rounding."""
+        across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
+        return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+
+
+def first_crossing(
+    step: DenseStep, guards: Guards, active: NDArray[np.bool_], resolution: float
+) -> tuple[float, list[int]]:
+    """The time at which active guards cross zero first in a step, and which do within the resolution [s] of it.
+
+    The end of the step and none where none does; the guards have then followed it. A guard that crosses zero and back
+    between two points at which it is looked at is found where its values leave room for that.
+    """
+
+    def at(t: float) -> Array:
+        return np.where(active, guards.values(t, step.y(t)), 1.0)
+
+    def one(i: int) -> Callable[[float], float]:
+        return lambda t: float(guards.sides[i] * at(t)[i])
+
+    def dips(points: Sequence[tuple[float, Array]]) -> dict[int, float]:
+        bottoms = {i: _bottom(one(i), *(t for t, _ in points)) for i in _may_dip(guards, points).tolist()}
+        return {i: _zero(one(i), points[0][0], x) for i, x in bottoms.items() if guards.crossed(at(x))[i]}
+
+    times = np.unique(np.linspace(step.start, step.end, POINTS + 1)).tolist()  # fewer in a step of few roundings
+    points = [(times[0], np.where(active, guards.now, 1.0))]
+    for t in times[1:]:
+        points.append((t, at(t)))
+        before, now = points[-2][0], points[-1][1]
+        zeros = dips(points[-3:]) if len(points) > 2 else {}
+        zeros |= {i: _zero(one(i), before, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
+        if zeros:
+            # Another guard may have crossed and come back before that, with its lowest point in the same interval.
+            beyond = max(t + SQRT_EPS * (step.end - step.start), float(np.nextafter(t, np.inf)))
+            zeros = dips([*points[-2:], (beyond, at(beyond))]) | zeros
+            first = min(zeros.values())
+            return first, [i for i, zero in sorted(zeros.items()) if zero <= first + resolution]
+        guards.follow(now)
+    return step.end, []
+
+
+def _zero(value: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that is positive at the lower end; that end where it is not, though it should be."""
+    at_low, at_high = value(low), value(high)
+    if not at_low > 0.0 > at_high:
+        return high if at_high == 0.0 else float(np.nextafter(low, high))
+    return float(brentq(value, low, high, xtol=TINY, rtol=DIGITS))
+
+
+def _may_dip(guards: Guards, points: Sequence[tuple[float, Array]]) -> NDArray[np.intp]:
+    """Guards whose middle value of three is the lowest, by so little above zero that a smooth one may reach it."""
+    (a, at_a), (b, at_b), (c, at_c) = ((t, guards.sides * values) for t, values in points)
+    steepest = np.maximum((at_a - at_b) / (b - a), (at_c - at_b) / (c - b))
+    counts = (guards.sides != 0.0) & (guards.sides * guards.directions <= 0.0)
+    return np.flatnonzero(counts & (at_b > 0.0) & (at_b < at_a) & (at_b < at_c) & (at_b <= steepest * (c - a)))
+
+
+def _bottom(value: Callable[[float], float], a: float, b: float, c: float) -> float:
+    """The first point across zero found on the way to the lowest point between a and c, else that point.
+
+    By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
+    tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
+    """
+    at_a, at_b, at_c = value(a), value(b), value(c)
+    while at_b > 0.0 and c - a > SQRT_EPS * (abs(b) + (c - a)):
+        left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+        x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        if not (a < x < c and abs(x - b) > 0.01 * (c - a)):  # no progress: into the larger part
+            x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+        at_x = value(x)
+        if at_x < at_b:
+            (a, at_a, c, at_c) = (b, at_b, c, at_c) if x > b else (a, at_a, b, at_b)
+            b, at_b = x, at_x
+        elif x > b:
+            c, at_c = x, at_x
+        else:
+            a, at_a = x, at_x
+    return b
+
+
+NODES = np.array([0.0, 0.11747233803526766, 0.35738424175967742, 0.64261575824032258, 0.88252766196473235, 1.0])
+"""Gauss-Lobatto points of a step: the polynomials of the libraries have order five at most."""
+
+TO_POWERS = np.linalg.inv(np.vander(NODES, increasing=True)) / np.arange(1.0, len(NODES) + 1)[:, None]
+"""From values at the nodes to the coefficients of the integral of their polynomial."""
+
+
+class StepLedger:
+    """The ledger along a step, from its rates at the nodes.
+
+    Quadratures stay outside the library: it would have to count them in its error norm to integrate them well, and a
+    state at rest, which needs no steps, may do work all the same.
+    """
+
+    def __init__(self, start: float, size: float, ledger: Array, rates: Array) -> None:
+        self.start, self.size, self.ledger = start, size, ledger
+        self.coefficients = TO_POWERS @ rates * size
+
+    def at(self, t: float) -> Array:
+        """The ledger at a time within the step."""
+        part = (t - self.start) / self.size if self.size else 0.0
+        return np.asarray(self.ledger + part ** np.arange(1.0, len(NODES) + 1) @ self.coefficients)

@@ -1,0 +1,71 @@
+"""Crossings inside a step of a library: the same ones as the compiled stepper finds, on random polynomials."""
+
+import numpy as np
+import pytest
+import symengine as se
+from solver_problems import problem
+
+from surfacechem.compile.program import compile_program
+from surfacechem.solve import solver
+from surfacechem.solve.adapters.dense_step import NODES, DenseStep, Guards, StepLedger, first_crossing
+from surfacechem.solve.contract import Margin
+
+GUARDS, DEGREE = 3, 4
+CLOSEST = 2e-3
+"""Least distance of a pair of zeros: a thirtieth of that of the points at which guards are looked at."""
+
+
+@pytest.fixture(scope="module")
+def clock():
+    """y' = 1 with guards that are polynomials of y, their coefficients parameters."""
+    t, y, dy = se.symbols("t y dy")
+    p = se.symarray("p", GUARDS * (DEGREE + 1)).tolist()
+    rows = [p[k * (DEGREE + 1) : (k + 1) * (DEGREE + 1)] for k in range(GUARDS)]
+    guards = [sum(c * y**j for j, c in enumerate(row)) for row in rows]
+    return compile_program(t, [y], [dy], p, [dy - 1], margins=guards)
+
+
+def polynomial(rng: np.random.Generator, direction: int) -> np.ndarray:
+    """Coefficients of a polynomial with three random zeros and a fourth beside one of them, such that the first of the
+    pair counts.
+    """
+    zeros = rng.choice([0.15, 0.45, 0.75, 1.05, 1.35], 3, replace=False) + rng.uniform(-0.05, 0.05, 3)
+    monic = np.poly([*zeros, zeros[0] + CLOSEST * (1 + rng.exponential())])
+    before = np.sign(np.polyval(monic, zeros[0] - CLOSEST))
+    return monic[::-1] * 10.0 ** rng.uniform(-6, 6) * (-direction * before or rng.choice([-1.0, 1.0]))
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_the_stepper_finds_the_same(clock, seed):
+    rng = np.random.default_rng(seed)
+    directions = rng.integers(-1, 2, GUARDS).tolist()
+    rows = np.array([polynomial(rng, d) for d in directions])
+    kinds = tuple(Margin(True, d, strict=d == -1 and bool(rng.integers(2))) for d in directions)
+    in_play = tuple(bool(flag) for flag in rng.random(GUARDS) < 0.8)
+    case = problem(clock, [0.0], [0.0, 1.0], 1e-9, parameters=rows.ravel(), margins=kinds, in_play=in_play)
+    found = solver("radau").solve(case).events
+
+    def values(_t: float, x: np.ndarray) -> np.ndarray:
+        return np.array([np.polyval(row[::-1], x[0]) for row in rows])
+
+    guards = Guards.of(kinds, values)
+    guards.start(values(0.0, np.zeros(1)))
+    step = DenseStep(0.0, 1.0, lambda t: np.array([t]))
+    t, fired = first_crossing(step, guards, np.array(in_play), 1e-10)
+    assert fired == found.index.tolist()
+    assert t == pytest.approx(found.t[0] if fired else 1.0, rel=1e-9)
+
+
+def test_what_has_just_fired_has_to_leave_zero_first():
+    guards = Guards.of([Margin.restart()], lambda t, _: np.array([t * (1.0 - t)]))
+    step = DenseStep(0.0, 2.0, lambda _: np.zeros(0))
+    guards.start(np.array([1e-20]), fired=[0])
+    t, fired = first_crossing(step, guards, np.ones(1, bool), 0.0)
+    assert fired == [0]
+    assert t == pytest.approx(1.0, rel=1e-14)
+
+
+def test_a_ledger_is_the_integral_of_its_rates():
+    times = 2.0 + 3.0 * NODES
+    ledger = StepLedger(2.0, 3.0, np.array([7.0]), (times**4)[:, None])
+    assert ledger.at(4.0)[0] == pytest.approx(7.0 + (4.0**5 - 2.0**5) / 5, rel=1e-13)
