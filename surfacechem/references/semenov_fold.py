@@ -41,8 +41,10 @@ class SemenovFold(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {"T_0": scene.constant("T_0"), "beta": scene.friction("beta")}
-        return {**own, "H": scene.conductance(), "D_0": scene.heating_at_T_0}
+        decay = scene.friction("beta")  # per kelvin, of the factor of a law; here what grows is counted
+        growth = None if decay is None else -decay
+        heat = {"H": scene.conductance(), "D_0": scene.heating_at_T_0}
+        return {"T_0": scene.constant("T_0"), "beta": growth, **heat}
 
     def __post_init__(self) -> None:
         """Refuse what has ignited."""

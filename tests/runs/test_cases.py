@@ -94,26 +94,25 @@ def test_an_exact_solution_of_another_scene_is_not_used():
     assert "it says nothing of phi" in third.source
 
 
-SHEARED_FILM = """
+HELD_FILM = """
 T_0: 300 K
 bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
 interface:
   temperature: T_c
-  medium: {thickness: 5 um, conductivity: 0.13 W/m/K, viscosity: 0.01 Pa s}
-  friction: [film-shear]
-heat: [film: {between: [lower, upper], closure: medium}]
-loading: {v: 30 m/s, p: {ramp: {rate: 1 MPa/s}}}
+  friction: [viscous: {eta: {value: 0.01 Pa s, times: [exponential: {beta: -0.01 1/K}]}}]
+heat: [conductance: {between: [interface, lower], h: 7e4}, conductance: {between: [interface, upper], h: 3e4}]
+loading: {v: 10 m/s, g_n: 1 um, p: {ramp: {rate: 1 MPa/s}}}
 initial: {T_c: 300 K}
 run: {until: 1 ms, outputs: 21}
-reference: couette-flow
+reference: semenov-fold
 """
 
 
 def test_an_exact_solution_is_held_against_balances_without_rates():
-    accuracy = Simulation(load_text(SHEARED_FILM)).run().accuracy
-    assert accuracy.source == "exact solution couette-flow"
+    accuracy = Simulation(load_text(HELD_FILM)).run().accuracy
+    assert accuracy.source == "exact solution semenov-fold"
     assert accuracy.error < 1e-12
-    rubbing = SHEARED_FILM.replace("[film-shear]", "[film-shear, coulomb: {mu: 0.1}]")
+    rubbing = HELD_FILM.replace("friction: [", "friction: [coulomb: {mu: 0.1}, ")
     assert "it misses the equation of T_c by" in Simulation(load_text(rubbing)).run().accuracy.source
 
 
