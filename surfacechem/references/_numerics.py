@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.references.base import Array
-
-ROUNDING = 4.0 * np.finfo(np.float64).eps
-"""Relative difference to a target that no further iteration removes."""
+from surfacechem.tolerances import DIGITS
 
 ITERATIONS = 400
 """At most: halving alone takes 52 to the last digit, and one for each factor of two between the ends of a bracket."""
@@ -64,9 +62,9 @@ def increasing_root(
             newton = x - error / slope
         inside = (newton > low) & (newton < high)
         following = np.where(inside, newton, 0.5 * (low + high))
-        reached = np.abs(error) <= ROUNDING * np.abs(target)
+        reached = np.abs(error) <= DIGITS * np.abs(target)
         step = np.minimum(np.abs(following - x), high - low)
-        settled = reached | (step <= ROUNDING * np.abs(x))
+        settled = reached | (step <= DIGITS * np.abs(x))
         x = np.where((error == 0.0) | (reached & ~inside), x, following)
         if settled.all():
             return x

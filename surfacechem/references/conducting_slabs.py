@@ -62,47 +62,21 @@ class ConductingSlab:
     h_far: float = 0.0
     T_far: float = 0.0
 
-    def _wave(self, s: Complex) -> tuple[Complex, Complex, Complex]:
-        """Decay per length, k times it, and what a wave has lost across the slab and back."""
-        p = np.sqrt(s * self.C / (self.conductivity * self.thickness))
-        return p, self.conductivity * p, np.exp(-2 * p * self.thickness)
-
-    def answer(self, s: Complex, x: float = 0.0) -> Complex:
-        """Temperature at x per heat flux into the contact."""
+    def answer(self, s: Complex, x: float = 0.0) -> tuple[Complex, Complex]:
+        """Temperature at x per heat flux into the contact, and less the initial one where nothing enters there."""
         if not self.C:
-            return np.zeros_like(s)
+            return np.zeros_like(s), np.zeros_like(s)
         if not self.conductivity:
-            return 1 / (self.C * s)
-        p, kp, E = self._wave(s)
+            return 1 / (self.C * s), np.zeros_like(s)
+        # Decay of a wave per length, k times it, and what is left of it across the slab and back.
+        p = np.sqrt(s * self.C / (self.conductivity * self.thickness))
+        kp, E = self.conductivity * p, np.exp(-2 * p * self.thickness)
         back = (kp - self.h_far) / (kp + self.h_far)
-        return (np.exp(-p * x) + back * np.exp(-p * (2 * self.thickness - x))) / (kp * (1 - back * E))
-
-    def open(self, s: Complex, x: float = 0.0) -> Complex:
-        """Temperature at x less the initial one where nothing enters at the contact."""
-        if not (self.C and self.conductivity and self.h_far):
-            return np.zeros_like(s)
-        p, kp, E = self._wave(s)
-        rise = (self.T_far - self.T) / s / (kp / self.h_far * (1 - E) + 1 + E)
-        result: Complex = rise * (np.exp(-p * (self.thickness - x)) + np.exp(-p * (self.thickness + x)))
-        return result
-
-
-def flux(first: ConductingSlab, second: ConductingSlab, resistance: float, s: Complex) -> Complex:
-    """Heat flux from the first to the second body."""
-    drive = (first.T - second.T) / s + first.open(s) - second.open(s)
-    return drive / (first.answer(s) + second.answer(s) + resistance)
-
-
-def temperature(
-    bodies: tuple[ConductingSlab, ConductingSlab], resistance: float, number: int, x: float, t: Array
-) -> Array:
-    """Temperature of a body at a distance from the contact, at t > 0."""
-    body, sign = bodies[number - 1], 1.0 if number == 2 else -1.0
-
-    def rise(s: Any) -> Any:
-        return body.open(s, x) + sign * flux(*bodies, resistance, s) * body.answer(s, x)
-
-    return body.T + inverted(rise, t)
+        heated = (np.exp(-p * x) + back * np.exp(-p * (2 * self.thickness - x))) / (kp * (1 - back * E))
+        if not self.h_far:
+            return heated, np.zeros_like(s)
+        from_far = (self.T_far - self.T) / s / (kp / self.h_far * (1 - E) + 1 + E)
+        return heated, from_far * (np.exp(-p * (self.thickness - x)) + np.exp(-p * (self.thickness + x)))
 
 
 class ConductingSlabs(Reference):
@@ -140,7 +114,7 @@ class ConductingSlabs(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        for reason in _strange(scene.scene):
+        for reason in _beside_conduction(scene.scene):
             raise InputError(f"it knows conduction between two bodies alone, and {reason}.")
         h = scene.conductance()
         return {"R": 1.0 / h if h else None, **_of_body(scene, 1), **_of_body(scene, 2)}
@@ -153,20 +127,32 @@ class ConductingSlabs(Reference):
             ConductingSlab(self.T_2, self.C_2, self.thickness_2, self.conductivity_2, self.h_far_2, self.T_far_2),
         )
 
+    def _flux(self, s: Complex) -> Complex:
+        """Transform of the heat flux from the first to the second body."""
+        first, second = self.bodies
+        (heated_1, open_1), (heated_2, open_2) = first.answer(s), second.answer(s)
+        return ((first.T - second.T) / s + open_1 - open_2) / (heated_1 + heated_2 + self.R)
+
     def quantities(self, t: Array) -> Quantities:
         """Temperatures at the contact; through a resistance also the heat fluxes, which begin finite."""
         T_1, T_2 = (self.profile(number, np.zeros(1), t)[:, 0] for number in (1, 2))
         if not self.R:
             return {"T_1": T_1, "T_2": T_2, "T": T_1}
         q = np.full(t.size, (self.T_1 - self.T_2) / self.R)
-        q[t > 0] = inverted(lambda s: flux(*self.bodies, self.R, s), t[t > 0])
+        q[t > 0] = inverted(self._flux, t[t > 0])
         return {"T_1": T_1, "T_2": T_2, "q_1": -q, "q_2": q}
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
         """Temperatures of a body at distances from the contact [m], shape (times, places)."""
-        values = np.full((t.size, x.size), self.bodies[number - 1].T)
+        body, sign = self.bodies[number - 1], 1.0 if number == 2 else -1.0
+        values = np.full((t.size, x.size), body.T)
         for j, place in enumerate(x.tolist()):
-            values[t > 0, j] = temperature(self.bodies, self.R, number, place, t[t > 0])
+
+            def rise(s: Complex, place: float = place) -> Complex:
+                heated, unheated = body.answer(s, place)
+                return unheated + sign * self._flux(s) * heated
+
+            values[t > 0, j] += inverted(rise, t[t > 0])
         return values
 
 
@@ -181,33 +167,30 @@ def _of_body(scene: SceneView, k: int) -> dict[str, float | None]:
     return {names[name]: value for name, value in found.items()}
 
 
-def _strange(scene: Scene) -> Iterator[str]:
+def _beside_conduction(scene: Scene) -> Iterator[str]:
     """The contents of a scene beside conduction, in words."""
-    interface = scene.interface
-    if interface.potentials or interface.frictions or interface.reactions or interface.limits or interface.variables:
+    interface, bodies = scene.interface, {body.name for body in scene.bodies}
+    laws = (interface.potentials, interface.frictions, interface.reactions, interface.limits, interface.variables)
+    if any(laws):
         yield "the interface has laws of its own"
-    if scene.normal or scene.tangential or scene.programme or scene.loading:
+    if any((scene.normal, scene.tangential, scene.programme, scene.loading)):
         yield "something is loaded or moves"
-    nodes = [body.temperature for body in scene.bodies]
-    if interface.temperature is not None and interface.temperature not in nodes:
+    if interface.temperature not in (None, *(body.temperature for body in scene.bodies)):
         yield "the interface has a temperature of its own"
     for path in scene.heat:
-        names = {body.name for body in scene.bodies}
-        if path.name() != "conductance" or set(path.between) != names or any(_varies(path, n) for n, _ in path.specs()):
+        constant = not any(isinstance(getattr(path, name), Varying) for name, _ in path.specs())
+        if path.name() != "conductance" or set(path.between) != bodies or not constant:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
-        yield from _strange_body(body)
+        yield from _varying(body)
 
 
-def _strange_body(body: Body) -> Iterator[str]:
-    if body.energy is not None and (body.energy.name() != "constant" or _varies(body.energy, "C")):
+def _varying(body: Body) -> Iterator[str]:
+    """The contents of a body that are not constant, in words."""
+    if body.energy is not None and (body.energy.name() != "constant" or isinstance(vars(body.energy)["C"], Varying)):
         yield f"the heat capacity of {body.name} varies"
-    if body.conduction is not None and _varies(body.conduction, "conductivity"):
+    if body.conduction is not None and isinstance(body.conduction.conductivity, Varying):
         yield f"the conductivity of {body.name} varies"
     loads = [body.temperature, body.conduction.far if body.conduction else None]
     if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
         yield f"a temperature of {body.name} varies"
-
-
-def _varies(law: Any, name: str) -> bool:
-    return isinstance(getattr(law, name), Varying)

@@ -36,16 +36,17 @@ class PullOffFold:
     """Energy [J/m^2] that the jump turns into heat."""
 
 
-@dataclass(frozen=True)
-class SpringAndZone:
-    """An exponential cohesive zone in series with a spring: its branches, and where they end.
+class SpringAndZone(Reference):
+    """An exponential cohesive zone in series with a spring: its branches, and where they end."""
 
-    Stiffness [Pa/m] of the spring, strength [Pa] of the zone and the gap [m] at which it is reached.
-    """
+    t_max: float = parameter("Pa", "strength", above=0)
+    g_0: float = parameter("m", "gap at the strength", above=0)
+    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
 
-    k: float
-    t_max: float
-    g_0: float
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
+        return {**zone, "k": scene.support("normal", "k")}
 
     @property
     def severity(self) -> float:
@@ -64,17 +65,18 @@ class SpringAndZone:
     def gap(self, w: Array, low: float, high: float) -> Array:
         """The gap [m] at displacements w, on a stable branch between two gaps."""
         lower = np.minimum(np.full_like(w, low), w)
-        return increasing_root(self._displacement, w, lower, np.maximum(np.minimum(w, high), lower))
 
-    def _displacement(self, g: Array) -> tuple[Array, Array]:
-        slope = self.t_max / self.g_0 * (1.0 - g / self.g_0) * np.exp(1.0 - g / self.g_0)
-        return g + self.traction(g) / self.k, 1.0 + slope / self.k
+        def displacement(g: Array) -> tuple[Array, Array]:
+            slope = self.t_max / self.g_0 * (1.0 - g / self.g_0) * np.exp(1.0 - g / self.g_0)
+            return g + self.traction(g) / self.k, 1.0 + slope / self.k
+
+        return increasing_root(displacement, w, lower, np.maximum(np.minimum(w, high), lower))
 
     @cached_property
     def folds(self) -> tuple[PullOffFold, PullOffFold]:
         """The snap apart and the snap together: at both x with x exp(-x) = k g_0 / t_max, g = g_0 (1 + x)."""
         if self.severity >= 1.0:
-            raise InputError("stable for every displacement; there is no jump.")
+            raise InputError(f"{self.name}: stable for every displacement; there is no jump.")
         distance = np.array([-math.log(self.severity)])
         low, high = np.sqrt(2.0 * distance), distance + np.sqrt(distance * (distance + 2.0))
 
@@ -97,7 +99,7 @@ class SpringAndZone:
         return PullOffFold(g, w, t, after, float(self.traction(np.array(after))), release)
 
 
-class CohesivePullOff(Reference):
+class CohesivePullOff(SpringAndZone):
     r"""Elastic bodies, held together by an exponential cohesive zone, are pulled apart at constant speed.
 
     .. math:: k(w-g_n)=t_{max}\frac{g_n}{g_0}e^{1-g_n/g_0},\qquad
@@ -116,17 +118,12 @@ class CohesivePullOff(Reference):
     '1.111832559e-08 1.105377225e-07 3.054240033e-02 1.000742319e-02'
     """
 
-    t_max: float = parameter("Pa", "strength", above=0)
-    g_0: float = parameter("m", "gap at the strength", above=0)
-    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
     w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
-        far = {"k": scene.support("normal", "k"), "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
-        return {**zone, **far}
+        return {**super().from_scene(scene), "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
 
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
@@ -134,36 +131,31 @@ class CohesivePullOff(Reference):
         if not self.stable and self.w_i > self.opening.w:
             raise InputError(f"{self.name}: w_i must not be above the fold at {self.opening.w!r} m.")
 
-    @cached_property
-    def bodies(self) -> SpringAndZone:
-        """Spring and zone."""
-        return SpringAndZone(self.k, self.t_max, self.g_0)
-
     @property
     def stable(self) -> bool:
         """True if every displacement has one gap."""
-        return self.bodies.severity >= 1.0
+        return self.severity >= 1.0
 
     @property
     def opening(self) -> PullOffFold:
         """The jump on opening; InputError if it is stable."""
-        return self.bodies.folds[0]
+        return self.folds[0]
 
     @property
     def closing(self) -> PullOffFold:
         """The jump on closing; InputError if it is stable."""
-        return self.bodies.folds[1]
+        return self.folds[1]
 
     def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t
         if self.stable:
-            g, heat = self.bodies.gap(w, 0.0, math.inf), np.zeros_like(w)
+            g, heat = self.gap(w, 0.0, math.inf), np.zeros_like(w)
         else:
             fold, open_ = self.opening, w > self.opening.w
-            closed = self.bodies.gap(np.minimum(w, fold.w), 0.0, fold.g)
-            g = np.where(open_, self.bodies.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
+            closed = self.gap(np.minimum(w, fold.w), 0.0, fold.g)
+            g = np.where(open_, self.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
             heat = np.where(open_, fold.release, 0.0)
-        return {"w_n": w, "g_n": g, "t_n": self.bodies.traction(g), "heat": heat}
+        return {"w_n": w, "g_n": g, "t_n": self.traction(g), "heat": heat}
 
 
 class CohesivePullOffHeating(CohesivePullOff, UniformBody):
@@ -190,7 +182,7 @@ class CohesivePullOffHeating(CohesivePullOff, UniformBody):
         return {**mechanics, "T": self.heated(np.asarray(mechanics["heat"]))}
 
 
-class OverdampedPullOff(Reference):
+class OverdampedPullOff(SpringAndZone):
     r"""Overdamped opening of a cohesive zone at a far-field displacement a little beyond its fold.
 
     .. math:: c\,\dot g_n=k(w_{off}+\delta w-g_n)-t_n(g_n),\qquad
@@ -208,29 +200,19 @@ class OverdampedPullOff(Reference):
     '9.50710596e-05 9.50681912e-05'
     """
 
-    t_max: float = parameter("Pa", "strength", above=0)
-    g_0: float = parameter("m", "gap at the strength", above=0)
-    k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     c: float = parameter("Pa s/m", "damping", above=0)
     delta_w: float = parameter("m", "far-field displacement beyond the fold", above=0)
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
         dampers = [c for c in (scene.support("normal", name) for name in ("c_b", "c_g")) if c is not None]
-        held = {"k": scene.support("normal", "k"), "c": sum(dampers) if dampers else None}
-        return {**zone, **held, "g_i": scene.initial("g_n")}
-
-    @cached_property
-    def bodies(self) -> SpringAndZone:
-        """Spring and zone."""
-        return SpringAndZone(self.k, self.t_max, self.g_0)
+        return {**super().from_scene(scene), "c": sum(dampers) if dampers else None, "g_i": scene.initial("g_n")}
 
     @property
     def fold(self) -> PullOffFold:
         """The fold that is passed."""
-        return self.bodies.folds[0]
+        return self.folds[0]
 
     @property
     def w(self) -> float:
@@ -240,22 +222,19 @@ class OverdampedPullOff(Reference):
     @property
     def width(self) -> float:
         """Width [m] of the bottleneck."""
-        return math.sqrt(2.0 * self.k * self.delta_w / self._curvature)
+        x = self.fold.g / self.g_0 - 1.0
+        curvature = self.t_max / self.g_0**2 * (1.0 - x) * math.exp(-x)
+        return math.sqrt(2.0 * self.k * self.delta_w / curvature)
 
     @property
     def asymptotic_time(self) -> float:
         """Time [s] of the passage from far below to far above, for small delta_w."""
-        return math.pi * self.c * math.sqrt(2.0 / (self._curvature * self.k * self.delta_w))
-
-    @property
-    def _curvature(self) -> float:
-        x = self.fold.g / self.g_0 - 1.0
-        return self.t_max / self.g_0**2 * (1.0 - x) * math.exp(-x)
+        return math.pi * self.c * self.width / (self.k * self.delta_w)
 
     @cached_property
     def end_gap(self) -> float:
         """Gap [m] at `end_time`."""
-        final = float(self.bodies.gap(np.array([self.w]), self.bodies.folds[1].g, math.inf)[0])
+        final = float(self.gap(np.array([self.w]), self.folds[1].g, math.inf)[0])
         return 0.5 * (self.fold.g + final)
 
     @property
@@ -273,7 +252,7 @@ class OverdampedPullOff(Reference):
         grid = self.fold.g + self.width * np.sinh(np.linspace(first, last, GRID))
         guess = np.where(t > 0, np.interp(t, self._times(grid), grid), low)
         g = increasing_root(lambda x: (self._times(x), self.c / self._force(x - self.fold.g)), t, low, high, guess)
-        return {"g_n": g, "t_n": self.bodies.traction(g), "v_n": self._force(g - self.fold.g) / self.c}
+        return {"g_n": g, "t_n": self.traction(g), "v_n": self._force(g - self.fold.g) / self.c}
 
     def _times(self, g: Array) -> Array:
         """Integral of c dg / force over panels in arsinh of the distance from the fold."""

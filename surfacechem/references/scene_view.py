@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -50,8 +50,12 @@ class SceneView:
         return self._constant(self.scene.interface.limits, name)
 
     def _constant(self, laws: Iterable[Law], name: str) -> float | None:
-        values = self.run.values
-        found = [values[path] for law in laws for path in _paths(law, name) if path in values]
+        """A constant of one law, as its own or as that of a factor of one of its parameters."""
+        paths = []
+        for law in laws:
+            varying = [value for field, _ in law.specs() if isinstance(value := getattr(law, field), Varying)]
+            paths += [law.path, *(factor.path for value in varying for factor in value.factors)]
+        found = [self.run.values[f"{path}.{name}"] for path in paths if f"{path}.{name}" in self.run.values]
         return found[0] if len(found) == 1 else None
 
     def ramp(self, variable: str) -> float | None:
@@ -145,12 +149,3 @@ class SceneView:
         """Friction at the reference temperature and external heat [W/m^2]."""
         T_0 = self.constant("T_0")
         return None if T_0 is None else self.friction_power(T_0) + self.heat_supply
-
-
-def _paths(law: Law, name: str) -> Iterator[str]:
-    """Paths that a constant of a law may have: as its own, or as that of a factor of one of its parameters."""
-    yield f"{law.path}.{name}"
-    for field, _ in law.specs():
-        value = getattr(law, field)
-        if isinstance(value, Varying):
-            yield from (f"{factor.path}.{name}" for factor in value.factors)

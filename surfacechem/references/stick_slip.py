@@ -75,7 +75,7 @@ class StickSlip(Reference):
     Source: Sauer, Duong & Mandadapu (2021), eqs. e:tt_max and e:dry_fric, with an oscillator, integrated.
 
     >>> slider = StickSlip(m=10.0, k=1e8, V=1e-3, t_s=6e4, t_k=4e4)
-    >>> f"{slider.period:.12f} {slider.slip_time:.6e} {slider.slip.v_max:.9f} {slider.heat_per_cycle:.9f}"
+    >>> f"{slider.period:.12f} {slider.slip.duration:.6e} {slider.slip.v_max:.9f} {slider.heat_per_cycle:.9f}"
     '0.400994458826 9.944588e-04 0.633456323 16.039778353'
     """
 
@@ -110,11 +110,6 @@ class StickSlip(Reference):
         return self.t_s / (self.k * self.V)
 
     @property
-    def slip_time(self) -> float:
-        """Duration [s] of a slip."""
-        return self.slip.duration
-
-    @property
     def stick_time(self) -> float:
         """Duration [s] of a stick."""
         return 2.0 * self.slip.stretch / self.V
@@ -122,7 +117,7 @@ class StickSlip(Reference):
     @property
     def period(self) -> float:
         """Duration [s] of a cycle."""
-        return self.slip_time + self.stick_time
+        return self.slip.duration + self.stick_time
 
     @property
     def heat_per_cycle(self) -> float:
@@ -133,10 +128,10 @@ class StickSlip(Reference):
         since, pull = t - self.onset_time, self.k * self.V
         cycle = np.maximum(np.floor(since / self.period), 0.0)
         within = since - cycle * self.period
-        slips = (since >= 0.0) & (within < self.slip_time)
+        slips = (since >= 0.0) & (within < self.slip.duration)
         slip, v, above = self.slip.motion(np.where(slips, within, 0.0))
         slip = cycle * self.slip.distance + np.where(slips, slip, np.where(since < 0.0, 0.0, self.slip.distance))
-        rest = 2.0 * self.t_k - self.t_s + pull * (within - self.slip_time)
+        rest = 2.0 * self.t_k - self.t_s + pull * (within - self.slip.duration)
         spring = np.where(slips, self.t_k + above, np.where(since < 0.0, pull * t, rest))
         tractions = {"t_t": np.where(slips, self.t_k, spring), "spring_traction": spring}
         return {"v": np.where(slips, v, 0.0), "u_t": slip, **tractions, "heat": self.t_k * slip}

@@ -45,23 +45,20 @@ class VelocitySteps(Reference):
         r"""Logarithm of :math:`v\theta/L` after a slip [in units of L] at a constant velocity."""
 
     def quantities(self, t: Array) -> Quantities:
-        after_1, after_2 = t > self.t_1, t > self.t_2
+        def ln_theta(start: Array, v: Array | float, duration: Array | float) -> Array:
+            steady = np.log(self.L / v)
+            return np.asarray(steady + self.relaxed(np.asarray(start - steady), np.asarray(v * duration / self.L)))
+
+        after_1, after_2, ln_0 = t > self.t_1, t > self.t_2, np.log(self.theta_i)
         v = np.where(after_1 & ~after_2, self.v_step, self.v_i)
+        ln_1 = ln_theta(ln_0, self.v_i, self.t_1)
+        ln_2 = ln_theta(ln_1, self.v_step, self.t_2 - self.t_1)
         begun = np.where(after_2, self.t_2, np.where(after_1, self.t_1, 0.0))
-        ln_1 = self._ln_theta(np.log(self.theta_i), self.v_i, self.t_1)
-        ln_2 = self._ln_theta(ln_1, self.v_step, self.t_2 - self.t_1)
-        start = np.where(after_2, ln_2, np.where(after_1, ln_1, np.log(self.theta_i)))
-        ln_theta = self._ln_theta(start, v, t - begun)
-        return {"ln_theta": ln_theta, "theta": np.exp(ln_theta), "v": v, f"t_{self.law}": self._traction(v, ln_theta)}
-
-    def _ln_theta(self, start: Array, v: Array | float, duration: Array | float) -> Array:
-        steady = np.log(self.L / v)
-        return np.asarray(steady + self.relaxed(np.asarray(start - steady), np.asarray(v * duration / self.L)))
-
-    def _traction(self, v: Array, ln_theta: Array) -> Array:
-        exponent = (self.mu_0 + self.b * (np.log(self.v_0 / self.L) + ln_theta)) / self.a
-        ln_sinh = np.log(v / (2.0 * self.v_0)) + exponent  # arsinh of a large number, by its logarithm
-        return np.asarray(self.a * self.p * (ln_sinh + np.log1p(np.sqrt(1.0 + np.exp(-2.0 * ln_sinh)))))
+        now = ln_theta(np.where(after_2, ln_2, np.where(after_1, ln_1, ln_0)), v, t - begun)
+        # Traction by the logarithm of a hyperbolic sine that may overflow.
+        ln_sinh = np.log(v / (2.0 * self.v_0)) + (self.mu_0 + self.b * (np.log(self.v_0 / self.L) + now)) / self.a
+        traction = self.a * self.p * (ln_sinh + np.log1p(np.sqrt(1.0 + np.exp(-2.0 * ln_sinh))))
+        return {"ln_theta": now, "theta": np.exp(now), "v": v, f"t_{self.law}": traction}
 
 
 class AgingVelocitySteps(VelocitySteps):

@@ -75,10 +75,10 @@ class Chatter(Regime):
     def corner(self, point: Mapping[str, float]) -> Trial:
         """Speed, mass and stiffness of any size; outputs in the middle of three sticks."""
         exact = StickSlip(t_s=6e4, t_k=4e4, **point)
-        if exact.stick_time < SHORTEST * exact.slip_time:
+        if exact.stick_time < SHORTEST * exact.slip.duration:
             raise InputError(f"a stick of less than {SHORTEST:g} of a slip is within rounding of steady sliding.")
-        first = exact.onset_time + exact.slip_time
-        times = [first + (k + 0.5) * exact.stick_time + k * exact.slip_time for k in range(3)]
+        first = exact.onset_time + exact.slip.duration
+        times = [first + (k + 0.5) * exact.stick_time + k * exact.slip.duration for k in range(3)]
         changes = {
             "loading.w_t": {"ramp": {"rate": point["V"]}},
             "mechanics.tangential.m": point["m"],
