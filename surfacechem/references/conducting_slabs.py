@@ -187,7 +187,9 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
 
 def _varying(body: Body) -> Iterator[str]:
     """The contents of a body that are not constant, in words."""
-    if body.energy is not None and (body.energy.name() != "constant" or isinstance(vars(body.energy)["C"], Varying)):
+    if body.energy is not None and (
+        body.energy.name() != "constant" or isinstance(getattr(body.energy, "C", None), Varying)
+    ):
         yield f"the heat capacity of {body.name} varies"
     if body.conduction is not None and isinstance(body.conduction.conductivity, Varying):
         yield f"the conductivity of {body.name} varies"
