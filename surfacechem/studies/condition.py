@@ -84,11 +84,9 @@ def _slopes(answer: Callable[[Data], Answer], base: Answer, data: Data, name: st
                 found, done = answer({**data, name: moved}), abs(moved - data[name]) / abs(data[name])
                 now = {key: relative_errors(found[key], base[key], least(base[key])) / done for key in base}
                 break
-        if before and now and all(_is_straight(before[key], now[key]) for key in now):
+        # Long steps see the curvature, short ones rounding: taken is the first slope that the next step confirms.
+        changes = ((np.abs(before[key] - slope), STRAIGHT * slope) for key, slope in now.items())
+        if before and now and all(np.max(change, initial=0.0) <= np.max(most, initial=0.0) for change, most in changes):
             return now
         before = now
     return before
-
-
-def _is_straight(first: Array, second: Array) -> bool:
-    return bool(np.max(np.abs(first - second), initial=0.0) <= STRAIGHT * np.max(second, initial=0.0))

@@ -98,7 +98,8 @@ def filled(
 def _time_again(cell: Cell) -> None:
     """A round of a cell; one that ends otherwise, where the machine is too busy for its time limit, does not count."""
     spent: list[float] = []
-    while cell.again and not _enough(cell, spent):
+    most = MOST_REPEATS if min(cell.seconds) <= BRIEF else 1
+    while cell.again and len(spent) < most and (len(spent) < LEAST_REPEATS or sum(spent) <= BRIEF):
         done = attempt(cell.again, lambda done: Cell(done.status if isinstance(done, Trajectory) else "failed", ""))
         if done.outcome != cell.outcome:
             return
@@ -107,29 +108,20 @@ def _time_again(cell: Cell) -> None:
         cell.stepping += done.stepping
 
 
-def _enough(cell: Cell, spent: Sequence[float]) -> bool:
-    most = MOST_REPEATS if min(cell.seconds) <= BRIEF else 1
-    return len(spent) >= most or (len(spent) >= LEAST_REPEATS and sum(spent) > BRIEF)
-
-
 def check_solvers(wanted: Sequence[str], path: str) -> None:
     """InputError for a solver that there is not, and for none."""
     for name in wanted:
         if name not in names:
             raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=path))
-    check_some(wanted, path)
+    if not wanted:
+        raise InputError("at least one is needed.", Place(path=path))
 
 
 def check_tolerances(wanted: Sequence[float], path: str) -> None:
     """InputError for a tolerance that no solver takes, and for none."""
     for rtol in wanted:
         check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", path)
-    check_some(wanted, path)
-
-
-def check_some(wanted: Sequence[object], path: str) -> None:
-    """InputError where nothing is wanted."""
-    if len(wanted) == 0:
+    if not wanted:
         raise InputError("at least one is needed.", Place(path=path))
 
 

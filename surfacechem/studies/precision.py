@@ -173,7 +173,7 @@ def _compared(
     name, known = subject.case.name, subject.names
     variables = tuple(name for name in wanted if name in known) or tuple(subject.states)
     log.info("%s: its reference", name)
-    truth, reference = None, ""
+    truth: Truth | None = None
     try:
         truth = establish(subject, variables)
         reference = truth.source
@@ -181,21 +181,21 @@ def _compared(
         reference = error.message
     log.info("%s: %d solvers at %d tolerances", name, len(solvers), len(tolerances))
 
-    points = filled(solvers, tolerances, lambda rtol: partial(_attempt, subject, truth, rtol), repeat)
+    def measured(rtol: float, solver: str) -> WorkPoint:
+        if unable := subject.unable(solver):
+            return WorkPoint("omitted", unable)
+        return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))
+
+    points = filled(solvers, tolerances, lambda rtol: partial(measured, rtol), repeat)
     return Compared(subject, variables, truth, reference, points)
-
-
-def _attempt(subject: Subject, truth: Truth | None, rtol: float, solver: str) -> WorkPoint:
-    if unable := subject.unable(solver):
-        return WorkPoint("omitted", unable)
-    return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))
 
 
 def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
     if isinstance(done, Exception):
         return WorkPoint("failed", f"{type(done).__name__}: {done}")
-    objection = done.reason if done.status == "failed" else ""
-    if objection := (truth.objection(done) if truth else objection):
+    if done.status == "failed":
+        return WorkPoint("failed", done.reason)
+    if truth and (objection := truth.objection(done)):
         return WorkPoint("failed", objection)
     errors = truth.errors(computed(done), event_times(done)) if truth else None
     if errors and not all(math.isfinite(error) for kind in errors.by_kind.values() for error in kind.values()):
@@ -209,10 +209,6 @@ def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
 def _variables() -> Iterator[Variable]:
     """The variables over case, solver and tolerance, the coordinates first."""
     every = ("case", "solver", "tolerance")
-
-    def of_point(name: str, unit: str, text: str, read: Callable[[WorkPoint], float | str]) -> Variable:
-        return Variable(name, every, lambda case, solver, rtol: read(case.points[solver, rtol]), unit, text)
-
     yield Variable("tolerance", ("tolerance",), float, "1", "relative tolerance asked for")
     yield Variable("case_name", ("case",), lambda case: case.name, "1", "name of the case")
     yield Variable("solver_name", ("solver",), str, "1", "name of the solver")
@@ -225,18 +221,21 @@ def _variables() -> Iterator[Variable]:
     for kind, text in MEANING.items():
         known, text = partial(Compared.uncertainty, kind=kind), f"uncertainty of the reference: {text}"
         yield Variable(f"uncertainty_{kind}", ("case",), known, "1", text)
-    yield of_point("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome)
-    yield of_point("reason", "1", "why the run ended, failed or was left out", lambda p: p.reason)
-    for kind, text in MEANING.items():
-        yield of_point(f"error_{kind}", "1", text, partial(WorkPoint.error, kind=kind))
-    yield of_point("energy_error", "1", "largest energy residual relative to the energy exchanged", lambda p: p.energy)
-    yield of_point("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan))
-    yield of_point("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan]))
-    yield of_point("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan))
-    yield of_point("stepping_seconds", "s", "least time inside the library's own steps", WorkPoint.least_stepping)
-    yield of_point("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds)))
-    for name, text in COUNTS.items():
-        yield of_point(f"count_{name}", "1", text, partial(WorkPoint.count, name=name))
+    of_point: list[tuple[str, str, str, Callable[[WorkPoint], float | str]]] = [
+        ("status", "1", "finished, stopped, failed or omitted", lambda p: p.outcome),
+        ("reason", "1", "why the run ended, failed or was left out", lambda p: p.reason),
+        *((f"error_{kind}", "1", text, partial(WorkPoint.error, kind=kind)) for kind, text in MEANING.items()),
+        ("energy_error", "1", "largest energy residual relative to the energy exchanged", lambda p: p.energy),
+        ("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan)),
+        ("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan])),
+        ("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan)),
+        ("stepping_seconds", "s", "least time inside the library's own steps", WorkPoint.least_stepping),
+        ("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds))),
+        *((f"count_{name}", "1", text, partial(WorkPoint.count, name=name)) for name, text in COUNTS.items()),
+    ]
+    for name, unit, text, read in of_point:
+        at = partial(lambda case, solver, rtol, read: read(case.points[solver, rtol]), read=read)
+        yield Variable(name, every, at, unit, text)
     for kind in KINDS:
         each = partial(lambda case, s, rtol, name, kind: case.points[s, rtol].error(kind, name), kind=kind)
         yield Variable(f"variable_error_{kind}", (*every, "variable"), each, "1", f"{MEANING[kind]} of each variable")

@@ -31,6 +31,7 @@ from surfacechem.studies.condition import condition, least
 from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, check_tolerances, filled
 from surfacechem.studies.regimes import Exact, Expectation, Refused, Regime, Stops, Trial, chosen
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
+from surfacechem.tolerances import EPS
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +45,6 @@ RTOL, STEPS = 1e-10, 1500
 
 LEAST, MOST = 2.0, 16.0
 """Digits below which a value that is given out as an answer is wrong, and those that a double holds."""
-
-EPSILON = float(np.finfo(float).eps)
 
 SOLVERS = (OWN, "lsoda", "bdf", "scipy-radau", "cvode", "ida")
 
@@ -140,7 +139,11 @@ def stability(
     for number, regime in enumerate(found, 1):
         values = few(regime.values) if quick else list(regime.values)
         log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
-        rows.append(MatrixRow(regime, values, filled(solvers, values, partial(_at_value, regime, rtol))))
+        rows.append(
+            MatrixRow(
+                regime, values, filled(solvers, values, lambda value, of=regime: prepared(of.problem(value), rtol))
+            )
+        )
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
     options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
     options += ["--rtol", repr(float(rtol))] if rtol != RTOL else []
@@ -179,10 +182,6 @@ def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
     run = Run(times=times, rtol=rtol, max_steps=STEPS)
     judge = partial(_judged, problem, rtol, known)
     return lambda name: attempt(partial(model.solve, replace(run, solver=name)), judge)
-
-
-def _at_value(regime: Regime, rtol: float, value: float) -> Callable[[str], Attempt]:
-    return prepared(regime.problem(value), rtol)
 
 
 def read(problem: Trial) -> Case:
@@ -293,28 +292,28 @@ def _variables(first: str) -> Iterator[Variable]:
     def at(read: Callable[[Attempt], float | str], nothing: float | str = math.nan) -> Callable[..., float | str]:
         return lambda row, k, solver=first: read(cell) if (cell := row.at(k, solver)) else nothing
 
+    def value(row: MatrixRow, k: int) -> float:
+        return row.values[k] if k < len(row.values) else math.nan
+
+    problem, cell = ("regime", "decade"), ("regime", "decade", "solver")
     yield Variable("regime", ("regime",), lambda row: row.regime.name, "1", "regime")
     yield Variable("decade", ("decade",), float, "1", "number of the value, from mild to extreme")
     yield Variable("solver", ("solver",), str, "1", "solver")
     yield Variable("symbol", ("regime",), lambda row: row.regime.symbol, "1", "parameter")
-    given = lambda row, k: row.values[k] if k < len(row.values) else math.nan  # noqa: E731
-    yield Variable("value", ("regime", "decade"), given, "1", "value of the parameter")
-    for name, read, text in (
-        ("condition", lambda cell: cell.condition, "relative change of the answer over its data's"),
-        ("possible", lambda cell: digits_left(cell.condition, EPSILON), "digits that rounding of the data leaves"),
-    ):
-        yield Variable(name, ("regime", "decade"), at(read), "1", text)
-    digits = "-log10 of the largest relative error, of values or of the time of the end"
-    outcomes = f"what came of it: {', '.join(OUTCOMES)}"
-    for name, unit, text, reader in (
-        ("digits", "1", digits, at(lambda cell: cell.digits)),
-        ("steps", "1", "steps", at(lambda cell: cell.cost.steps)),
-        ("residuals", "1", "evaluations of the equations", at(lambda cell: cell.cost.residuals)),
-        ("seconds", "s", "run time", at(lambda cell: sum(cell.seconds))),
-        ("outcome", "1", outcomes, at(lambda cell: cell.outcome, "")),
-        ("reason", "1", "where the error is largest, or why the run ended", at(lambda cell: cell.reason, "")),
-    ):
-        yield Variable(name, ("regime", "decade", "solver"), reader, unit, text)
+    yield Variable("value", problem, value, "1", "value of the parameter")
+    text = "relative change of the answer over its data's"
+    yield Variable("condition", problem, at(lambda cell: cell.condition), "1", text)
+    text = "digits that rounding of the data leaves"
+    yield Variable("possible", problem, at(lambda cell: digits_left(cell.condition, EPS)), "1", text)
+    text = "-log10 of the largest relative error, of values or of the time of the end"
+    yield Variable("digits", cell, at(lambda cell: cell.digits), "1", text)
+    yield Variable("steps", cell, at(lambda cell: cell.cost.steps), "1", "steps")
+    yield Variable("residuals", cell, at(lambda cell: cell.cost.residuals), "1", "evaluations of the equations")
+    yield Variable("seconds", cell, at(lambda cell: sum(cell.seconds)), "s", "run time")
+    text = f"what came of it: {', '.join(OUTCOMES)}"
+    yield Variable("outcome", cell, at(lambda cell: cell.outcome, ""), "1", text)
+    text = "where the error is largest, or why the run ended"
+    yield Variable("reason", cell, at(lambda cell: cell.reason, ""), "1", text)
 
 
 def _sections(
@@ -352,7 +351,7 @@ def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
 
 def _condition_texts(number: float, rtol: float) -> Sequence[str]:
     """A condition number, the digits that are possible, and those that it leaves at the tolerance."""
-    left = (f"{digits_left(number, change):.1f}" for change in (EPSILON, rtol))
+    left = (f"{digits_left(number, change):.1f}" for change in (EPS, rtol))
     return (f"{number:.0e}", *left) if math.isfinite(number) else ("", "", "")
 
 

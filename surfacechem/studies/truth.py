@@ -26,7 +26,7 @@ from surfacechem.results.error_estimates import computed, difference, event_erro
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
-from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
 
 Array = NDArray[np.float64]
@@ -107,15 +107,12 @@ class Subject:
         """Names of all that may be compared."""
         return [*self.states, *(item.name for item in self.model.system.outputs)]
 
-    def settings(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Run:
-        """The run of the case with another solver and tolerance, its absolute tolerance in proportion."""
+    def solve(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Trajectory:
+        """A run with another solver and tolerance, its absolute tolerance in proportion."""
         run = self.case.run
         atol = None if run.atol is None else run.atol * rtol / run.rtol
-        return replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=run.max_seconds or limit)
-
-    def solve(self, name: str, rtol: float, limit: float = MOST_SECONDS) -> Trajectory:
-        """A run with another solver and tolerance."""
-        return self.model.solve(self.settings(name, rtol, limit))
+        seconds = run.max_seconds or limit
+        return self.model.solve(replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=seconds))
 
     def unable(self, name: str) -> str:
         """Why a solver cannot run this case; empty where it can."""
@@ -224,7 +221,11 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
         raise InputError("; ".join(failures))
     if len(found) == 1:
         return replace(found[0], source=f"{found[0].source} alone, which no second method confirms")
-    pairs = [(a, b, a.errors(b.values, b.events)) for a, b in combinations(found, 2) if _same_end(a, b)]
+    pairs = [
+        (a, b, a.errors(b.values, b.events))
+        for a, b in combinations(found, 2)
+        if a.status == b.status and not difference(a.events, b.events) and len(a.times) == len(b.times)
+    ]
     if not pairs:
         raise InputError(f"{name} has no reference: its methods come to different ends or events.")
     first, second, apart = min(pairs, key=lambda pair: np.nan_to_num(pair[2].worst("max", "event"), nan=math.inf))
@@ -233,10 +234,6 @@ def numerical(subject: Subject, variables: Sequence[str]) -> Truth:
         raise InputError(f"{name} has no reference: the methods that agree best, {methods}, differ by {largest:.1e}.")
     source = f"{methods}, extrapolated from rtol {TIGHTEST * DECADE:.0e} and {TIGHTEST:.0e}"
     return replace(first, source=source, uncertainty=apart.larger(first.uncertainty))
-
-
-def _same_end(a: Truth, b: Truth) -> bool:
-    return a.status == b.status and not difference(a.events, b.events) and len(a.times) == len(b.times)
 
 
 def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Truth:
