@@ -52,6 +52,24 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, InterfaceArrhenius)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
+        mixtures = [law for law in mechanism.potentials if isinstance(law, IdealMixture)]
+        self.species: dict[str, Species] = {item.name: item for law in mixtures for item in law.species}
+        springs = {name: item.spring for name, item in self.species.items() if item.spring}
+        self.pulled = next((name for name, spring in springs.items() if spring.stiffness), "")
+        """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
+        self._amounts = {variable.name: variable.density for variable in mechanism.variables}
+        first = next(iter(self.species.values()))
+        self.site_density = self._amounts[first.variable] * first.sites
+        """Sites per reference area [1/m^2]."""
+        self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
+        self._lengths = lengths(self.laws, self.pairs)
+        # The gap at which the pulled bond carries the force; zero where no bond is elastic.
+        pulled = springs.get(self.pulled)
+        gap = pulled.rest_length + FORCE / pulled.stiffness if pulled else 0.0
+        self._known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": gap}
+        self._known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
+        for name, spring in springs.items():
+            self._known[f"f_{self.species[name].variable}"] = spring.stiffness * (gap - spring.rest_length)
         # Every number of a law is a symbol: the logarithm of one that is zero is infinite only when it is evaluated.
         self._bound: dict[str, InterfaceArrhenius] = {}
         self._numbers: dict[Expression, float] = {}
@@ -59,17 +77,14 @@ class Curves:
             symbols = {name: symengine.Symbol(f"{label}.{name}") for name, _ in law.specs()}
             self._bound[label] = law.bind(symbols)
             self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in symbols.items()}
-        self._amounts = {variable.name: variable.density for variable in mechanism.variables}
-        self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
-        self._lengths = lengths(self.laws, self.pairs)
         # Without interactions, so that standard states depend on no coverage.
-        laws = (
+        plain = [
             law.bind({"species": tuple(replace(item, interactions=()) for item in law.species)})
             if isinstance(law, IdealMixture)
             else law
             for law in mechanism.potentials
-        )
-        self._psi = sum(self._call(law.statement) for law in laws)
+        ]
+        self._psi = sum(self._call(law.statement) for law in plain)
 
     @property
     def loaded(self) -> bool:
@@ -77,23 +92,6 @@ class Curves:
         rates = (self._log_rate([label], law.change) for label, law in self.laws.items())
         constants = (self._log_equilibrium(law.change, False) for law in self.laws.values())
         return any(depends(expression, FORCE) for expression in (*rates, *constants))
-
-    @property
-    def pulled(self) -> str:
-        """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
-        return next((name for name, item in self.species.items() if item.spring and item.spring.stiffness), "")
-
-    @property
-    def species(self) -> dict[str, Species]:
-        """The species by name."""
-        mixtures = (law for law in self.mechanism.potentials if isinstance(law, IdealMixture))
-        return {item.name: item for law in mixtures for item in law.species}
-
-    @property
-    def site_density(self) -> float:
-        """Sites per reference area [1/m^2]."""
-        item = next(iter(self.species.values()))
-        return self._amounts[item.variable] * item.sites
 
     def thermo(self, temperature: float) -> dict[str, Thermo]:
         """Standard thermo of every species at a temperature [K], without force."""
@@ -125,10 +123,13 @@ class Curves:
         forward, backward = (self._log_rate(laws, pair.change) for laws in (pair.forward, pair.backward))
         return self._evaluate(forward - backward - self._log_equilibrium(pair.change, True), temperatures, forces)
 
+    def _call(self, formula: Callable[..., Expression]) -> Expression:
+        return formula(**{name: self._known[name] for name in reads(formula)})
+
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
-        """At coverages of one, over the amount of the bond that the reaction makes or breaks."""
+        """Over the amount of the bond that the reaction makes or breaks."""
         total = log_sum([self._call(self._bound[label].log_forward) for label in labels])
-        return self._filled(total) - log(min(self._amounts[name] for name in change))
+        return total - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
         """With the work of a prescribed force on reactions that undo each other."""
@@ -136,27 +137,12 @@ class Curves:
         for name, nu in change.items():
             total += nu * derivative(self._psi, self._coverages[name]) / self._amounts[name]
             total -= nu * FORCE * self._lengths.get(name, 0) if paired else 0
-        return self._filled(-total / (BOLTZMANN * TEMPERATURE))
-
-    def _filled(self, expression: Expression) -> Expression:
-        return symengine.sympify(expression).subs(dict.fromkeys(self._coverages.values(), 1))
-
-    def _call(self, formula: Callable[..., Expression]) -> Expression:
-        known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": self._gap}
-        known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
-        for item in self.species.values():
-            if item.spring:
-                known[f"f_{item.variable}"] = item.spring.stiffness * (self._gap - item.spring.rest_length)
-        return formula(**{name: known[name] for name in reads(formula)})
-
-    @property
-    def _gap(self) -> Expression:
-        """The gap at which the pulled bond carries the force; zero where no bond is elastic."""
-        spring = self.species[self.pulled].spring if self.pulled else None
-        return spring.rest_length + FORCE / spring.stiffness if spring else 0.0
+        return -total / (BOLTZMANN * TEMPERATURE)
 
     def _evaluate(self, expression: Expression, temperatures: Array, forces: Array) -> Array:
-        function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [expression], cse=True)
+        """Values at coverages of one."""
+        full = symengine.sympify(expression).subs(dict.fromkeys(self._coverages.values(), 1))
+        function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [full], cse=True)
         points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
         return np.asarray(function(points), dtype=np.float64)[..., 0]
 
