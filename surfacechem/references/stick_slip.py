@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -137,8 +138,30 @@ class StickSlip(Reference):
         return {"v": np.where(slips, v, 0.0), "u_t": slip, **tractions, "heat": self.t_k * slip}
 
 
+@dataclass(frozen=True)
+class Cycle:
+    """A stick and the slip that ends it."""
+
+    start: float
+    """Spring traction [Pa] at the beginning of the stick."""
+    stick_time: float
+    phi: float
+    """Bonding state at the end of the stick."""
+    limit: float
+    """Traction [Pa] at the end of the stick."""
+    slip: Slip
+
+    @property
+    def duration(self) -> float:
+        """Stick and slip [s]."""
+        return self.stick_time + self.slip.duration
+
+
 class BondedSlider(Reference):
-    """A mass on a driven spring whose contact sticks the better the more bonds it has."""
+    """A mass on a driven spring whose contact sticks the better the more bonds it has; sliding breaks all of them.
+
+    It starts at rest with a relaxed spring. A subclass states its cycles, and its bonds during a stick.
+    """
 
     m: float = parameter("kg/m^2", "mass", above=0)
     k: float = parameter("Pa/m", "tangential stiffness", above=0)
@@ -163,6 +186,33 @@ class BondedSlider(Reference):
         if not self.mu_k <= self.mu_ub <= self.mu_b <= 2.0 * self.mu_k + self.mu_ub:
             raise InputError(f"{self.name}: exact for mu_k <= mu_ub <= mu_b <= 2 mu_k + mu_ub only.")
 
+    @abstractmethod
+    def cycles(self) -> Iterator[Cycle]:
+        """The cycles from the start on."""
+
+    @abstractmethod
+    def bonds(self, cycle: Cycle, t: Array) -> Array:
+        """Bonding state at times since the beginning of the stick of a cycle."""
+
+    def quantities(self, t: Array) -> Quantities:
+        values = np.zeros((5, len(t)))
+        begin, slipped, last, t_k = 0.0, 0.0, float(np.max(t, initial=0.0)), self.mu_k * self.p
+        for cycle in islice(self.cycles(), CYCLES):
+            inside = (t >= begin) & (t < begin + cycle.duration)
+            since = t[inside] - begin
+            sticks = since < cycle.stick_time
+            slip, v, above = cycle.slip.motion(np.where(sticks, 0.0, since - cycle.stick_time))
+            phi = np.where(sticks, self.bonds(cycle, since), 0.0)
+            spring = np.where(sticks, cycle.start + self.k * self.V * since, t_k + above)
+            values[:, inside] = phi, v, slipped + slip, np.where(sticks, spring, t_k), spring
+            begin, slipped = begin + cycle.duration, slipped + cycle.slip.distance
+            if begin > last:
+                break
+        else:
+            raise InputError(f"{self.name}: more than {CYCLES} cycles until t = {last!r} s.")
+        found = dict(zip(("phi", "v", "u_t", "t_t", "spring_traction"), values, strict=True))
+        return {**found, "heat": t_k * found["u_t"]}
+
 
 class StickSlipDebonding(BondedSlider):
     r"""Stick-slip that begins bonded: sticking bears :math:`\mu_bp` once and :math:`\mu_{ub}p` ever after.
@@ -173,70 +223,25 @@ class StickSlipDebonding(BondedSlider):
     .. math:: t_2=t_1+t_{slip}(\mu_b)+\frac{(\mu_{ub}+\mu_b-2\mu_k)p}{kV},\quad
         t_{j+1}=t_j+t_{slip}(\mu_{ub})+\frac{2(\mu_{ub}-\mu_k)p}{kV}
 
-    for the beginnings of slips. The contact starts at rest, complete in its bonds, with a relaxed spring. Any t >= 0.
+    for the beginnings of slips. The contact starts complete in its bonds. Any t >= 0.
 
     Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
 
     >>> slider = StickSlipDebonding(m=10.0, k=1e8, V=1e-3, p=1e5, mu_b=0.9, mu_ub=0.6, mu_k=0.4)
-    >>> f"{slider.first.v_max:.9f} {slider.unbonded_from:.9f}"
+    >>> first, second = islice(slider.cycles(), 2)
+    >>> f"{first.slip.v_max:.9f} {first.duration + second.stick_time:.9f}"
     '1.582139146 1.600993859'
     """
 
-    @property
-    def first(self) -> Slip:
-        """The slip that breaks the bonds."""
-        return Slip(self.m, self.k, self.V, (self.mu_b - self.mu_k) * self.p)
+    def cycles(self) -> Iterator[Cycle]:
+        start, phi, mu = 0.0, 1.0, self.mu_b
+        while True:
+            slip = Slip(self.m, self.k, self.V, (mu - self.mu_k) * self.p)
+            yield Cycle(start, (mu * self.p - start) / (self.k * self.V), phi, mu * self.p, slip)
+            start, phi, mu = (2.0 * self.mu_k - mu) * self.p, 0.0, self.mu_ub
 
-    @property
-    def onset_time(self) -> float:
-        """Time [s] of the first slip."""
-        return self.mu_b * self.p / (self.k * self.V)
-
-    @property
-    def unbonded_from(self) -> float:
-        """Time [s] of the second slip."""
-        left = (2.0 * self.mu_k - self.mu_b) * self.p
-        return self.onset_time + self.first.duration + (self.mu_ub * self.p - left) / (self.k * self.V)
-
-    def quantities(self, t: Array) -> Quantities:
-        onset, rest = self.onset_time, self.onset_time + self.first.duration
-        slip, v, above = self.first.motion(np.clip(t - onset, 0.0, self.first.duration))
-        sliding, t_k = (t > onset) & (t < rest), self.mu_k * self.p
-        start = np.where(t < rest, 0.0, (2.0 * self.mu_k - self.mu_b) * self.p)
-        pulled = start + self.k * self.V * (t - np.where(t < rest, 0.0, rest))
-        spring = np.where(sliding, t_k + above, pulled)
-        # Without bonds it goes on as plain stick-slip does from the onset of its first slip.
-        plain = StickSlip(m=self.m, k=self.k, V=self.V, t_s=self.mu_ub * self.p, t_k=t_k)
-        later = plain.solution(np.maximum(t - self.unbonded_from, 0.0) + plain.onset_time)
-        after = t >= self.unbonded_from
-        u_t = np.where(t < onset, 0.0, slip) + np.where(after, later["u_t"], 0.0)
-        return {
-            "phi": np.where(t > onset, 0.0, 1.0),
-            "u_t": u_t,
-            "v": np.where(after, later["v"], np.where(sliding, v, 0.0)),
-            "t_t": np.where(after, later["t_t"], np.where(sliding, t_k, spring)),
-            "spring_traction": np.where(after, later["spring_traction"], spring),
-            "heat": t_k * u_t,
-        }
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """A stick and the slip that ends it."""
-
-    start: float
-    """Spring traction [Pa] at the beginning of the stick."""
-    stick_time: float
-    phi: float
-    """Bonding state at the end of the stick."""
-    limit: float
-    """Traction [Pa] at the end of the stick."""
-    slip: Slip
-
-    @property
-    def duration(self) -> float:
-        """Stick and slip [s]."""
-        return self.stick_time + self.slip.duration
+    def bonds(self, cycle: Cycle, t: Array) -> Array:
+        return np.full_like(t, cycle.phi)
 
 
 class StickSlipRebonding(BondedSlider):
@@ -249,7 +254,7 @@ class StickSlipRebonding(BondedSlider):
     :math:`\beta=p(\mu_b-\mu_{ub})/(kV)`; the next begins with :math:`2t_k-t_s`. In the steady cycle
     :math:`\alpha=2p(\mu_b-\mu_k)/(kV)`, :math:`\beta=2p(\mu_b-\mu_{ub})/(kV)`. For :math:`\mu_{ub}=\mu_k` there is none
     above :math:`V_c=2p(\mu_b-\mu_{ub})/(k\tau)`. Near there the Lambert function loses all digits; what is solved, to
-    rounding, is the equation without it. The contact starts at rest, without bonds, with a relaxed spring.
+    rounding, is the equation without it. The contact starts without bonds.
 
     Source: sticking limit of Sauer, Duong & Mandadapu (2021), eq. e:mu0, at T_0, with an oscillator, integrated.
 
@@ -302,21 +307,5 @@ class StickSlipRebonding(BondedSlider):
         drop = self.p * ((self.mu_ub - self.mu_k) + (self.mu_b - self.mu_ub) * phi)
         return Cycle(start, x * self.tau, phi, limit, Slip(self.m, self.k, self.V, drop))
 
-    def quantities(self, t: Array) -> Quantities:
-        values = np.zeros((5, len(t)))
-        begin, slipped, last = 0.0, 0.0, float(np.max(t, initial=0.0))
-        for cycle in islice(self.cycles(), CYCLES):
-            inside = (t >= begin) & (t < begin + cycle.duration)
-            since = t[inside] - begin
-            sticks = since < cycle.stick_time
-            slip, v, above = cycle.slip.motion(np.where(sticks, 0.0, since - cycle.stick_time))
-            phi = np.where(sticks, -np.expm1(-since / self.tau), 0.0)
-            spring = np.where(sticks, cycle.start + self.k * self.V * since, self.p * self.mu_k + above)
-            values[:, inside] = phi, v, slipped + slip, np.where(sticks, spring, self.p * self.mu_k), spring
-            begin, slipped = begin + cycle.duration, slipped + cycle.slip.distance
-            if begin > last:
-                break
-        else:
-            raise InputError(f"{self.name}: more than {CYCLES} cycles until t = {last!r} s.")
-        found = dict(zip(("phi", "v", "u_t", "t_t", "spring_traction"), values, strict=True))
-        return {**found, "heat": self.p * self.mu_k * found["u_t"]}
+    def bonds(self, cycle: Cycle, t: Array) -> Array:
+        return np.asarray(-np.expm1(-t / self.tau))
