@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from surfacechem.errors import InputError, suggestion
 from surfacechem.plots import overlays, style
 from surfacechem.plots.style import Array, meaning, symbol, unit, unit_text, varies
+from surfacechem.tolerances import EPS, ROUNDING
 
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K", r".*"),
@@ -31,8 +32,8 @@ KINDS: tuple[tuple[str, str, str], ...] = (
 RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
 """Residuals and the attributes that hold their largest relative values."""
 
-LEAST = 1e-18
-"""Residuals below this are drawn as this."""
+LEAST = EPS / 256
+"""Residuals below this, which is far below the last digit of what is balanced, are drawn as this."""
 
 DECADES = 1e3
 """Times that span more than this go on a logarithmic axis, unless they are evenly spaced."""
@@ -195,7 +196,7 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
         ax.plot(dataset["time"].values, np.maximum(relative, LEAST), label=name.partition("_")[0], linewidth=1.2)
     ax.set_yscale("log")
     low, high = ax.get_ylim()
-    ax.set_ylim(min(low, LEAST), max(high, 1e-12))
+    ax.set_ylim(min(low, LEAST), max(high, ROUNDING))
     ax.set_ylabel("Balance residual [1]")
     style.legend(ax)
 

@@ -17,6 +17,7 @@ from matplotlib.ticker import NullFormatter
 
 from surfacechem.plots import style
 from surfacechem.plots.style import COLOURS, Array
+from surfacechem.tolerances import EPS
 
 
 def figure(dataset: xarray.Dataset) -> Figure:
@@ -45,9 +46,9 @@ NUMBERS = {
 TEXTS = {"status": POINT, **{name: (dimension,) for dimension, name in LABELS.items()}}
 """Variables that are read, with their dimensions."""
 
-# Below the last digit of a double, relative to one: an error that is exactly zero has a place on a logarithmic axis.
-SMALLEST = 1e-17
-"""Errors below this are drawn as this."""
+SMALLEST = EPS / 16
+"""Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
+of its own."""
 
 BELOW, INSIDE = "below the uncertainty of the reference", "inside the library's own steps"
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place
 from surfacechem.results.netcdf import reading, replacing
+from surfacechem.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
 
@@ -44,8 +45,8 @@ STYLE: Any = {
     "ytick.labelsize": 8.5,
 }
 
-FLAT = 1e-9
-"""A curve that changes by less than this part of its size is constant."""
+FLAT = 1000 * ROUNDING
+"""A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it."""
 
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 

@@ -17,7 +17,7 @@ from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_text, varies
 
-PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "μ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"))
+PREFIXES = tuple((10.0 ** (-3 * k), prefix) for k, prefix in enumerate(["", "m", "μ", "n", "p", "f"]))
 
 MOST_CURVES = 7
 """Values of a second parameter that are drawn as curves of their own."""

@@ -77,7 +77,7 @@ class BouncingBody(UniformBody):
             # The logarithm rounds: it may be in the flight before, or beyond.
             whole += np.where(flights >= flown(whole + 1), 1.0, 0.0) - np.where(flights < flown(whole), 1.0, 0.0)
             n = np.where(t < first, 0.0, whole + 1)
-        since = np.where(n > 0, t - first - (flight * flown(n - 1) if a else 0.0), t)
+        since = np.where(n > 0, t - (first + (flight * flown(n - 1) if a else 0.0)), t)
         v = np.where(n > 0, speed * e**n, self.v_n_i)
         g = np.where(n > 0, 0.0, self.g_n_i) + v * since - a * since**2 / 2
         rests = t >= self.rest_time

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -77,13 +77,12 @@ def attempt(solve: Callable[[], Trajectory], judge: Callable[[Trajectory | Excep
 
 
 def filled(
-    solvers: Sequence[str], values: Sequence[float], prepare: Callable[[float], Callable[[str], C]], rounds: int = 0
+    solvers: Sequence[str], prepared: Mapping[float, Callable[[str], C]], rounds: int = 0
 ) -> dict[tuple[str, float], C]:
-    """The cells of a problem by solver and value: what does not depend on the solver is prepared once for each value;
-    each cell is run once, then timed in so many rounds.
+    """The cells of a problem by solver and value: each is run once, by solver from what is prepared for the value, and
+    then timed in so many rounds.
     """
-    prepared = {value: prepare(value) for value in values}
-    cells = {(name, value): prepared[value](name) for name in solvers for value in values}
+    cells = {(name, value): run(name) for name in solvers for value, run in prepared.items()}
     for _ in range(rounds):
         for cell in cells.values():
             if cell.outcome in ("finished", "stopped") and sum(cell.seconds) < BUDGET:

@@ -19,6 +19,7 @@ from surfacechem.results.detailed_balance import said
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.summaries import columns
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
+from surfacechem.tolerances import ROUNDING
 from surfacechem.units import parse
 
 if TYPE_CHECKING:
@@ -110,7 +111,8 @@ def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
 
 
 def _number(value: float, digits: int = 6) -> str:
-    return f"{value:.{digits}g}" if abs(value) > 1e-9 else "0"
+    """A difference of numbers of up to a thousand [kJ/mol]; rounding is shown as zero."""
+    return f"{value:.{digits}g}" if abs(value) > 1e3 * ROUNDING else "0"
 
 
 def _reactions(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:

@@ -22,11 +22,10 @@ from surfacechem.solve.radau.solver import LOOSEST
 from surfacechem.solve.run import Trajectory
 from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_tolerances, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
-from surfacechem.studies.truth import KINDS, MEANING, Errors, Subject, Truth, establish
+from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish
 
 log = logging.getLogger(__name__)
 
-TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 REPEAT, MOST_REPEAT = 5, 1000
 
 COUNTS = {
@@ -186,7 +185,7 @@ def _compared(
             return WorkPoint("omitted", unable)
         return attempt(partial(subject.solve, solver, rtol), partial(_judged, truth))
 
-    points = filled(solvers, tolerances, lambda rtol: partial(measured, rtol), repeat)
+    points = filled(solvers, {rtol: partial(measured, rtol) for rtol in tolerances}, repeat)
     return Compared(subject, variables, truth, reference, points)
 
 

@@ -139,11 +139,8 @@ def stability(
     for number, regime in enumerate(found, 1):
         values = few(regime.values) if quick else list(regime.values)
         log.info("%s: %d values, regime %d of %d", regime.name, len(values), number, len(found))
-        rows.append(
-            MatrixRow(
-                regime, values, filled(solvers, values, lambda value, of=regime: prepared(of.problem(value), rtol))
-            )
-        )
+        runs = {value: prepared(regime.problem(value), rtol) for value in values}
+        rows.append(MatrixRow(regime, values, filled(solvers, runs)))
     corners = [worst_corner(regime, rounds, rtol) for regime in found if regime.space] if rounds else []
     options = ["--solvers", ",".join(solvers)] if tuple(solvers) != SOLVERS else []
     options += ["--rtol", repr(float(rtol))] if rtol != RTOL else []

@@ -45,9 +45,11 @@ MOST_SECONDS, LONGEST = 60.0, 900.0
 long [s]: which methods it is made of must not depend on how busy a machine is.
 """
 
-# A choice: two decades below the loosest tolerance that is usual, whose errors a reference must still tell.
-AGREE = 1e-6
-"""Methods that differ by more than this do not agree."""
+TOLERANCES = tuple(10.0**-k for k in (4, 6, 8, 10, 12))
+"""Relative tolerances of a study, if none are given."""
+
+AGREE = TOLERANCES[0] / 100
+"""Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance."""
 
 KINDS = ("final", "max", "l2")
 MEANING = {
