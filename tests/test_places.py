@@ -1,0 +1,233 @@
+"""How many places one touches to add something: each addition is made in a copy of the package, and runs there.
+
+A law, a rate type, an exact solution and an output are one file. A component, a constraint and the solver of a library
+are a file and its line in the one list of their kind. A key of a case is tested in ``format/test_declarations.py``, the
+law of the page "Adding a law" in ``test_docs.py``.
+"""
+
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+CASE = """\
+T_0: 300 K
+bodies:
+  lower: {temperature: T, C: 50 J/m^2/K}
+  upper: {temperature: T, C: 50 J/m^2/K}
+interface: {temperature: T, friction: [coulomb: {mu: 0.25}]}
+mechanics: {tangential: {m: 5 kg/m^2}}
+loading: {p: 30 kPa}
+initial: {T: 300 K, v: 2 m/s}
+run: {until: 1 ms, solver: lsoda}
+"""
+RUN = """
+import json, surfacechem
+solution = surfacechem.run("case.yaml")
+end = {name: float(values[-1]) for name, values in solution.dataset.data_vars.items() if values.dims == ("time",)}
+text = f"{solution.reason} {solution.audit.violations} {solution.accuracy and solution.accuracy.source}"
+print(json.dumps({**end, "text": text}))
+"""
+V_I, M, MU_P, T_I, C = 2.0, 5.0, 0.25 * 30e3, 300.0, 100.0
+
+LAW = '''
+
+class Drag(Friction):
+    r"""Resistance in proportion to the velocity. .. math:: t_t = c v"""
+
+    c: float = parameter("Pa s/m", "resistance", at_least=0)
+
+    def traction(self, v: Expression) -> Expression:
+        """Tangential traction [Pa]."""
+        return self.c * v
+'''
+FACTOR = '''
+
+class SteepFactor(RateFactor):
+    """Twice the work of the force."""
+
+    rate_type = "steep"
+
+    x: float = parameter("m", "distance to the transition state")
+
+    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
+        """Logarithm of the factor."""
+        return 2 * f * self.x / (BOLTZMANN * T_c)
+'''
+RATE = """
+import json
+from surfacechem.mechanism import load_mechanism
+(law,) = load_mechanism("bond.yaml").reactions
+amounts = {"theta_free": 0.5, "n_theta_free": 1.0, "theta_bond": 0.5, "n_theta_bond": 1.0}
+print(json.dumps({"rate": law.rate(T_c=300.0, f=1e-12, **amounts)}))
+"""
+BOND = """\
+phases:
+- {name: pair, thermo: ideal-surface, kinetics: surface, species: all, reactions: all, site-density: 1e-9 mol/m^2}
+species:
+- {name: free, composition: {}, thermo: {model: constant-cp}}
+- {name: bond, composition: {}, thermo: {model: constant-cp}}
+reactions:
+- {equation: bond => free, type: steep, rate-constant: {A: 3 1/s, b: 0, Ea: 0}, x: 1 nm}
+"""
+SOLUTION = '''
+"""A slider that friction brakes, before it rests."""
+
+from surfacechem.contracts.terms import parameter
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+
+
+class EarlyBraking(Reference):
+    """A velocity that falls at a constant rate."""
+
+    v_i: float = parameter("m/s", "initial velocity")
+    a: float = parameter("m/s^2", "deceleration")
+
+    @classmethod
+    def from_scene(cls, scene: SceneView) -> Parameters:
+        force = scene.friction("mu") * scene.initial("p")
+        return {"v_i": scene.initial("v"), "a": force / scene.support("tangential", "m")}
+
+    def quantities(self, t: Array) -> Quantities:
+        return {"v": self.v_i - self.a * t, "u_t": self.v_i * t - self.a * t**2 / 2}
+'''
+COMPONENT = '''
+"""A body that is cooled."""
+
+from surfacechem.model.balances import HEAT, OUTSIDE, Power
+
+
+def cooling(build):
+    """One statement of a power: balances, ledger and entropy follow."""
+    body = build.scene.bodies[0].name
+    T = build.thermal.node_of[body].T
+    yield Power(HEAT, OUTSIDE, body, -1e6 + 0 * T, "H_cooled", "heat of cooling", entropy=-1e6 / T)
+'''
+CONSTRAINT = '''
+"""The end of the track."""
+
+from surfacechem.model.system import Margin
+
+
+def track(build):
+    """The slider stays on its track."""
+    way = build.variables.get("u_t", "the track")
+    build.margins.append(Margin("track", 1e-3 - way, "the slider leaves its track"))
+'''
+ADAPTER = '''
+"""Dormand and Prince's method of order 8."""
+
+from scipy.integrate import DOP853
+
+from surfacechem.solve.adapters.scipy_methods import SciPySolver
+
+
+def explicit() -> SciPySolver:
+    """The method by its name."""
+    return SciPySolver("dop853", DOP853)
+'''
+
+
+class Place(NamedTuple):
+    """An addition: texts to append to files of the package, or to put after a line of theirs; a case; what it gives."""
+
+    added: dict[str, tuple[str, str]]
+    case: dict[str, str]
+    expected: dict[str, float | str]
+    script: str = RUN
+
+
+MODEL, AFTER = "model/assemble.py", "    stated(friction(build))\n"
+PLACES = {
+    "a law": Place(
+        {"laws/friction.py": ("", LAW)},
+        {"coulomb: {mu: 0.25}": "drag: {c: 5 kPa s/m}"},
+        {"v": V_I * math.exp(-5e3 * 1e-3 / M)},
+    ),
+    "a rate type": Place(
+        {"laws/bonds.py": ("", FACTOR)},
+        {},
+        {"rate": 1.5 * math.exp(2e-12 * 1e-9 / (1.380649e-23 * 300.0))},
+        RATE,
+    ),
+    "an exact solution": Place(
+        {"references/early_braking.py": ("", SOLUTION)},
+        {"run:": "reference: early-braking\nrun:"},
+        {"text": "exact solution early-braking", "v": V_I - MU_P / M * 1e-3},
+    ),
+    "an output": Place(
+        {
+            "model/components/friction.py": (
+                "        yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)\n",
+                '        build.name(Quantity("rubbed", "W/m^2", "power of friction"), power)\n',
+            )
+        },
+        {},
+        {"rubbed": MU_P * (V_I - MU_P / M * 1e-3)},
+    ),
+    "a component": Place(
+        {
+            "model/components/cooling.py": ("", COMPONENT),
+            MODEL: (
+                AFTER,
+                "    from surfacechem.model.components.cooling import cooling\n\n    stated(cooling(build))\n",
+            ),
+        },
+        {"v: 2 m/s": "v: 0 m/s"},
+        {"H_cooled": -1e3, "T": T_I * math.sqrt(1 - 2e3 / (C * T_I)), "text": "()"},
+    ),
+    "a constraint": Place(
+        {
+            "model/constraints/track.py": ("", CONSTRAINT),
+            MODEL: (AFTER, "    from surfacechem.model.constraints.track import track\n\n    track(build)\n"),
+        },
+        {},
+        {"text": "the slider leaves its track"},
+    ),
+    "a solver": Place(
+        {
+            "solve/adapters/explicit.py": ("", ADAPTER),
+            "solve/__init__.py": ("_FACTORIES = {\n", '    "dop853": ("adapters.explicit", "explicit"),\n'),
+        },
+        {"lsoda": "dop853"},
+        {"v": V_I - MU_P / M * 1e-3},
+    ),
+}
+FILES = {"a component": 2, "a constraint": 2, "a solver": 2}
+"""Files to touch where it is more than one: the file itself and the list of its kind."""
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_places(name, tmp_path):
+    place = PLACES[name]
+    assert len(place.added) == FILES.get(name, 1)
+    for folder in ("surfacechem", "mechanisms"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for file, (anchor, text) in place.added.items():
+        path = tmp_path / "surfacechem" / file
+        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        assert anchor in before
+        path.write_text(before.replace(anchor, anchor + text, 1) if anchor else before + text, encoding="utf-8")
+    case = CASE
+    for old, new in place.case.items():
+        assert old in case
+        case = case.replace(old, new)
+    (tmp_path / "case.yaml").write_text(case, encoding="utf-8")
+    (tmp_path / "bond.yaml").write_text(BOND, encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    process = [sys.executable, "-c", place.script]
+    done = subprocess.run(process, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    for key, expected in place.expected.items():
+        if isinstance(expected, str):
+            assert expected in found[key]
+        else:
+            assert found[key] == pytest.approx(expected, rel=1e-6), found
