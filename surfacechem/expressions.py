@@ -45,7 +45,8 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
     import symengine
 
     result = symengine.diff(symengine.sympify(expression), symbol)
-    while empty := {piece: symengine.Integer(0) for piece in result.atoms(symengine.Piecewise) if _vanishes(piece)}:
+    zero = symengine.Integer(0)
+    while empty := {p: zero for p in result.atoms(symengine.Piecewise) if all(v == 0 for v in p.args[::2])}:
         result = result.xreplace(empty)
     return result
 
@@ -91,10 +92,6 @@ def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = N
         return found
 
     return bound(symengine.sympify(expression))
-
-
-def _vanishes(piece: Any) -> bool:
-    return all(value == 0 for value in piece.args[::2])
 
 
 def _engine(*values: Expression) -> Any:

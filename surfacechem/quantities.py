@@ -98,5 +98,7 @@ VARIABLES = _table(
 )
 """What laws may read. Temperatures of bodies and interface resolve to the node that carries them."""
 
+VELOCITIES = frozenset(("v_n", "v_t", "v", "v_2", "speed"))
+
 INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))
 """What laws read of each other, and no case names."""

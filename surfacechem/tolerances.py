@@ -60,6 +60,11 @@ NOTHING = 1e-9
 nanokelvin. No run is asked for more digits than nine, which leaves that of a variable of order one.
 """
 
+SLACK = 1e-6
+"""How far beyond its bounds a bonding variable may be while no run has said how accurate it is: the coarsest relative
+tolerance in use.
+"""
+
 FEWEST = 1e-12
 """Bonded fraction that is no bond any more: of 1e16 sites on a square metre, one bond on a square centimetre."""
 

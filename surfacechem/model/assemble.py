@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.model.automaton import Sink
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
+from surfacechem.model.checks import check_touch
 from surfacechem.model.components.chemistry import reactions
 from surfacechem.model.components.conduction import conductors, profiles, slabs
 from surfacechem.model.components.force import force, rupture
@@ -28,10 +30,10 @@ from surfacechem.model.constraints.load_steps import load_steps
 from surfacechem.model.constraints.relaxing import relaxing
 from surfacechem.model.constraints.softening import apart_from_envelope, softening_mode
 from surfacechem.model.ledger import flow, regime, sinks, state, totals
+from surfacechem.model.refit import Fit
 from surfacechem.model.sliding.creep import stands_for_velocity
 from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
-from surfacechem.model.system import START, Outside, Role, System
-from surfacechem.model.touch import touch
+from surfacechem.model.system import START, Outside, Profile, Role, System
 from surfacechem.scene import Scene
 
 __all__ = ["LOADABLE", "TRACTIONS", "assemble"]
@@ -82,7 +84,7 @@ def assemble(scene: Scene) -> System:
     stage_ends(build)
     # Outputs.
     totals(build)
-    touch(build)
+    check_touch(build)
     logarithmic_state(build)
     layers = profiles(build)
     build.varying_margins()
@@ -93,6 +95,14 @@ def assemble(scene: Scene) -> System:
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
     assert not shared, f"parameters and quantities share the names {shared}"
+    return _system(build, layers, taking, fit())
+
+
+def _system(
+    build: Build, layers: tuple[Profile, ...], taking: Mapping[str, tuple[Sink, ...]], fit: Fit | None
+) -> System:
+    """All that was stated, as one frozen graph."""
+    scene = build.scene
     unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,
@@ -122,7 +132,7 @@ def assemble(scene: Scene) -> System:
         follows={str(x): value for x, value in build.motion.follows.items()},
         given=dict(build.motion.given),
         pulls=dict(build.motion.pulls),
-        fit=fit(),
+        fit=fit,
         warnings=(
             *build.interface.remarks,
             *build.warnings,
@@ -143,7 +153,7 @@ def _cycles(build: Build) -> Iterator[str]:
 def _is_there(build: Build, role: Role) -> bool:
     """Whether a derived variable was derived: one that nobody reads is not there."""
     name = role.variable
-    return role.role != "derived" or build.variables.was_read(name) or any(item.name == name for item in build.named)
+    return role.role != "derived" or build.variables.was_read(name) or build.is_named(name)
 
 
 def _outside(build: Build) -> Outside | None:

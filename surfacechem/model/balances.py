@@ -85,6 +85,14 @@ class Node:
         return -self.T * second(self.free_energy, self.T)
 
 
+def elastic_energy(k: Any, w: Any, g: Any) -> Any:
+    """Energy [J/m^2] of bodies of stiffness `k` [Pa/m], the far field displaced by `w` [m] at the gap `g` [m].
+
+    Of expressions or of arrays.
+    """
+    return k * (w - g) ** 2 / 2
+
+
 def internal_energy(F: Expression, T: Expression) -> Expression:
     """U = F - T F_T, term by term: what is in proportion to T has no energy, whatever the size of its derivatives."""
     return symengine.Add(*(term - T * derivative(term, T) for term in _terms(F)))

@@ -103,8 +103,9 @@ def _account(build: Build, power: Power) -> None:
 def totals(build: Build) -> None:
     """Energies, entropies and the fluxes into the bodies."""
     energies, entropies = [], []
-    for member, parts in _energies(build).items():
-        suffix = _suffix(build, member)
+    for member, parts in _stored(build).items():
+        names = [body.name for body in build.scene.bodies]
+        suffix = str(names.index(member) + 1) if member in names else "c"
         U = _sum([balances.internal_energy(F, node.T) if node else F for node, F in parts])
         energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
         S = _sum([balances.entropy(F, node.T) for node, F in parts if node])
@@ -121,6 +122,19 @@ def totals(build: Build) -> None:
         build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
     if build.interface.bonds:
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
+
+
+def _stored(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
+    """Nodes and free energies of every member that stores energy; no node where there is no medium."""
+    found: dict[str, list[tuple[Node | None, Expression]]] = {}
+    inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
+    for node in (*build.thermal.nodes.values(), *inside):
+        for member, F in node.energies.items():
+            if F != 0:
+                found.setdefault(member, []).append((node, F))
+    if build.interface.temperature is None and build.psi != 0:
+        found["interface"] = [(None, build.psi)]
+    return found
 
 
 def _enthalpy(build: Build) -> None:
@@ -140,24 +154,6 @@ def _enthalpy(build: Build) -> None:
 def _sum(terms: list[Expression]) -> Expression:
     """The sum; one term alone as it is, since a sum of one rounds differently."""
     return terms[0] if len(terms) == 1 else symengine.Add(*terms)
-
-
-def _energies(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
-    """Nodes and free energies of every member that stores energy; no node where there is no medium."""
-    found: dict[str, list[tuple[Node | None, Expression]]] = {}
-    inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
-    for node in (*build.thermal.nodes.values(), *inside):
-        for member, F in node.energies.items():
-            if F != 0:
-                found.setdefault(member, []).append((node, F))
-    if build.interface.temperature is None and build.psi != 0:
-        found["interface"] = [(None, build.psi)]
-    return found
-
-
-def _suffix(build: Build, member: str) -> str:
-    names = [body.name for body in build.scene.bodies]
-    return str(names.index(member) + 1) if member in names else "c"
 
 
 def _fluxes(build: Build) -> None:
@@ -241,25 +237,26 @@ def _by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
     The rest is exchanged with what has another temperature, supplied from outside, or thermo-elastic.
     """
     node = build.thermal.node_of[body.name]
-    known = any(item.name == f"C_{node.name}" for item in build.named)
+    known = build.is_named(f"C_{node.name}")
     whole = symengine.Symbol(f"C_{node.name}") if known else balances.conditioned(node.capacity(), build.about)
     share = -node.T * balances.second(node.energies[body.name], node.T) / whole
-    rubbed = (
-        p.amount for p in build.powers if p.kind == DISSIPATION and (p.source, p.target) == (MECHANICS, INTERFACE)
-    )
-    made = {"friction": symengine.Add(*rubbed), "reaction": _heat_of_reaction(build)}
+    dissipated = [power for power in build.powers if power.kind == DISSIPATION and power.target == INTERFACE]
+    rubbed = symengine.Add(*(power.amount for power in dissipated if power.source == MECHANICS))
+    made = {"friction": rubbed, "reaction": _heat_of_reaction(build)}
     parts = {name: share * heat for name, heat in made.items() if heat != 0}
-    exchanges = bool(
-        build.scene.heat
-        or any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
-        or any(str(x) in GEOMETRY for x in build.rates)
-        or build.motion.far_fields
-    )
+    exchanges = _exchanges(build)
     if not parts or len(parts) + exchanges < 2:
         return
     named = [_part(build, k, body, name, heat) for name, heat in parts.items()]
     if exchanges:
         _part(build, k, body, "exchange", flux - symengine.Add(*named))
+
+
+def _exchanges(build: Build) -> bool:
+    """Whether anything but friction and reactions brings heat to the bodies and the interface."""
+    supplied = any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
+    moved = any(str(x) in GEOMETRY for x in build.rates) or bool(build.motion.far_fields)
+    return bool(build.scene.heat) or supplied or moved
 
 
 def _heat_of_reaction(build: Build) -> Expression:
@@ -280,27 +277,7 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
     if not build.edges:
         return {}
-    _jump_accounts(build)
-    centre = build.thermal.node_of.get("interface")
-    if centre is None or not centre.takes_heat:
-        _refuse_local(build)
-    supports = {axis: _merged(build, far.takers(build)) for axis, far in build.motion.far_fields.items()}
-    return {INTERFACE: _merged(build, takers(build)), **supports}
-
-
-def _refuse_local(build: Build) -> None:
-    """Only an interface that stores heat can pay for what breaks."""
-    for law in build.interface.limits:
-        if law.release == "local":
-            raise InputError(
-                "in a local release the interface pays, but here it has no heat of its own. Give it a temperature and "
-                "a capacity, or use `release: joint`, in which the bodies do.",
-                law.place,
-            )
-
-
-def _jump_accounts(build: Build) -> None:
-    """Accounts that only jumps change."""
+    # Accounts that only jumps change.
     nothing = symengine.Integer(0)
     rows = [
         ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
@@ -313,6 +290,18 @@ def _jump_accounts(build: Build) -> None:
         ]
     for name, unit, text, kind in rows:
         build.ledger.append(Account(Quantity(name, unit, text), nothing, kind, "events"))
+    centre = build.thermal.node_of.get(INTERFACE)
+    if centre is None or not centre.takes_heat:
+        # Only an interface that stores heat can pay for what breaks.
+        for law in build.interface.limits:
+            if law.release == "local":
+                message = (
+                    "in a local release the interface pays, but here it has no heat of its own. Give it a temperature "
+                    "and a capacity, or use `release: joint`, in which the bodies do."
+                )
+                raise InputError(message, law.place)
+    supports = {axis: _merged(build, far.takers(build)) for axis, far in build.motion.far_fields.items()}
+    return {INTERFACE: _merged(build, takers(build)), **supports}
 
 
 def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
@@ -328,27 +317,24 @@ def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
     )
 
 
-def _has_medium(build: Build) -> bool:
-    """Whether something between the bodies conducts: a medium that the case names, or a law of a film or a gap."""
-    channels = {channel for law in build.scene.heat for channel in law.channels()}
-    return build.interface.medium is not None or bool(channels & {"film", "gas", "gap"})
-
-
 def regime(build: Build) -> str:
     """The thermal regime in words."""
-    nodes = [build.thermal.node_of[body.name] for body in build.scene.bodies]
-    centre = build.thermal.node_of.get("interface")
-    if centre is not None and all(node.prescribed for node in (*nodes, centre)):
-        loads = [build.loads[node.name] for node in (*nodes, centre)]
-        starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
-        still = not any(build.slope_of(node.name) != 0 or build.loads[node.name].jumps() for node in (*nodes, centre))
-        return "isothermal" if still and len(starts) == 1 else "prescribed temperatures"
+    thermal = build.thermal
+    nodes = [thermal.members[body.name] for body in build.scene.bodies]
+    centre = thermal.members.get(INTERFACE)
     if centre is None:
-        if nodes[0] is nodes[1]:
+        if nodes[0] == nodes[1]:
             return "perfect contact without a medium"
-        return "medium without temperature" if _has_medium(build) else "no medium"
-    if nodes[0] is nodes[1] is centre:
+        # What conducts between the bodies is a medium that the case names, or a law of a film or a gap.
+        channels = {channel for law in build.scene.heat for channel in law.channels()}
+        between = build.interface.medium is not None or channels & {"film", "gas", "gap"}
+        return "medium without temperature" if between else "no medium"
+    names = {*nodes, centre}
+    if all(thermal.nodes[name].prescribed for name in names):
+        loads = [build.loads[name] for name in names]
+        starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
+        moves = any(build.slope_of(name) != 0 for name in names) or any(load.jumps() for load in loads)
+        return "isothermal" if len(starts) == 1 and not moves else "prescribed temperatures"
+    if len(names) == 1:
         return "perfect contact"
-    if centre in nodes:
-        return "one-sided perfect contact"
-    return "separate interface temperature"
+    return "one-sided perfect contact" if centre in nodes else "separate interface temperature"

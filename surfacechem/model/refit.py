@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.substances import Fluid
 from surfacechem.errors import InputError
+from surfacechem.tolerances import SQRT_EPS
 
 Array = NDArray[np.float64]
 
 ROOM = 0.1
 """The first range goes beyond the temperatures at the start by this part of them."""
 
-NEAR = 1e-6
-"""A run that comes this close to an end, as a part of the range, has reached it."""
+NEAR = SQRT_EPS
+"""A run that comes this close to an end, as a part of the range, has reached it: its margin is zero there."""
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
-from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.refit import Fit
-from surfacechem.quantities import Quantity
+from surfacechem.quantities import VELOCITIES, Quantity
 from surfacechem.scene import Engine
 
 Array = NDArray[np.float64]
@@ -83,6 +82,7 @@ class State:
     """Size below which it counts as none, relative to the absolute tolerance; its scale, where not given."""
     given: Given | None = None
     """What is given in its place, where it stands for that."""
+    is_temperature: bool = False
 
     @property
     def name(self) -> str:
@@ -228,6 +228,46 @@ class Caution:
 
 
 @dataclass(frozen=True)
+class Profile:
+    """Temperatures across a body, from the contact to the far side."""
+
+    number: int
+    body: str
+    points: tuple[float, ...]
+    """Places as fractions of the thickness."""
+    thickness: str
+    """Path of the thickness."""
+    surface: str
+    """Name of the temperature at the contact."""
+    anchored: bool
+    """Whether that is a state."""
+    states: tuple[str, ...]
+    """Names of the temperatures inside, in order."""
+    far: str = ""
+    """Name of the temperature at the far side where it is given."""
+
+    @property
+    def name(self) -> str:
+        """Name in the dataset."""
+        return f"profile_{self.number}"
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A body that says how it conducts: what it takes to judge whether it may be one lump."""
+
+    number: int
+    body: str
+    is_lump: bool
+    resistance: Expression
+    """L / k [m^2 K/W]."""
+    capacity: Expression
+    """Of the whole body [J/(m^2 K)]."""
+    conductance: Expression | None
+    """Of all paths at the contact [W/(m^2 K)]; None in perfect contact."""
+
+
+@dataclass(frozen=True)
 class System:
     """States, equations and everything that is read off them.
 
@@ -359,7 +399,7 @@ class System:
     @cached_property
     def sliding(self) -> NDArray[np.bool_]:
         """Which states are velocities without inertia, shape (states,)."""
-        return np.array([state.algebraic and state.quantity.unit == "m/s" for state in self.states], dtype=bool)
+        return np.array([state.algebraic and state.name in VELOCITIES for state in self.states], dtype=bool)
 
     @property
     def memory(self) -> tuple[Mode | Register, ...]:
@@ -393,7 +433,7 @@ class System:
 
         Heat contents that depend on temperatures alone are left out: the jump of the rest is what they take up.
         """
-        moving = {state.symbol for state in self.states if state.quantity.unit != "K"}
+        moving = {state.symbol for state in self.states if not state.is_temperature}
         moving |= {self.t, *(item.symbol for item in self.memory)}
         members = symengine.sympify(self.find("E_total").expression).free_symbols
         moved = [member for member in members if self.expand(member).free_symbols & moving]

@@ -73,7 +73,12 @@ class Parameters:
         self, name: str, path: str, spec: Spec, value: float, load: Load | None = None, field: str = ""
     ) -> Expression:
         """A new parameter of a law as a symbol; its name gives way to names that are taken."""
-        return self._append(Parameter(symengine.Symbol(self._unique(name, path)), path, spec, value, load, field))
+        owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
+        candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
+        numbered = (f"{name}_{i}" for i in range(2, 1000))
+        free = next(c for c in (*candidates, *numbered) if c not in self._taken)
+        self._taken.add(free)
+        return self._append(Parameter(symengine.Symbol(free), path, spec, value, load, field))
 
     def constant(self, name: str, path: str, spec: Spec, value: float, internal: bool) -> Expression:
         """A scene-level number under exactly this name."""
@@ -87,14 +92,6 @@ class Parameters:
         path = next(path for path in (parameter.path, *numbered) if path not in taken)
         self.items.append(replace(parameter, path=path))
         return parameter.symbol
-
-    def _unique(self, name: str, path: str) -> str:
-        owners = [part for part in path.replace("-", "_").split(".")[:-1] if part.isidentifier()]
-        candidates = [name, *(f"{name}_{owner}" for owner in reversed(owners))]
-        numbered = (f"{name}_{i}" for i in range(2, 1000))
-        free = next(c for c in (*candidates, *numbered) if c not in self._taken)
-        self._taken.add(free)
-        return free
 
 
 class Variables:

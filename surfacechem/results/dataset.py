@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.model.conductors import Profile
-from surfacechem.model.system import System
+from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
 from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save
 from surfacechem.solve.run import Run, Trajectory

@@ -155,7 +155,7 @@ def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     system = run.model.system
     known = [state.name for state in system.states] + [item.name for item in system.outputs]
     stands_for = {
-        "T": [s.name for s in system.states if s.quantity.unit == "K" and s.name not in system.inside],
+        "T": [s.name for s in system.states if s.is_temperature and s.name not in system.inside],
         "R_c": [name for name in known if name.startswith("R_")],
         "sigma_chem": [f"sigma_{name[2:]}" for name in known if name.startswith("R_")],
     }

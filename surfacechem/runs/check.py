@@ -163,7 +163,7 @@ def _affinity(scene: Scene, start: Start, system: System) -> Iterator[Group]:
 
 def _heat(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
     """Heat paths and dissipation against capacities, over the whole run."""
-    capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.quantity.unit == "K"}
+    capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.is_temperature}
     for profile in system.profiles:
         capacities[profile.surface] = sum(capacities.get(name, 0.0) for name in (profile.surface, *profile.states))
     nodes = {body.name: body.temperature for body in scene.bodies} | {"interface": scene.interface.temperature}

@@ -13,8 +13,7 @@ from surfacechem.results.event_table import entropy_destroyed, event_counts, eve
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
-    from surfacechem.model.conductors import Profile
-    from surfacechem.model.system import System
+    from surfacechem.model.system import Profile, System
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
     from surfacechem.runs.check import Group

@@ -74,10 +74,10 @@ def cause(
     if result.status in (Status.NO_CONSISTENT_STATE, Status.SINGULAR) and algebraic:
         names = " and ".join(state.at_start[0].name for state in algebraic)
         reason = f"no {names} satisfies the balances that have no inertia or capacity"
-        if all(state.quantity.unit == "K" for state in algebraic):
+        if all(state.is_temperature for state in algebraic):
             stable = next(margin for margin in system.margins if margin.name == f"{STABLE}{algebraic[0].name}")
             reason = system.reason(stable, np.nan_to_num(inputs))
-        elif any(state.quantity.unit == "K" for state in algebraic):
+        elif any(state.is_temperature for state in algebraic):
             reason += ": ignition, or sliding that nothing steadies"
         return "stopped", f"{reason} at {where}"
     if (fast := runaway(system.states, result)) is not None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
-from surfacechem.model.springs import stored
+from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
 from surfacechem.solve.branches import Domain
 from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point
@@ -279,9 +279,9 @@ class Jumper:
         (k, w, F, g), (_, w_new, F_new, g_new) = self._far_field(last), self._far_field(before)
         if edge.fold:
             middle = (g_new + g) / 2
-            way = stored(k, w_new, middle) - stored(k, w, middle) + (F_new + F) / 2 * (g_new - g)
+            way = elastic_energy(k, w_new, middle) - elastic_energy(k, w, middle) + (F_new + F) / 2 * (g_new - g)
             return books, dict(zip(self.system.pulls, way.tolist(), strict=True))
-        lift = stored(k, w_new, g) - stored(k, w, g)
+        lift = elastic_energy(k, w_new, g) - elastic_energy(k, w, g)
         books[0] += np.sum(lift) + np.sum((F - F_new) * g)
         accounts = list(self.system.pulls)
         for j, name in enumerate(self.system.given, start=2):

@@ -16,8 +16,8 @@ from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
+from surfacechem.model.checks import check_start
 from surfacechem.model.system import System
-from surfacechem.model.validity import check_start
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status

@@ -22,7 +22,7 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     Heat that grows with temperature meets what leaves twice: in a stable state, and above it in one that any
     disturbance ignites or cools down.
     """
-    guessed = np.array([state.algebraic and state.quantity.unit == "K" for state in system.states])
+    guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
     if not guessed.any():
         return y
     playing = system.in_play(parameters)

@@ -61,14 +61,11 @@ def reactions(build: Build) -> Iterator[Power]:
     load = dead_load(build, laws, pairs)
     found = [_reaction(build, label, law, mu, load, pairs) for label, law in laws.items()]
     rates = _rates(build, found)
-    change = {name: symengine.Integer(0) for name in build.bonding}
     dissipated: dict[str, Expression] = {}
     for reaction in found:
         rate, law = rates[reaction.label], reaction.law
         power = build.stretch * rate * reaction.affinity
         dissipated[reaction.account] = dissipated.get(reaction.account, 0) - power
-        for x, n in law.stoichiometry().items():
-            change[x] += n * rate
         _across_an_open_gap(build, law, rate)
         own_departure(build, reaction.label, law, reaction.affinity)
     for account, power in dissipated.items():
@@ -80,15 +77,24 @@ def reactions(build: Build) -> Iterator[Power]:
         yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*work), "W_f", text)
     for pair in pairs:
         departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
-    for name, bond in build.bonding.items():
-        build.rows.sites(name, change[name], bond.density, build.stretch)
-        formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
-        build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
+    _bond_rows(build, found, rates)
     phi = symengine.Symbol("phi")
     if "phi" not in build.bonding and depends(build.psi, phi):
         M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
         if rate != 0:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
+
+
+def _bond_rows(build: Build, found: Sequence[Reaction], rates: Mapping[str, Expression]) -> None:
+    """Balances of the bonds."""
+    change = {name: symengine.Integer(0) for name in build.bonding}
+    for reaction in found:
+        for x, n in reaction.law.stoichiometry().items():
+            change[x] += n * rates[reaction.label]
+    for name, bond in build.bonding.items():
+        build.rows.sites(name, change[name], bond.density, build.stretch)
+        formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
+        build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
 
 
 def _reaction(

@@ -19,9 +19,8 @@ from surfacechem.expressions import Expression
 from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, Node, Power
 from surfacechem.model.build import BOTH, Build
-from surfacechem.model.conductors import Conductor, Profile
 from surfacechem.model.parts import Slab, Thermal
-from surfacechem.model.system import State
+from surfacechem.model.system import Conductor, Profile, State
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Body, Conduction
 
@@ -175,7 +174,9 @@ def profiles(build: Build) -> tuple[Profile, ...]:
             build.rows.balance(node.name, build.energy_row(node))
             text = f"temperature of {slab.body.name}, point {i} from the contact"
             quantity = Quantity(node.name, "K", text)
-            build.states.append(State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start))
+            build.states.append(
+                State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
+            )
         law, last = slab.law, slab.behind[-1]
         thickness = f"{law.path if law.place else f'bodies.{slab.body.name}.conduction'}.thickness"
         found.append(

@@ -40,12 +40,9 @@ def force(build: Build) -> None:
         if depends(derivative(build.psi, bond.symbol), g_n):
             variable = "f" if name == "phi" else f"f_{name}"
             build.variables.define(variable, partial(_elastic, build, variable, name), "derived", ELASTIC)
-    if build.variables.has("t_n") and not _elastic_phi(build):
+    elastic = {role.variable for role in build.variables.roles if role.by == ELASTIC}
+    if build.variables.has("t_n") and "f" not in elastic:
         build.variables.define("f", partial(_shared, build), "derived", SHARED)
-
-
-def _elastic_phi(build: Build) -> bool:
-    return any(role.variable == "f" and role.by == ELASTIC for role in build.variables.roles)
 
 
 def _elastic(build: Build, variable: str, name: str) -> Expression:

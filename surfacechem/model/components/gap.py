@@ -13,7 +13,7 @@ from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import Equilibrium
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import LENGTH, FarField, Held, far_field, held, read_by_potentials
+from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, read_by_potentials
 from surfacechem.model.constraints.breaking import bonds_left
 from surfacechem.model.constraints.closing import TOUCHING, closing
 from surfacechem.model.system import Margin, State
@@ -30,18 +30,24 @@ def normal_gap(build: Build) -> None:
         return
     meets = not read_by_potentials(build, "g_n")
     if meets and mount.quasi_static:
-        _rigid(build, mount)
+        # An interface that no potential lets open: closed it carries any traction, open it carries none.
+        if not mount.law.k:
+            raise InputError(
+                "a rigid interface under dead load has no opening. Give the mounting a stiffness k.",
+                Place(path=mount.by),
+            )
+        far = far_field(build, mount)
+        pull = far.force(symengine.Integer(0), symengine.Integer(0))
+        closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, _starts_closed(build, pull))
+        build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
+        _carry(build, closed * pull)
     else:
         build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
         build.variables.get("g_n", "the mechanics", "mechanics")
-        if meets and not _ends_before_touch(build):
+        # A law that holds for an open gap only ends the run as the gap closes.
+        if meets and not any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat)):
             _unilateral(build, mount)
     _refuse_idle_restitution(build, mount)
-
-
-def _ends_before_touch(build: Build) -> bool:
-    """Whether a law holds for an open gap only, so that a run ends as it closes."""
-    return any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat))
 
 
 def _refuse_idle_restitution(build: Build, mount: Held) -> None:
@@ -82,19 +88,6 @@ def _free(build: Build) -> Expression:
     """Zero while a rigid contact is closed."""
     closed = build.find_mode("closed")
     return symengine.Integer(1) if closed is None else 1 - closed
-
-
-def _rigid(build: Build, mount: Held) -> None:
-    """An interface that no potential lets open: closed it carries any traction, open it carries none."""
-    if not mount.law.k:
-        raise InputError(
-            "a rigid interface under dead load has no opening. Give the mounting a stiffness k.", Place(path=mount.by)
-        )
-    far = far_field(build, mount)
-    pull = far.force(symengine.Integer(0), symengine.Integer(0))
-    closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, _starts_closed(build, pull))
-    build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
-    _carry(build, closed * pull)
 
 
 def _unilateral(build: Build, mount: Held) -> None:
@@ -168,12 +161,8 @@ def normal_motion(build: Build) -> Iterator[Power]:
     elif mount.damped:
         build.rows.kinematics("g_n", rate)
     else:
-        _quasi_static(build, g, far, t_n)
-
-
-def _quasi_static(build: Build, g: Expression, far: FarField, t_n: Expression) -> None:
-    """Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find."""
-    residual = far.force(g, symengine.Integer(0)) - t_n
-    size = far.size(g) + absolute(t_n)
-    build.rows.equilibrium("g_n", build.total_derivative(residual))
-    build.equilibria.append(Equilibrium("g_n", residual, size))
+        # Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find.
+        residual = far.force(g, symengine.Integer(0)) - t_n
+        size = far.size(g) + absolute(t_n)
+        build.rows.equilibrium("g_n", build.total_derivative(residual))
+        build.equilibria.append(Equilibrium("g_n", residual, size))

@@ -9,7 +9,7 @@ from typing import Any
 
 import symengine
 
-from surfacechem.contracts.terms import Law, Load, Potential, Spec, UnderPressure
+from surfacechem.contracts.terms import Load, Potential, Spec, UnderPressure
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, positive, where
 from surfacechem.model.automaton import Edge
@@ -20,7 +20,7 @@ from surfacechem.model.parts import Bond, Energy
 from surfacechem.model.sliding.formulations import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import NOTHING
+from surfacechem.tolerances import NOTHING, SLACK
 
 LOADABLE = (
     "phi",
@@ -94,7 +94,10 @@ def bonding_variables(build: Build) -> dict[str, Bond]:
         amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
         quantity = Quantity(variable.name, "1", variable.long_name)
         found[variable.name] = _bonding_state(build, quantity, amount, 1.0)
-        _amounts(build, variable.name, amount)
+        # What it amounts to where it is one: N_x per reference area, n_x per current area.
+        by, current = f"interface.{variable.name}", partial(_per_current_area, build, amount)
+        build.variables.define(f"N_{variable.name}", partial(symengine.sympify, amount), "constant", by)
+        build.variables.define(f"n_{variable.name}", current, "derived", by)
     if build.interface.bonds:
         build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
     return found
@@ -107,6 +110,10 @@ def _current_density(build: Build) -> Expression:
     return build.name(VARIABLES["n_c"], nominal / build.stretch)
 
 
+def _per_current_area(build: Build, amount: Expression) -> Expression:
+    return amount / build.stretch
+
+
 def _side_density(build: Build, k: int, density: float) -> Expression:
     """Sites of one body; those of the reference are the reference density itself."""
     sites = build.interface.sites
@@ -115,12 +122,6 @@ def _side_density(build: Build, k: int, density: float) -> Expression:
     spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
     path = f"interface.sites.{build.scene.bodies[k - 1].name}"
     return build.constant(f"N_{k}", path, spec, density) / build.stretch
-
-
-def _amounts(build: Build, name: str, density: Expression) -> None:
-    """What a bonding variable amounts to where it is one: N_x per reference area, n_x per current area."""
-    build.variables.define(f"N_{name}", lambda: density, "constant", f"interface.{name}")
-    build.variables.define(f"n_{name}", lambda: density / build.stretch, "derived", f"interface.{name}")
 
 
 def _derived_phi(build: Build) -> Expression:
@@ -146,7 +147,7 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
 def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     if not build.variables.has("slack"):
         spec = Spec("1", "how far rounding may carry a bonding variable beyond its bounds")
-        number = partial(build.constant, "slack", "run.slack", spec, 1e-6, internal=True)
+        number = partial(build.constant, "slack", "run.slack", spec, SLACK, internal=True)
         build.variables.define("slack", number, "internal", "run")
     slack = build.variables.get("slack", "the bounds")
     spec = Spec("1", f"upper bound of {name}")
@@ -180,7 +181,8 @@ def free_energy(build: Build) -> Energy:
         borne = [
             _per_reference_area(build, b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()
         ]
-        contact = partial(_contact_pressure, build, [_in_modes(build, F) for F in borne])
+        sides = {} if build.find_mode("side") is None else _by_side(symengine.Symbol("g_n"))
+        contact = partial(_contact_pressure, build, [symengine.sympify(F).xreplace(sides) for F in borne])
         build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
         _warn_of_net_pressure(build)
     elif build.variables.has("p"):
@@ -243,17 +245,14 @@ def _warn_of_net_pressure(build: Build) -> None:
     """
     attracting = [law.name() for law in build.interface.potentials if _attracts(law)]
     readers = [*build.interface.frictions, *build.interface.reactions, *build.scene.heat]
-    net = [law.name() for law in readers if _reads_net_pressure(law) and not getattr(law, "t_n_max", 0)]
+    relieved = [law for law in readers if law_reads(law, "p") and not getattr(law, "t_n_max", 0)]
+    net = [law.name() for law in relieved if not (isinstance(law, UnderPressure) and law.pressure == "contact")]
     if attracting and net:
         build.warnings.append(
             f"The attraction of {' and '.join(attracting)} lowers the net pressure, which is read by "
             f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
             "bears give the law `pressure: contact`, or a factor `of: p_contact`."
         )
-
-
-def _reads_net_pressure(law: Law) -> bool:
-    return law_reads(law, "p") and not (isinstance(law, UnderPressure) and law.pressure == "contact")
 
 
 def _per_reference_area(
@@ -280,7 +279,9 @@ def _in_sides(build: Build, given: Expression) -> Expression:
     if "g_n" not in build.motion.gap_rates:
         build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
         return given
-    rests = _rests(build)
+    # Bodies at no gap are in contact, loaded or not, under a dead load: nothing else holds them there.
+    mount = held(build, "n")
+    rests = mount is not None and mount.quasi_static and not mount.law.k
     start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
     build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
     for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
@@ -304,17 +305,6 @@ def _in_sides(build: Build, given: Expression) -> Expression:
 def _by_side(g: Any) -> dict[Any, Any]:
     side = symengine.Symbol("side")
     return {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
-
-
-def _in_modes(build: Build, F: Expression) -> Expression:
-    """An energy with the sides of touch in the mode, where there is one."""
-    return F if build.find_mode("side") is None else symengine.sympify(F).xreplace(_by_side(symengine.Symbol("g_n")))
-
-
-def _rests(build: Build) -> bool:
-    """Whether bodies at no gap are in contact, loaded or not: under a dead load nothing else holds them there."""
-    mount = held(build, "n")
-    return mount is not None and mount.quasi_static and not mount.law.k
 
 
 def _known(build: Build) -> set[Any]:

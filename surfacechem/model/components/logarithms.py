@@ -43,4 +43,4 @@ def logarithmic_state(build: Build) -> None:
     build.named[:0] = [phi, change]
     build.rows.logarithm("phi", symbol, LOGARITHM, build.expanded(build.rows["phi"]))
     state = State(VARIABLES[LOGARITHM], symbol, dot, build.scene.initial[LOGARITHM], 1.0, algebraic=False)
-    build.states = [state if item.name == "phi" else item for item in build.states]
+    build.states = [state if item.symbol == bond.symbol else item for item in build.states]

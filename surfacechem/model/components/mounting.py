@@ -11,9 +11,8 @@ import symengine
 from surfacechem.contracts.terms import Law, Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
-from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
+from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power, elastic_energy
 from surfacechem.model.build import Build
-from surfacechem.model.springs import stored
 from surfacechem.model.system import Pace
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Mounting
@@ -143,7 +142,7 @@ class FarField:
 
     def stored(self, g: Expression) -> Expression:
         """Elastic energy of the bodies [J/m^2]."""
-        return stored(self.k, self.w, g)
+        return elastic_energy(self.k, self.w, g)
 
     def carried(self, g: Expression) -> Expression:
         """Traction that the bodies carry elastically [Pa], the fall of what they store as the gap opens."""
@@ -230,7 +229,13 @@ def far_field(build: Build, mount: Held) -> FarField:
         drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
         force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
         if law.c_b != 0 and given:
-            _refuse_jumps(build, w)
+            load = build.loads.get(w)
+            if load is not None and load.jumps():
+                raise InputError(
+                    f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
+                    "traction. Give the jump a duration, or leave out the damper.",
+                    load.place,
+                )
         w_dot = build.slope_of(w) if needed and given else symengine.Integer(0)
         build.motion.far_fields[mount.axis] = FarField(
             mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
@@ -243,31 +248,17 @@ def _bound(build: Build, mount: Held) -> Mounting | FarField:
     """The parameters of a mounting as symbols; two directions share the mass, or the whole mounting."""
     if mount.beside is None:
         law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
-        _keep_above_zero(build, mount)
+        # What makes a gap inertial, overdamped or quasi-static may change, but not vanish.
+        dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
+        makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
+        path = f"mechanics.{KEYS[mount.axis]}.{makes}"
+        items = build.parameters.items
+        for i, item in enumerate(items):
+            if item.path == path and item.value > 0:
+                items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
         return law
     first = far_field(build, mount.beside)
     if mount.law is mount.beside.law:
         return first
     law = build.variables.bind(mount.law, f"mechanics.{KEYS[mount.axis]}", f"_{mount.axis}")
     return replace(first, k=law.k, c_b=law.c_b, c_g=law.c_g, beta_1=law.beta_1)
-
-
-def _keep_above_zero(build: Build, mount: Held) -> None:
-    """What makes a gap inertial, overdamped or quasi-static may change, but not vanish."""
-    dampers = [name for name in ("c_b", "c_g") if getattr(mount.law, name) > 0]
-    makes = "m" if mount.inertial else "k" if mount.quasi_static else dampers[0] if len(dampers) == 1 else ""
-    path = f"mechanics.{KEYS[mount.axis]}.{makes}"
-    items = build.parameters.items
-    for i, item in enumerate(items):
-        if item.path == path and item.value > 0:
-            items[i] = replace(item, spec=replace(item.spec, above=0.0, at_least=-math.inf))
-
-
-def _refuse_jumps(build: Build, w: str) -> None:
-    load = build.loads.get(w)
-    if load is not None and load.jumps():
-        raise InputError(
-            f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
-            "traction. Give the jump a duration, or leave out the damper.",
-            load.place,
-        )

@@ -60,6 +60,15 @@ class Opposed:
         return "_".join(self.labels)
 
     @property
+    def told(self) -> tuple[Mapping[str, int | float], Expression] | None:
+        """Change of species and of length, of single reactions that the force drives along a distance."""
+        forward, backward = list(self.forward.values()), list(self.backward.values())
+        x_f, x_r = forward[0].distance, backward[0].distance
+        if len(forward) > 1 or len(backward) > 1 or x_f is None or x_r is None:
+            return None
+        return forward[0].stoichiometry(), x_f - x_r
+
+    @property
     def title(self) -> str:
         """The reaction both ways."""
         first = next(iter(self.forward.values()))
@@ -126,28 +135,30 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
             )
             raise InputError(message, idle.place)
         return {}
-    for law in laws.values():
-        # A rate that feels the force while its reverse follows from the affinity, without the work.
-        if law.balanced and law.length is None and "f" in reads(law.statement):
-            if _is_held_at_zero(build):
-                return {}
-            known = "x_on" in dict(law.specs())
-            remedy = (
-                "Give `x_on`, 0 m where formation does not feel the force"
-                if known
-                else "Write it as two reactions with `=>`, each with its own distance to the transition state"
-            )
-            message = (
-                f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the "
-                f"force, but how far a bond lets the load down as it forms is not known. {remedy}."
-            )
-            raise InputError(message, law.place)
+    # A rate that feels the force while its reverse follows from the affinity, without the work.
+    felt = (law for law in laws.values() if law.balanced and law.length is None and "f" in reads(law.statement))
+    unknown = next(felt, None)
+    if unknown is not None:
+        if _is_held_at_zero(build):
+            return {}
+        raise _unknown_length(unknown)
     found = lengths(laws, pairs)
     if not found:
         return {}
     f = build.variables.get("f", "the work of the force")
     load = -f * sum(build.bonding[name].density * build.bonding[name].symbol * found[name] for name in found)
     return {name: derivative(load, build.bonding[name].symbol) / build.bonding[name].density for name in found}
+
+
+def _unknown_length(law: RateLaw) -> InputError:
+    remedy = "Write it as two reactions with `=>`, each with its own distance to the transition state"
+    if "x_on" in dict(law.specs()):
+        remedy = "Give `x_on`, 0 m where formation does not feel the force"
+    return InputError(
+        f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
+        f"how far a bond lets the load down as it forms is not known. {remedy}.",
+        law.place,
+    )
 
 
 def _is_held_at_zero(build: Build) -> bool:
@@ -166,15 +177,8 @@ def by_affinity(law: RateLaw) -> bool:
 
 def lengths(laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """How far a bond of each species lets a load down [m], up to what no pair tells; empty where no pair feels it."""
-    known = [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
-    told = []
-    for pair in pairs:  # of single reactions that the force drives along a distance
-        forward, backward = list(pair.forward.values()), list(pair.backward.values())
-        if len(forward) == len(backward) == 1:
-            x_f, x_r = forward[0].distance, backward[0].distance
-            if x_f is not None and x_r is not None:
-                told.append((forward[0].stoichiometry(), x_f - x_r))
-    known = told + known
+    known = [pair.told for pair in pairs if pair.told is not None]
+    known += [(law.stoichiometry(), law.length) for law in laws.values() if law.length is not None]
     names = list(dict.fromkeys(name for change, _ in known for name in change))
     both_ways = [law.stoichiometry() for law in laws.values() if law.balanced and not by_affinity(law)]
     changes = _matrix(names, [change for change, _ in known])

@@ -83,7 +83,7 @@ def stage_ends(build: Build) -> None:
     stages = build.scene.programme
     if not stages:
         return
-    stage = next(mode.symbol for mode in build.modes if mode.name == "stage")
+    stage = build.find_mode("stage")
     begun = build.register("stage_begun", "time at which the stage began")
     for i, item in enumerate(stages):
         advance = {stage: symengine.Integer(i + 1), begun: build.t}
@@ -92,7 +92,21 @@ def stage_ends(build: Build) -> None:
             length = build.parameters.add("length", f"{_path(item)}.for", spec, item.duration)
             _stage_end(build, item, begun + length - build.t, advance, {stage: (i,)})
         elif item.event:
-            _at_event(build, item, stage, i, begun)
+            # The transition itself moves the programme on.
+            found = [j for j, other in enumerate(build.edges) if other.name.startswith(item.event)]
+            if not found:
+                known = [other.name for other in build.edges]
+                raise InputError(
+                    f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}", item.place
+                )
+            for j in found:
+                other = build.edges[j]
+                modes = {
+                    **other.modes,
+                    stage: where(_during(stage, i), i + 1, other.modes.get(stage, stage)),
+                    begun: where(_during(stage, i), build.t, other.modes.get(begun, begun)),
+                }
+                build.edges[j] = replace(other, modes=modes)
         elif item.variable:
             _at_value(build, item, stage, i, advance)
 
@@ -128,26 +142,10 @@ def _variable(build: Build, item: Stage) -> Expression:
         return build.thermal.nodes[item.variable].T
     if build.variables.has(item.variable):
         return build.variables.get(item.variable, f"the stage {item.name}")
-    if any(named.name == item.variable for named in build.named):
+    if build.is_named(item.variable):
         return symengine.Symbol(item.variable)
     roles = (role.variable for role in build.variables.roles if role.role not in ("constant", "internal"))
     known = {*roles, *build.thermal.nodes} - INTERNAL
     raise InputError(
         f"the stage {item.name} waits for '{item.variable}'.{suggestion(item.variable, known)}", item.place
     )
-
-
-def _at_event(build: Build, item: Stage, stage: Expression, i: int, begun: Expression) -> None:
-    """The transition itself moves the programme on."""
-    found = [j for j, other in enumerate(build.edges) if other.name.startswith(item.event)]
-    if not found:
-        known = [other.name for other in build.edges]
-        raise InputError(f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}", item.place)
-    for j in found:
-        other = build.edges[j]
-        modes = {
-            **other.modes,
-            stage: where(_during(stage, i), i + 1, other.modes.get(stage, stage)),
-            begun: where(_during(stage, i), build.t, other.modes.get(begun, begun)),
-        }
-        build.edges[j] = replace(other, modes=modes)

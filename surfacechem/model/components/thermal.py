@@ -18,6 +18,7 @@ from surfacechem.model.constraints.folds import determinant
 from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.scene import Scene
 from surfacechem.tolerances import NOTHING
 
 _NEWTON = 20
@@ -39,33 +40,39 @@ def temperatures(build: Build) -> Thermal:
     if scene.T_0 is not None:
         spec = Spec("K", "reference temperature", above=0)
         build.variables.define("T_0", partial(build.constant, "T_0", "T_0", spec, scene.T_0), "constant", "T_0")
-    given = [(f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)]
-    if build.interface.temperature is not None:
-        given.append(("T_c", build.interface.temperature, INTERFACE))
-    else:
+    if build.interface.temperature is None:
         mean = partial(_mean_temperature, build)
         build.variables.define("T_c", mean, "derived", "harmonic mean of the bodies, no medium")
-    if scene.surroundings is not None:
-        given.append(("T_a", scene.surroundings, SURROUNDINGS))
     nodes: dict[str, Node] = {}
     members: dict[str, str] = {}
-    for variable, temperature, member in given:
+    for variable, temperature, member in _members_of(scene):
         own_history = isinstance(temperature, Load)
         name = variable if isinstance(temperature, Load) else temperature
-        place = Place(path=f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature")
+        message = ""
         if own_history and name in nodes:
             message = f"{name} has two roles: the temperature of {member}, and a node of another member."
-            raise InputError(message, place)
+        elif name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
+            message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
+        if message:
+            path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
+            raise InputError(message, path=path)
         if name not in nodes:
-            if name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
-                message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
-                raise InputError(message, place)
             load = temperature if isinstance(temperature, Load) else scene.loading.get(name)
             nodes[name] = _node(build, name, load)
         node, members[member] = nodes[name], name
         role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
         build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
     return Thermal(nodes, members)
+
+
+def _members_of(scene: Scene) -> Iterator[tuple[str, str | Load, str]]:
+    """Variable, temperature and name of each member that has one."""
+    for k, body in enumerate(scene.bodies, start=1):
+        yield f"T_{k}", body.temperature, body.name
+    if scene.interface.temperature is not None:
+        yield "T_c", scene.interface.temperature, INTERFACE
+    if scene.surroundings is not None:
+        yield "T_a", scene.surroundings, SURROUNDINGS
 
 
 def _node(build: Build, name: str, load: Load | None) -> Node:
@@ -164,7 +171,7 @@ def _temperature_state(build: Build, node: Node) -> None:
             path=f"initial.{node.name}",
         )
     quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
-    build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic))
+    build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic, is_temperature=True))
 
 
 def _initial(build: Build, node: Node) -> float:
