@@ -195,6 +195,11 @@ class RateLaw(Law):
         return None
 
     @property
+    def lacks_length(self) -> bool:
+        """Whether the rate feels a force that the affinity, from which its reverse follows, does not know."""
+        return self.balanced and self.length is None and "f" in reads(self.statement)
+
+    @property
     def taken(self) -> tuple[Callable[..., Expression], Callable[..., Expression]] | None:
         """Enthalpy and Gibbs energy [J] that one reaction takes from what is beside the interface; None where nothing.
 

@@ -5,7 +5,7 @@ Beside them stand the totals that the ledger must explain, who takes the heat of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -158,7 +158,13 @@ def _sum(terms: list[Expression]) -> Expression:
 
 def _fluxes(build: Build) -> None:
     flows = list(passages(build))
-    fluxes = [_flux(build, k, body, flows) for k, body in enumerate(build.scene.bodies, start=1)]
+    fluxes = []
+    for k, body in enumerate(build.scene.bodies, start=1):
+        flux, booked = _flux(build, k, body, flows)
+        fluxes.append(flux)
+        if booked is not None and booked != 0:
+            account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
+            build.ledger.append(Account(account, booked, "heat"))
     known = [flux for flux in fluxes if flux is not None]
     if all(flux == 0 for flux in known):
         return
@@ -173,20 +179,23 @@ def _fluxes(build: Build) -> None:
         build.name(Quantity("q_t", "W/m^2", text, tag="e:qt_def"), (q_1 - q_2) / 2)
 
 
-def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> Expression | None:
-    """Heat into a body from the interface: stated by its laws, or recovered from a balance where it has none.
+def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expression, Expression] | tuple[None, None]:
+    """Heat into a body from the interface, and how it is booked.
+
+    It is stated by its laws, or recovered from a balance where it has none; of a temperature that evolves the balance
+    is booked.
 
     Two bodies that share a prescribed temperature leave open which of them the heat goes into.
     """
     node = build.thermal.node_of[body.name]
-    sharing = [name for name, other in build.thermal.node_of.items() if other is node and name != body.name]
+    sharing = build.thermal.sharing(body.name)
     channels, others = _received(build, body, flows)
     if len(channels) > 1 and not sharing:
         channels = {name: _part(build, k, body, name, heat) for name, heat in channels.items()}
     flux = symengine.Add(*channels.values())
     if sharing and node.prescribed:
         if sharing != [INTERFACE]:
-            return None
+            return None, None
         moved = balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
         flux = flux + sum(_arriving(INTERFACE, flows)) - moved
     elif body.name in node.energies:
@@ -194,12 +203,10 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> Expression 
         recovered = rate - symengine.Add(*others)
         flux = recovered if sharing else flux
         if not node.prescribed:
-            _book_heat(build, k, body, recovered)
             if sharing and not build.thermal.slabs:
                 _by_source(build, k, body, flux)
-            return flux
-    _book_heat(build, k, body, flux)
-    return flux
+            return flux, recovered
+    return flux, flux
 
 
 def _received(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str, Expression], list[Expression]]:
@@ -267,12 +274,6 @@ def _heat_of_reaction(build: Build) -> Expression:
     return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
 
 
-def _book_heat(build: Build, k: int, body: Body, flux: Expression) -> None:
-    if flux != 0:
-        account = Quantity(f"heat_into_{k}", "J/m^2", f"heat received by {body.name} from the interface")
-        build.ledger.append(Account(account, flux, "heat"))
-
-
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
     if not build.edges:
@@ -317,6 +318,13 @@ def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
     )
 
 
+def _is_one_constant(build: Build, names: Collection[str]) -> bool:
+    """Whether prescribed temperatures are the same and stay as they are."""
+    loads = [build.loads[name] for name in names]
+    starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
+    return len(starts) == 1 and not any(load.jumps() for load in loads) and not any(map(build.slope_of, names))
+
+
 def regime(build: Build) -> str:
     """The thermal regime in words."""
     thermal = build.thermal
@@ -331,10 +339,7 @@ def regime(build: Build) -> str:
         return "medium without temperature" if between else "no medium"
     names = {*nodes, centre}
     if all(thermal.nodes[name].prescribed for name in names):
-        loads = [build.loads[name] for name in names]
-        starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
-        moves = any(build.slope_of(name) != 0 for name in names) or any(load.jumps() for load in loads)
-        return "isothermal" if len(starts) == 1 and not moves else "prescribed temperatures"
+        return "isothermal" if _is_one_constant(build, names) else "prescribed temperatures"
     if len(names) == 1:
         return "perfect contact"
     return "one-sided perfect contact" if centre in nodes else "separate interface temperature"

@@ -75,6 +75,10 @@ class Thermal:
             {node.name: node for slab in self.slabs.values() for node in slab.behind} | dict(self.nodes) | self.node_of
         )
 
+    def sharing(self, member: str) -> list[str]:
+        """The other members that have the same temperature."""
+        return [other for other, name in self.members.items() if name == self.members[member] and other != member]
+
     def volume(self, body: str) -> dict[str, Expression]:
         """Places in a body with their parts of its volume; the one at the contact is the first."""
         if body not in self.slabs:

@@ -51,11 +51,9 @@ class Reaction:
 def reactions(build: Build) -> Iterator[Power]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
-    laws = {
-        build.label(law): build.variables.bind(law, f"interface.bonding.{law.name()}")
-        for law in build.interface.reactions
-    }
+    laws = {}
     for law in build.interface.reactions:
+        laws[build.label(law)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
         build.law_ranges(law)
     pairs = opposed(laws)
     load = dead_load(build, laws, pairs)

@@ -127,17 +127,10 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
     """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
     shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
     if not (driven(build, "f") or (shares and driven(build, "t_n"))):
-        idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
-        if idle is not None:
-            message = (
-                f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to "
-                "the equilibrium; leave it out."
-            )
-            raise InputError(message, idle.place)
+        _refuse_idle_length(laws.values())
         return {}
     # A rate that feels the force while its reverse follows from the affinity, without the work.
-    felt = (law for law in laws.values() if law.balanced and law.length is None and "f" in reads(law.statement))
-    unknown = next(felt, None)
+    unknown = next((law for law in laws.values() if law.lacks_length), None)
     if unknown is not None:
         if _is_held_at_zero(build):
             return {}
@@ -145,9 +138,19 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
     found = lengths(laws, pairs)
     if not found:
         return {}
-    f = build.variables.get("f", "the work of the force")
-    load = -f * sum(build.bonding[name].density * build.bonding[name].symbol * found[name] for name in found)
-    return {name: derivative(load, build.bonding[name].symbol) / build.bonding[name].density for name in found}
+    f, bonds = build.variables.get("f", "the work of the force"), {name: build.bonding[name] for name in found}
+    load = -f * sum(bond.density * bond.symbol * found[name] for name, bond in bonds.items())
+    return {name: derivative(load, bond.symbol) / bond.density for name, bond in bonds.items()}
+
+
+def _refuse_idle_length(laws: Iterable[RateLaw]) -> None:
+    idle = next((law for law in laws if law.length is not None and law.log_ratio is None), None)
+    if idle is not None:
+        message = (
+            f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to the "
+            "equilibrium; leave it out."
+        )
+        raise InputError(message, idle.place)
 
 
 def _unknown_length(law: RateLaw) -> InputError:

@@ -45,11 +45,9 @@ def temperatures(build: Build) -> Thermal:
         build.variables.define("T_c", mean, "derived", "harmonic mean of the bodies, no medium")
     nodes: dict[str, Node] = {}
     members: dict[str, str] = {}
-    for variable, temperature, member in _members_of(scene):
-        own_history = isinstance(temperature, Load)
-        name = variable if isinstance(temperature, Load) else temperature
+    for variable, name, own, member in _members_of(scene):
         message = ""
-        if own_history and name in nodes:
+        if own is not None and name in nodes:
             message = f"{name} has two roles: the temperature of {member}, and a node of another member."
         elif name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
             message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
@@ -57,22 +55,23 @@ def temperatures(build: Build) -> Thermal:
             path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
             raise InputError(message, path=path)
         if name not in nodes:
-            load = temperature if isinstance(temperature, Load) else scene.loading.get(name)
-            nodes[name] = _node(build, name, load)
+            nodes[name] = _node(build, name, own or scene.loading.get(name))
         node, members[member] = nodes[name], name
         role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
         build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
     return Thermal(nodes, members)
 
 
-def _members_of(scene: Scene) -> Iterator[tuple[str, str | Load, str]]:
-    """Variable, temperature and name of each member that has one."""
-    for k, body in enumerate(scene.bodies, start=1):
-        yield f"T_{k}", body.temperature, body.name
-    if scene.interface.temperature is not None:
-        yield "T_c", scene.interface.temperature, INTERFACE
-    if scene.surroundings is not None:
-        yield "T_a", scene.surroundings, SURROUNDINGS
+def _members_of(scene: Scene) -> Iterator[tuple[str, str, Load | None, str]]:
+    """Variable, node and own history of the temperature of each member that has one, and the member."""
+    given = [(f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)]
+    given.append(("T_c", scene.interface.temperature, INTERFACE))
+    given.append(("T_a", scene.surroundings, SURROUNDINGS))
+    for variable, temperature, member in given:
+        if isinstance(temperature, Load):
+            yield variable, variable, temperature, member
+        elif temperature is not None:
+            yield variable, temperature, None, member
 
 
 def _node(build: Build, name: str, load: Load | None) -> Node:
