@@ -64,9 +64,11 @@ def temperatures(build: Build) -> Thermal:
 
 def _members_of(scene: Scene) -> Iterator[tuple[str, str, Load | None, str]]:
     """Variable, node and own history of the temperature of each member that has one, and the member."""
-    given = [(f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)]
-    given.append(("T_c", scene.interface.temperature, INTERFACE))
-    given.append(("T_a", scene.surroundings, SURROUNDINGS))
+    given: list[tuple[str, str | Load | None, str]] = [
+        *((f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)),
+        ("T_c", scene.interface.temperature, INTERFACE),
+        ("T_a", scene.surroundings, SURROUNDINGS),
+    ]
     for variable, temperature, member in given:
         if isinstance(temperature, Load):
             yield variable, variable, temperature, member
