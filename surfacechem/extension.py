@@ -16,7 +16,6 @@ from typing import Any, ClassVar
 
 import cantera
 
-from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.keys import REACTION
@@ -33,6 +32,9 @@ __all__ = ["LoadedInterface"]
 
 MOLECULAR = KILO * AVOGADRO
 """Molecules in a kmol."""
+
+PER_KMOL = {"J/mol": KILO, "J": MOLECULAR}
+"""Energies that may be per amount, and how many make one per kmol."""
 
 LARGEST = 700.0
 """Affinity over k_B T above which its exponential counts as this one's."""
@@ -128,15 +130,27 @@ class LoadedRate(cantera.ExtensibleRate):
             return
         specs = dict(self.law.specs())
         for key, name in self.law.own_keys().items():
-            if not self.bound.is_default(name):
-                _put(node, key, getattr(self.bound, name), specs[name])
+            value, unit = getattr(self.bound, name), specs[name].unit
+            if self.bound.is_default(name):
+                continue
+            if unit == "1":
+                node[key] = value
+            elif unit in PER_KMOL:
+                node.set_activation_energy(key, value * PER_KMOL[unit], "J/kmol")
+            else:
+                node.set_quantity(key, value, unit)
         constant = cantera.AnyMap()
         constant.set_quantity("A", self.bound.A, self.units)
         constant["b"] = self.bound.b
         constant.set_activation_energy("Ea", self.bound.Ea * KILO, "J/kmol")
         node["rate-constant"] = constant
-        if self.bound.coverage:
-            node["coverage-dependencies"] = {term.variable: _coverage_entry(term) for term in self.bound.coverage}
+        entries = {term.variable: cantera.AnyMap() for term in self.bound.coverage}
+        for term in self.bound.coverage:
+            entry = entries[term.variable]
+            entry["a"], entry["m"] = term.a, term.m
+            entry["E"] = [f"{energy!r} J/mol" for energy in term.E]  # a list gets no units from Cantera
+        if entries:
+            node["coverage-dependencies"] = entries
 
     def validate(self, equation: str, surface: Any) -> None:
         """Refuse what is wrong with the entry, and what Cantera would make of it."""
@@ -164,13 +178,8 @@ class LoadedRate(cantera.ExtensibleRate):
             if name not in values:
                 values[name] = self._load(data, name)
         found = float(self.bound.coefficient(values, 0.0))
-        self._warn_of_cap(found, data.T)
-        return found
-
-    def _warn_of_cap(self, coefficient: float, T: float) -> None:
-        """Say once that an exponent was too large to be taken literally."""
-        assert self.bound is not None
-        if not self.capped and coefficient > max(self.bound.A * T**self.bound.b, 1.0) * math.exp(EXPONENT_CAP):
+        largest = max(self.bound.A * data.T**self.bound.b, 1.0) * math.exp(EXPONENT_CAP)
+        if not self.capped and found > largest:
             self.capped = True
             warnings.warn(
                 f"reaction {self.bound.equation}: the logarithm of its rate of type {self.kind} is above "
@@ -178,6 +187,7 @@ class LoadedRate(cantera.ExtensibleRate):
                 RuntimeWarning,
                 stacklevel=2,
             )
+        return found
 
     def _load(self, data: Surroundings, name: str) -> float:
         value = data.read(name, self.kind)
@@ -237,13 +247,6 @@ def _coverage_term(units: Any, name: str, entry: Any) -> CoverageTerm:
     return CoverageTerm(name, float(entry["a"]), float(entry["m"]), E)
 
 
-def _coverage_entry(term: CoverageTerm) -> Any:
-    entry = cantera.AnyMap()
-    entry["a"], entry["m"] = term.a, term.m
-    entry["E"] = [f"{energy!r} J/mol" for energy in term.E]  # a list gets no units from Cantera
-    return entry
-
-
 def _number(units: Any, key: str, value: Any, unit: str) -> float:
     try:
         return converted(units, value, unit)
@@ -251,25 +254,9 @@ def _number(units: Any, key: str, value: Any, unit: str) -> float:
         raise InputError(f"{key} = {value} is not a quantity in {unit}.") from None
 
 
-def _put(node: Any, key: str, value: float, spec: Spec) -> None:
-    if spec.unit == "1":
-        node[key] = value
-    elif spec.unit == "J/mol":
-        node.set_activation_energy(key, value * KILO, "J/kmol")
-    elif spec.unit == "J":
-        node.set_activation_energy(key, value * MOLECULAR, "J/kmol")
-    else:
-        node.set_quantity(key, value, spec.unit)
-
-
-def _register() -> None:
-    """A rate of Cantera for every rate type that it does not know itself."""
-    for kind, law in kinds().items():
-        if law.native:
-            continue
-        rate, data = (AffinityRate, ByAffinity) if issubclass(law, AffinityReaction) else (LoadedRate, Surroundings)
-        made = type(law.__name__, (rate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
-        globals()[law.__name__] = cantera.extension(name=kind, data=data)(made)
-
-
-_register()
+for _kind, _law in kinds().items():  # a rate of Cantera for every rate type that it does not know itself
+    if not _law.native:
+        _by_affinity = issubclass(_law, AffinityReaction)
+        _rate, _data = (AffinityRate, ByAffinity) if _by_affinity else (LoadedRate, Surroundings)
+        _made = type(_law.__name__, (_rate,), {"law": _law, "__module__": __name__, "__doc__": _law.__doc__})
+        globals()[_law.__name__] = cantera.extension(name=_kind, data=_data)(_made)

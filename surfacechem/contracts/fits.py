@@ -74,14 +74,10 @@ def divided(pieces: Sequence[Piece], count: int) -> tuple[Piece, ...]:
         raise NoFitError(f"{len(found)} polynomials are needed {span}, {count} were at the start.")
     while len(found) < count:
         widest = max(range(len(found)), key=lambda i: found[i].high - found[i].low)
-        found[widest : widest + 1] = _halves(found[widest])
+        piece = found[widest]
+        middle = (piece.low + piece.high) / 2
+        found[widest : widest + 1] = [_moved(piece, piece.low, middle), _moved(piece, middle, piece.high)]
     return tuple(found)
-
-
-def _halves(piece: Piece) -> list[Piece]:
-    """The same polynomial in two pieces."""
-    middle = (piece.low + piece.high) / 2
-    return [_moved(piece, piece.low, middle), _moved(piece, middle, piece.high)]
 
 
 def _moved(piece: Piece, low: float, high: float) -> Piece:

@@ -18,8 +18,9 @@ Source: Cantera's CoverageDependentSurfPhase; Maxwell's relation of a potential 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from surfacechem.expressions import Expression, log, where
@@ -39,7 +40,7 @@ class EnergyCurve:
 
     ``pieces`` holds for each the coverage at which it begins and its coefficients of the powers of the coverage.
 
-    >>> Curve.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), Curve.polynomial([2.0, 1.0]).integral(1.0)
+    >>> EnergyCurve.through([0.0, 0.5, 1.0], [0.0, 1.0, 3.0])(0.75), EnergyCurve.polynomial([2.0, 1.0]).integral(1.0)
     (2.0, 1.3333333333333333)
     """
 
@@ -71,25 +72,21 @@ class EnergyCurve:
 
     def __call__(self, theta: Expression) -> Expression:
         """Value at a coverage."""
-        return self._pieced(theta, [(start, _power_sum(c, theta)) for start, c in self.pieces])
-
-    def integral(self, theta: Expression) -> Expression:
-        """Integral from no coverage to theta."""
-        rows: list[tuple[float, Expression]] = []
-        past: Expression = 0.0
-        for k, (start, c) in enumerate(self.pieces):
-            whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
-            rows.append((start, past - _power_sum(whole, start) + _power_sum(whole, theta)))
-            if k + 1 < len(self.pieces):
-                past = past + _power_sum(whole, self.pieces[k + 1][0]) - _power_sum(whole, start)
-        return self._pieced(theta, rows)
-
-    @staticmethod
-    def _pieced(theta: Expression, rows: list[tuple[float, Expression]]) -> Expression:
+        rows = [(start, _power_sum(c, theta)) for start, c in self.pieces]
         value: Expression = rows[0][1] if rows else 0.0
         for start, row in rows[1:]:
             value = where(theta >= start, row, value)
         return value
+
+    @property
+    def integral(self) -> EnergyCurve:
+        """The curve of its integral from no coverage on."""
+        pieces: list[tuple[float, tuple[float, ...]]] = []
+        for start, c in self.pieces:
+            whole = (0.0, *(value / (power + 1) for power, value in enumerate(c)))
+            past = _power_sum(pieces[-1][1], start) if pieces else 0.0
+            pieces.append((start, (past - _power_sum(whole, start), *whole[1:])))
+        return EnergyCurve(tuple(pieces))
 
 
 def _power_sum(coefficients: Sequence[float], theta: Expression) -> Expression:
@@ -172,51 +169,34 @@ def interactions(source: Source, entry: Any, variables: Mapping[str, str]) -> tu
     """How the thermo of a species depends on coverages, whose names ``variables`` gives by species."""
     found = []
     for name, node in (entry.get(KEY) or {}).items():
-        reader = _Reader(source, entry, node)
-        curves = (reader.curve("enthalpy", "enthalpies"), reader.curve("entropy", "entropies"))
-        a, b = (reader.number(key) if key in node else 0.0 for key in CAPACITY)
-        found.append(Interaction(str(name), variables[str(name)], *curves, a, b))
+        read = partial(_numbers, source, entry, node)
+        h, s = _curve(node, read, "enthalpy", "enthalpies"), _curve(node, read, "entropy", "entropies")
+        a, b = (read(key)[0] if key in node else 0.0 for key in CAPACITY)
+        found.append(Interaction(str(name), variables[str(name)], h, s, a, b))
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """The dependence on one species, in J, mol and K."""
+def _numbers(source: Source, entry: Any, node: Any, key: str) -> list[float]:
+    """One value or several, in J, mol and K."""
+    import cantera
 
-    source: Source
-    entry: Any
-    node: Any
+    value, unit = node[key], "J/kmol" if key.startswith("enthalp") else "J/kmol/K"
+    declared: Any = {**source.defaults(entry), **(node.get("units") or {})}
+    units = cantera.UnitSystem(declared)
+    found = [float(units.convert_to(x, unit)) / KILO for x in (value if isinstance(value, list) else [value])]
+    if not all(map(math.isfinite, found)):
+        raise source.error(f"species {entry['name']}: {KEY}: {key} must be finite, got {value}.", node, key)
+    return found
 
-    def numbers(self, key: str) -> list[float]:
-        """One value or several."""
-        import cantera
 
-        value, unit = self.node[key], "J/kmol" if key.startswith("enthalp") else "J/kmol/K"
-        declared: Any = {**self.source.defaults(self.entry), **(self.node.get("units") or {})}
-        units = cantera.UnitSystem(declared)
-        found = [float(units.convert_to(x, unit)) / KILO for x in (value if isinstance(value, list) else [value])]
-        if not all(map(math.isfinite, found)):
-            message = f"species {self.entry['name']}: {KEY}: {key} must be finite, got {value}."
-            raise self.source.error(message, self.node, key)
-        return found
-
-    def number(self, key: str) -> float:
-        """One value."""
-        return self.numbers(key)[0]
-
-    def curve(self, kind: str, many: str) -> EnergyCurve:
-        """The enthalpy or the entropy over the coverage."""
-        node = self.node
-        if kind in node:
-            return EnergyCurve.polynomial(self.numbers(kind))
-        if f"{kind}-coefficients" in node:
-            return EnergyCurve.polynomial(self.numbers(f"{kind}-coefficients"))
-        if many in node:
-            return EnergyCurve.through([float(x) for x in node[f"{kind}-coverages"]], self.numbers(many))
-        if f"{kind}-change" in node:
-            knot = float(node[f"{kind}-change"])
-            middle = self.number(f"{kind}-low") * knot
-            return EnergyCurve.through(
-                [0.0, knot, 1.0], [0.0, middle, middle + (1 - knot) * self.number(f"{kind}-high")]
-            )
-        return EnergyCurve()
+def _curve(node: Any, read: Callable[[str], list[float]], kind: str, many: str) -> EnergyCurve:
+    """The enthalpy or the entropy over the coverage."""
+    for key in (kind, f"{kind}-coefficients"):
+        if key in node:
+            return EnergyCurve.polynomial(read(key))
+    if many in node:
+        return EnergyCurve.through([float(x) for x in node[f"{kind}-coverages"]], read(many))
+    if f"{kind}-change" in node:
+        knot, low, high = float(node[f"{kind}-change"]), read(f"{kind}-low")[0], read(f"{kind}-high")[0]
+        return EnergyCurve.through([0.0, knot, 1.0], [0.0, low * knot, low * knot + (1 - knot) * high])
+    return EnergyCurve()

@@ -135,7 +135,7 @@ class ThermoRange:
 class StandardGibbs:
     """Standard molar Gibbs energy over R [K] as a function of temperature, from one range to the next.
 
-    >>> water = StandardGibbs((Piece(1e9, ConstantCp(h0=-8314.462618, s0=16.628925236)),))
+    >>> water = StandardGibbs((ThermoRange(1e9, ConstantCp(h0=-8314.462618, s0=16.628925236)),))
     >>> round(water(300.0), 6)
     -1600.0
     """
