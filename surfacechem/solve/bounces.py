@@ -14,6 +14,7 @@ from surfacechem.compile.program import Function, compile_function
 from surfacechem.model.system import System
 from surfacechem.solve.contract import Result, Status
 from surfacechem.solve.jumps import Jump
+from surfacechem.tolerances import PICOMETRE
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,6 @@ MANY = 1000
 ENDLESS = (
     "the number of steps allowed was used up by rebounds; with a smaller coefficient of restitution they would end"
 )
-
-UNSEEN = 1e-12
-"""Overlap [m] that tells of an impact which a method has passed: beyond rounding, and far below the size of an atom."""
 
 MISSED = "the method has not seen the gap close; radau does, or a tighter tolerance"
 
@@ -74,11 +72,11 @@ class Rebounds:
         return own
 
     def missed(self, result: Result) -> bool:
-        """Whether a stretch has ended beyond what it should have ended at."""
+        """Whether an arc has ended beyond what it should have ended at, by more than has a meaning for bodies."""
         ended = result.events.index if result.status is Status.EVENT else ()
         playing = result.problem.in_play
         found = [j for j in self.margins if playing is None or playing[j]] if len(result.margins) else []
-        return any(result.margins[j] < -UNSEEN and j not in ended for j in found)
+        return any(result.margins[j] < -PICOMETRE and j not in ended for j in found)
 
     def _aloft(self, start: float) -> float:
         """Time [s] for which what has just rebounded stays away."""

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from surfacechem.compile.preparing import PREPARING
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.model.system import System
+from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, PICOMETRE, TINY
 
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
 
-CLOSEST: dict[str, Any] = {"xtol": 1e-300, "rtol": 8.9e-16, "maxiter": 300, "disp": False}
+CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": DIGITS, "maxiter": 300, "disp": False}
 """How closely a root of the tractions is found: to rounding."""
 
 FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
@@ -30,9 +31,6 @@ FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
 
 REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
 """How far a search goes, relative to the gap."""
-
-SMALLEST_GAP = 1e-12
-"""Gap [m] below which the search starts as if from this one."""
 
 
 def march(driving: Curve, start: float, direction: float, noise: Curve) -> float | None:
@@ -48,7 +46,7 @@ def march(driving: Curve, start: float, direction: float, noise: Curve) -> float
 
 def steps_ahead(start: float, direction: float) -> Array:
     """Gaps in ever longer steps from a gap in a direction."""
-    size = FIRST * max(abs(start), SMALLEST_GAP)
+    size = FIRST * max(abs(start), PICOMETRE)
     return np.asarray(start + direction * size * (GROWTH ** np.arange(MARCH) - 1) / (GROWTH - 1))
 
 
@@ -88,32 +86,27 @@ Indices = NDArray[np.intp]
 Field = Callable[[Array], Array]
 """Driving tractions at ways of the gaps from where they begin, both of shape (points, gaps)."""
 
-RTOL, BEGINS = 1e-4, 1e-3
+RTOL, BEGINS = 1e-4, NEGLIGIBLE
 """Tolerance of the motion, relative to the way so far; it begins within this part of its first push."""
 
 STEPS = 20_000
 """Steps after which motion does not come to rest."""
 
-NUDGE = float(np.finfo(float).eps) ** (1 / 3)
-"""Part of a gap by which it is moved either way to see how its balance changes: the error of a central difference,
-NUDGE^2 of its curvature and a rounding over NUDGE, is then the least, two thirds of the digits."""
 
-KICK = 10 * NUDGE
+KICK = 10 * CBRT_EPS
 """Part of a gap with which motion begins from an unstable balance at least: the difference taken there does not reach
 back to the balance, where laws may have a kink. Ten times is a choice; motion would also leave from twice."""
 
-NEAR, NEWTON = 1e-3, 12
+NEAR, NEWTON = NEGLIGIBLE, 12
 """Part of the way within which Newton's method takes the last step to rest, and how many steps that may have."""
-
-DIGITS = 8 * float(np.finfo(float).eps)
 
 
 def stiffness(driving: Field, scale: Array, at: Array) -> Array:
     """Change of each driving traction along each gap, shape (gaps, gaps)."""
-    nudges = np.diag(NUDGE * scale)
+    nudges = np.diag(CBRT_EPS * scale)
     values = driving(np.vstack([at + nudges, at - nudges]))
     ahead, behind = np.split(values, 2)
-    return np.asarray(((ahead - behind) / (2 * NUDGE * scale)[:, None]).T)
+    return np.asarray(((ahead - behind) / (2 * CBRT_EPS * scale)[:, None]).T)
 
 
 def unstable_way(change: Array) -> Array | None:
@@ -198,12 +191,12 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
             break
         at, last = at.copy(), size
         at[free] += step
-        if size <= DIGITS:
+        if size <= 2 * DIGITS:
             break
     if last > NEAR * RTOL:
         return None
     # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
-    borne = np.abs(change) @ scale[free] * max(last, DIGITS)
+    borne = np.abs(change) @ scale[free] * max(last, 2 * DIGITS)
     return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None
 
 

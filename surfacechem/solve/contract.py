@@ -138,10 +138,13 @@ class Problem:
             "rtol must lie in (0, 1) and atol must not be negative.",
         )
 
-    def with_program(self, program: Program | None) -> "Problem":
-        """The same with other machine code; without any it is no more than data, as a pickle needs it."""
+    def changed(self, **changes: object) -> "Problem":
+        """The problem with other fields, over an arc of it or as a pickle needs it; what was checked is not checked
+        again.
+        """
         other = copy.copy(self)
-        object.__setattr__(other, "program", program)
+        for name, value in changes.items():
+            object.__setattr__(other, name, value)
         return other
 
     def _require(self, condition: bool, message: str) -> None:

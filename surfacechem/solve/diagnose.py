@@ -12,8 +12,9 @@ from surfacechem.compile.program import Program
 from surfacechem.model.system import STABLE, Margin, Pace, State, System
 from surfacechem.solve.contract import REASONS, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
+from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SOLVED
 
-FEW, SHARP = 100.0, 1e-12
+FEW, SHARP = 100.0, ROUNDING
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
 
 
@@ -36,14 +37,14 @@ def too_fast(system: System, result: Result, values: Mapping[str, float]) -> str
 
 Array = NDArray[np.float64]
 
-STALLED = 1e-3
+STALLED = NEGLIGIBLE
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
 left to close, explains why a run cannot go on."""
 
 GONE = 1e-30
 """A margin that has shrunk to this part of its largest value is closed for all that can be told, at any speed."""
 
-RESOLVED = 1e-14
+RESOLVED = SOLVED
 """Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
 
 RUNAWAY = 1e-9

@@ -7,16 +7,17 @@ the arc ends, the instant carries out what is due, and the next arc starts from 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
-from surfacechem.solve.arcs import Part, across_kink, changed, merged
 from surfacechem.solve.bounces import ENDLESS, MANY, MISSED
-from surfacechem.solve.contract import Problem, Result, Solver, Status
-from surfacechem.solve.equilibria import Point
+from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, Status
+from surfacechem.solve.equilibria import ATOM, Point
 from surfacechem.solve.instant import BRIEF, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
 from surfacechem.solve.roundoff import solve
@@ -30,13 +31,28 @@ RENEWALS = 4
 """Number of brief arcs that time could not resolve that may follow each other."""
 
 
+@dataclass(frozen=True)
+class Arc:
+    """A flow between events as it was solved, in its own time and with its own ledger."""
+
+    result: Result
+    start: Point
+    end: float
+    """Time reached [s]."""
+    status: Status
+    times: Array
+    """Output times reached [s]."""
+    booked: Array
+    """Ledger at its start."""
+
+
 class Hybrid:
     """One run of a system with edges."""
 
     def __init__(self, system: System, method: Solver, jumper: Jumper, problem: Problem, first: int) -> None:
         self.system, self.method, self.jumper, self.problem = system, method, jumper, problem
         self.instant = Instant(system, jumper, problem, first)
-        self.parts: list[Part] = []
+        self.arcs: list[Arc] = []
         self.exchanged = np.zeros(problem.program.n_ledger)
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
         self._steps = self._written = 0
@@ -58,38 +74,40 @@ class Hybrid:
             y, modes = ended.y, ended.parameters[columns]
         if instant.status is Status.MAX_STEPS and instant.rebounds.count > MANY:
             instant.status, instant.reason = Status.FAILED, ENDLESS
-        reached = self.parts[-1].end if self.parts else float(problem.segments[0])
+        reached = self.arcs[-1].end if self.arcs else float(problem.segments[0])
         end = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
-        return merged(problem, self.parts, instant.status, end, instant.booked)
+        if not self.arcs:
+            return unbegun(problem, instant.status, end, instant.booked)
+        return merged(problem, self.arcs, instant.status, end, instant.booked)
 
     def _segment(self, point: Point, end: float) -> Point | None:
         """From a point to the end of its load segment; None where the run ends before."""
         while point.t < end:
             started = self.instant.resolve(point)
-            part = self._flow(started, end) if started is not None else None
-            if started is None or part is None:
+            arc = self._flow(started, end) if started is not None else None
+            if started is None or arc is None:
                 return None
-            point = Point(part.end, part.result.y, part.result.ydot, started.parameters)
-            if part.status is Status.FINISHED:
+            point = Point(arc.end, arc.result.y, arc.result.ydot, started.parameters)
+            if arc.status is Status.FINISHED:
                 return point
-            self._renewed = self._renewed + 1 if part.result.t < BRIEF * self.problem.segments[-1] else 0
-            index = self._edge(part, point)
+            self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
+            index = self._edge(arc, point)
             if index is not None:
                 jumped = self.instant.apply(index, self.jumper.equilibria.in_time(index, point, end), point)
                 if jumped is None:
                     return None
                 point = jumped
                 continue
-            across = across_kink(self.system.states, point) if part.status in LOST else None
+            across = self._across_touch(point) if arc.status in LOST else None
             # What time could not resolve any more goes on in a time of its own.
-            renews = part.status is Status.STEP_UNDERFLOW and part.result.t > 0 and self._renewed < RENEWALS
+            renews = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS
             if across is None and not renews:
-                self.instant.status = part.status
+                self.instant.status = arc.status
                 return None
             point = across or point
         return point
 
-    def _flow(self, start: Point, end: float) -> Part | None:
+    def _flow(self, start: Point, end: float) -> Arc | None:
         """Integrate until an edge, a limit or the end of the segment; None where the run ends before or without it."""
         problem, instant = self.problem, self.instant
         seconds = None if self.deadline is None else self.deadline - time.monotonic()
@@ -101,8 +119,7 @@ class Hybrid:
         local[self._clock] = start.t
         local[self.system.origins] -= start.t
         segments = instant.rebounds.pieces(start.t, end)
-        arc = changed(
-            problem,
+        problem = problem.changed(
             y0=start.y,
             times=np.clip(times - start.t, 0.0, end - start.t),
             segments=segments,
@@ -114,13 +131,13 @@ class Hybrid:
             seen=instant.rebounds.seen(start.t, instant.sizes(start)),
             in_play=self.system.in_play(local),
         )
-        result = solve(self.method, arc, self.system.sliding)
+        result = solve(self.method, problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status
         if status is Status.FINISHED or (status in LOST and end - reached <= REACHED * end):
             # Where a gap closes at the very end, the last of its digits are rounding of the time.
             reached, status = end, Status.FINISHED
-        part = Part(result, start, reached, status, times[: len(result.times)], instant.booked)
-        self.parts.append(part)
+        arc = Arc(result, start, reached, status, times[: len(result.times)], instant.booked)
+        self.arcs.append(arc)
         instant.booked = instant.booked + result.ledger
         instant.flowed = (start.t, result.t, reached)
         self.exchanged = np.maximum(self.exchanged, np.abs(instant.booked))
@@ -130,19 +147,74 @@ class Hybrid:
         if instant.rebounds.missed(result):
             instant.status, instant.reason = Status.FAILED, MISSED
             return None
-        return part
+        return arc
 
-    def _edge(self, part: Part, point: Point) -> int | None:
+    def _edge(self, arc: Arc, point: Point) -> int | None:
         """The edge at which an arc has ended, if any."""
-        if part.status is Status.EVENT:
-            events, instant = part.result.events, self.instant
+        if arc.status is Status.EVENT:
+            events, instant = arc.result.events, self.instant
             fired = events.index[events.t == events.t[-1]]
             instant.limits = [int(i) for i in fired if i < instant.first and self.problem.margins[i].terminal]
             index = int(fired[-1]) - instant.first
             return index if index >= 0 else None
-        return self.jumper.equilibria.lost(point, self.problem.rtol) if part.status in LOST else None
+        return self.jumper.equilibria.lost(point, self.problem.rtol) if arc.status in LOST else None
+
+    def _across_touch(self, point: Point) -> Point | None:
+        """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
+        gaps = np.array([state.quantity.unit == "m" for state in self.system.states])
+        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
 
     @cached_property
     def _clock(self) -> int:
         """Column of the time at which an arc starts."""
         return next(j for j, p in enumerate(self.system.parameters) if p.path == START)
+
+
+def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Result:
+    """The result of a run that ended with a jump at its start."""
+    n, q, none = problem.program.n, problem.program.n_ledger, np.zeros(0)
+    states, lines = np.empty((0, n)), np.empty((0, q))
+    events = Events(none, states, states, lines, index=np.empty(0, np.int64))
+    begun = (problem.y0, np.zeros(n), ledger)
+    return Result(problem, status, end, *begun, none, none, states, lines, events, Counters(), stepping=0.0)
+
+
+def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
+    """The arcs as one result, which ends at this time with this ledger."""
+    last = arcs[-1].result
+    happened = [(arc, arc.result.events, np.ones(len(arc.result.events.t), bool)) for arc in arcs]
+    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
+    # The start of an arc, and what time cannot tell from it, is the event that is there already.
+    kept = [(arc, steps, (arc.start.t + steps.t > arc.start.t) | (arc is arcs[0])) for arc, steps in taken]
+    count = [(k, int(keep.sum())) for k, (_, _, keep) in enumerate(kept)]
+    return Result(
+        problem=problem.changed(
+            segments=np.array([*(arc.start.t for arc in arcs), problem.segments[-1]]),
+            parameters=np.array([arc.start.parameters for arc in arcs]),
+        ),
+        status=status,
+        t=end,
+        y=last.y,
+        ydot=last.ydot,
+        ledger=ledger,
+        margins=last.margins,
+        times=np.concatenate([arc.times for arc in arcs]),
+        outputs=np.concatenate([arc.result.outputs for arc in arcs]),
+        ledger_outputs=np.concatenate([arc.result.ledger_outputs + arc.booked for arc in arcs]),
+        events=Events(*_rows(happened), index=np.concatenate([arc.result.events.index for arc in arcs])),
+        counters=Counters(*map(sum, zip(*(arc.result.counters for arc in arcs), strict=True))),
+        steps=Points(*_rows(kept), segment=np.repeat(*np.transpose(count))) if problem.record_steps else None,
+        stepping=sum(arc.result.stepping for arc in arcs),
+        segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
+    )
+
+
+def _rows(found: Sequence[tuple[Arc, Points, NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
+    """Times, states, rates and ledgers of the points that are kept of each arc, in the time and ledger of the run."""
+    return (
+        np.concatenate([arc.start.t + points.t[keep] for arc, points, keep in found]),
+        np.concatenate([points.y[keep] for _, points, keep in found]),
+        np.concatenate([points.ydot[keep] for _, points, keep in found]),
+        np.concatenate([arc.booked + points.ledger[keep] for arc, points, keep in found]),
+    )

@@ -23,6 +23,7 @@ from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
+from surfacechem.tolerances import SOLVED
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -30,8 +31,8 @@ Mask = NDArray[np.bool_]
 NOISE = 1e-13
 """Guards below this part of their magnitude count as zero: some hundred roundings, those of a step onto it included."""
 
-REACHED = 1e-14
-"""Part of the time within which two moments are one."""
+REACHED = SOLVED
+"""Part of the time within which two moments are one: a step onto an event solves for its time."""
 
 BRIEF = 1e-6
 """Part of a run that counts as brief."""

@@ -11,6 +11,7 @@ from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
+from surfacechem.tolerances import ULPS
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ class JumpHeat:
                 with np.errstate(over="ignore", invalid="ignore"):  # far away a search may see no number
                     change = (target[:, j] - U[:, j]) / C[:, j]
                 moved = T + change
-                done = done and not np.any(np.abs(change) > 4e-16 * np.abs(T))
+                done = done and not np.any(np.abs(change) > ULPS * np.abs(T))
                 # A body without a minimum of energy above T = 0 lets Newton's method run out below it.
                 rows[:, column] = np.where(moved > 0, moved, np.nan)
             if done:

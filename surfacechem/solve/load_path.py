@@ -154,7 +154,7 @@ class LoadPath:
     def varies(self) -> bool:
         """Whether the shares of the heat of friction change as loads jump."""
         fixed = {p.symbol for p in self.system.parameters if p.load is None}
-        shares = [self.system.expand(sink.share) for sink in self.system.sinks.get(INTERFACE, ())]
+        shares = [self.system.expand(sink.share) for sink in self.system.sinks[INTERFACE]]
         return any(symengine.sympify(share).free_symbols - fixed for share in shares)
 
     @cached_property

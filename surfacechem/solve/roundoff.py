@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.solve.arcs import changed
 from surfacechem.solve.contract import Problem, Result, Solver, Status
 from surfacechem.tolerances import ULPS
 
@@ -31,7 +30,7 @@ def solve(method: Solver, problem: Problem, velocities: NDArray[np.bool_], first
         atol = np.where(velocities, np.maximum(problem.atol, SEEN * rounding(result)), problem.atol)
         if not np.all(np.isfinite(atol)) or np.all(atol == problem.atol):
             break
-        problem = changed(problem, atol=atol)
+        problem = problem.changed(atol=atol)
         result = method.solve(problem)
     return result
 

@@ -101,11 +101,11 @@ class Trajectory:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but machine code, which is made again from the system."""
-        return {**vars(self), "result": replace(self.result, problem=self.result.problem.with_program(None))}
+        return {**vars(self), "result": replace(self.result, problem=self.result.problem.changed(program=None))}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Give the problem the machine code that the model has made anew."""
-        problem = state["result"].problem.with_program(state["model"].program)
+        problem = state["result"].problem.changed(program=state["model"].program)
         vars(self).update(state, result=replace(state["result"], problem=problem))
 
     @cached_property

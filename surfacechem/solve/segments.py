@@ -8,7 +8,7 @@ passes over it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
+from surfacechem.tolerances import EPS, NEGLIGIBLE
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ PARTS_OF_A_PERIOD, MOST_PARTS = 8.17, 20_000
 """Parts into which the period of a load is cut, so many that no cut falls on a reversal, and the number of them above
 which it is left to the steps."""
 
-STRAY, LARGEST_SLACK = 1e3, 1e-3
+STRAY, LARGEST_SLACK = 1e3, NEGLIGIBLE
 """How far bonding may stray beyond its bounds between two points of a step, in tolerances, and at most."""
 
 
@@ -58,7 +59,7 @@ def segment_parameters(system: System, starts: Array, rtol: float, values: Mappi
 def nudge(system: System, parameters: Array) -> None:
     """Change the numbers of histories by their last digit, one up, the next down; times that pieces count from stay."""
     loads = [j for j, p in enumerate(system.parameters) if p.path.startswith("loading.") and p.field != "origin"]
-    parameters[:, loads] *= 1 + np.finfo(float).eps * (-1.0) ** np.arange(len(loads))
+    parameters[:, loads] *= 1 + EPS * (-1.0) ** np.arange(len(loads))
 
 
 def start_modes(system: System, parameters: Array, values: Mapping[str, float]) -> None:
@@ -89,15 +90,15 @@ ENOUGH = 10
 HALVINGS = 64
 """What takes any part of a run to the last bit of its time."""
 
-TOLD_APART = 1e-13
-"""Relative difference of times that are one: a piece between them would be rounding."""
+TOLD_APART = 512 * EPS
+"""Relative difference of times that are one, 1.1e-13: a piece between them would be rounding of where it begins."""
 
 
 class Passing:
     """The places of a system that time alone leads past."""
 
     def __init__(self, system: System) -> None:
-        turns, places = _turns(system), _places(system)
+        turns, places = _narrow(system)
         self.turns = len(turns)
         self._columns = np.array(
             [j for j, p in enumerate(system.parameters) if any(p.symbol in x.free_symbols for x in (*turns, *places))],
@@ -162,51 +163,36 @@ class Passing:
         return np.unique(high)
 
 
-def _turns(system: System) -> list[Expression]:
-    """Slopes of the histories on which anything depends other than by sums, products and whole powers."""
-    bent = _closure(system, {symbol for member in _members(system) for symbol in _inside_functions(member)})
-    given = (item for item in system.named if symengine.Symbol(item.name) in bent)
-    slopes = (derivative(system.expand(item.expression), system.t) for item in given if _reads_time(system, item))
-    return _of_time(system, slopes)
-
-
-def _reads_time(system: System, item: Any) -> bool:
-    return system.t in symengine.sympify(item.expression).free_symbols
-
-
-def _places(system: System) -> list[Expression]:
-    """What conditions of formulas compare, and the peaks of laws."""
-    compared = {gap for member in _members(system) for gap in _compared(member)}
+def _narrow(system: System) -> tuple[list[Expression], list[Expression]]:
+    """What depends on time alone and changes its sign where something is narrow: the slopes of the histories that turn
+    inside functions, other than sums, products and whole powers; and what conditions compare, with the peaks of laws.
+    """
+    bent, compared, t = set(), set(), system.t
+    for member in _members(system):
+        curved = list(member.atoms(symengine.Function, symengine.Piecewise))
+        curved += [x for x in member.atoms(symengine.Pow) if not (x.args[1].is_Integer and x.args[1] > 0)]
+        bent |= {symbol for item in curved for symbol in item.free_symbols}
+        compared |= _compared(member)
+    bent = _made_of(system, bent)
+    bends = [item.expression for item in system.named if symengine.Symbol(item.name) in bent]
+    turns = [derivative(system.expand(x), t) for x in bends if t in symengine.sympify(x).free_symbols]
     peaks = [margin.expression for margin in system.margins if margin.peak]
-    return _of_time(system, (system.expand(item) for item in (*sorted(compared, key=str), *peaks)))
+    places = [system.expand(item) for item in (*sorted(compared, key=str), *peaks)]
+    return _of_time(system, turns), _of_time(system, places)
+
+
+def _of_time(system: System, expressions: Sequence[Expression]) -> list[Expression]:
+    """Those that depend on time and on parameters alone, each once."""
+    given = {system.t, *(parameter.symbol for parameter in system.parameters)}
+    return [item for item in dict.fromkeys(expressions) if system.t in item.free_symbols <= given]
 
 
 def _members(system: System) -> list[Expression]:
     """What is integrated, and the named quantities that it is made of."""
     integrated = [symengine.sympify(row) for row in (*system.rows.values(), *(item.rate for item in system.ledger))]
-    read = _closure(system, {symbol for item in integrated for symbol in item.free_symbols})
-    named = [item.expression for item in system.named if symengine.Symbol(item.name) in read]
-    return [*integrated, *(symengine.sympify(item) for item in named)]
-
-
-def _closure(system: System, symbols: set[Any]) -> set[Any]:
-    """The symbols, with all that the named quantities among them are made of; each is made of earlier ones."""
-    found = set(symbols)
-    for item in reversed(system.named):
-        if symengine.Symbol(item.name) in found:
-            found |= symengine.sympify(item.expression).free_symbols
-    return found
-
-
-def _inside_functions(expression: Expression) -> set[Any]:
-    """The symbols in arguments of anything but sums, products and whole powers."""
-    curved = expression.atoms(symengine.Function, symengine.Piecewise)
-    powers = (item for item in expression.atoms(symengine.Pow) if not _is_whole(item.args[1]))
-    return {symbol for item in (*curved, *powers) for symbol in item.free_symbols}
-
-
-def _is_whole(exponent: Any) -> bool:
-    return bool(exponent.is_Integer and exponent > 0)
+    read = _made_of(system, {symbol for item in integrated for symbol in item.free_symbols})
+    named = [symengine.sympify(item.expression) for item in system.named if symengine.Symbol(item.name) in read]
+    return integrated + named
 
 
 def _compared(expression: Expression) -> set[Expression]:
@@ -216,7 +202,10 @@ def _compared(expression: Expression) -> set[Expression]:
     return {item.args[0] - item.args[1] for item in single if isinstance(item, COMPARISONS)}
 
 
-def _of_time(system: System, expressions: Iterable[Expression]) -> list[Expression]:
-    """Those that depend on time and on parameters alone, each once."""
-    given = {system.t, *(parameter.symbol for parameter in system.parameters)}
-    return [item for item in dict.fromkeys(expressions) if system.t in item.free_symbols <= given]
+def _made_of(system: System, symbols: set[Any]) -> set[Any]:
+    """The symbols, with all that the named quantities among them are made of; each is made of earlier ones."""
+    found = set(symbols)
+    for item in reversed(system.named):
+        if symengine.Symbol(item.name) in found:
+            found |= symengine.sympify(item.expression).free_symbols
+    return found

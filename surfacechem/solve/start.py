@@ -25,30 +25,26 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
     guessed = np.array([state.algebraic and state.is_temperature for state in system.states])
     if not guessed.any():
         return y
-    playing = system.in_play(parameters)
-    checks = [i for i, m in enumerate(system.moving_margins()) if m.name.startswith(STABLE) and playing[i]]
-    chosen = _stable(program, checks, y, parameters, guessed) if checks else y
-    found = consistent(program, 0.0, chosen, np.zeros_like(y), parameters)
+    if not _are_stable(system, program, y[None], parameters)[0]:
+        tried = np.array([np.where(guessed, part * y, y) for part in COLDER])
+        stable = _are_stable(system, program, tried, parameters)
+        y = tried[int(stable.argmax())] if stable.any() else y
+    found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
     if found.valid and np.any(found.y[guessed] <= 0):
         names = " and ".join(state.name for state, is_one in zip(system.states, guessed, strict=True) if is_one)
         raise InputError(
             f"at the start the interface takes up more heat than any temperature {names} above zero brings it.",
             path="interface",
         )
-    return chosen
+    return y
 
 
-def _stable(program: Program, checks: list[int], y: Array, parameters: Array, guessed: NDArray[np.bool_]) -> Array:
-    tried = np.vstack([y, *(np.where(guessed, part * y, y) for part in COLDER)])
-    if _are_stable(program, checks, tried[:1], parameters)[0]:
-        return y
-    stable = _are_stable(program, checks, tried, parameters)
-    return np.asarray(tried[int(stable.argmax())] if stable.any() else y)
-
-
-def _are_stable(program: Program, checks: list[int], y: Array, parameters: Array) -> NDArray[np.bool_]:
+def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
+    """Which first guesses lead to states in which all limits of stability are open."""
+    playing = system.in_play(parameters)
+    checks = [i for i, m in enumerate(system.moving_margins()) if m.name.startswith(STABLE) and playing[i]]
+    if not checks or program.margins is None:
+        return np.ones(len(y), dtype=bool)
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)
     rows = np.concatenate([np.zeros((len(y), 1)), found.y, found.ydot, np.tile(parameters, (len(y), 1))], axis=1)
-    assert program.margins is not None
-    margins = np.atleast_2d(program.margins(rows))[:, checks]
-    return np.asarray(found.valid & np.all(margins > 0, axis=1))
+    return np.asarray(found.valid & np.all(np.atleast_2d(program.margins(rows))[:, checks] > 0, axis=1))
