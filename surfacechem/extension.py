@@ -254,9 +254,14 @@ def _number(units: Any, key: str, value: Any, unit: str) -> float:
         raise InputError(f"{key} = {value} is not a quantity in {unit}.") from None
 
 
-for _kind, _law in kinds().items():  # a rate of Cantera for every rate type that it does not know itself
-    if not _law.native:
-        _by_affinity = issubclass(_law, AffinityReaction)
-        _rate, _data = (AffinityRate, ByAffinity) if _by_affinity else (LoadedRate, Surroundings)
-        _made = type(_law.__name__, (_rate,), {"law": _law, "__module__": __name__, "__doc__": _law.__doc__})
-        globals()[_law.__name__] = cantera.extension(name=_kind, data=_data)(_made)
+def _register() -> None:
+    """A rate of Cantera for every rate type that it does not know itself."""
+    for kind, law in kinds().items():
+        if law.native:
+            continue
+        rate, data = (AffinityRate, ByAffinity) if issubclass(law, AffinityReaction) else (LoadedRate, Surroundings)
+        made = type(law.__name__, (rate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
+        globals()[law.__name__] = cantera.extension(name=kind, data=data)(made)
+
+
+_register()

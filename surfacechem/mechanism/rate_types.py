@@ -200,7 +200,9 @@ def kinds() -> dict[str, type[InterfaceArrhenius]]:
     ]
     for factor in vars(bonds).values():
         if inspect.isclass(factor) and issubclass(factor, RateFactor) and factor is not RateFactor:
-            own = {"kind": PREFIX + factor.rate_type, "__doc__": factor.__doc__, "__module__": __name__}
+            text = inspect.getdoc(factor) or ""
+            words = text.partition("\n\n>>>")[0]  # the worked number is that of the factor
+            own = {"kind": PREFIX + factor.rate_type, "__doc__": words, "__module__": __name__}
             name = f"Interface{factor.__name__.removesuffix('Factor')}"
             known.append(cast(type[InterfaceArrhenius], type(name, (LoadedReaction, factor), own)))
     return {law.kind: law for law in known}
