@@ -102,7 +102,7 @@ def _system(
     build: Build, layers: tuple[Profile, ...], taking: Mapping[str, tuple[Sink, ...]], fit: Fit | None
 ) -> System:
     """All that was stated, as one frozen graph."""
-    scene = build.scene
+    scene, far_fields = build.scene, build.motion.far_fields
     unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
     return System(
         t=build.t,
@@ -130,8 +130,8 @@ def _system(
         equilibria=tuple(build.equilibria),
         sinks=taking,
         follows={str(x): value for x, value in build.motion.follows.items()},
-        given=dict(build.motion.given),
-        pulls=dict(build.motion.pulls),
+        given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0} | build.motion.given,
+        pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
         fit=fit,
         warnings=(
             *build.interface.remarks,

@@ -148,15 +148,11 @@ def conditioned(expression: Expression, about: Mapping[Any, Expression], degree:
             derivatives.append(derivative(derivatives[-1], x))
         if depends(derivatives[-1], x):
             continue
-        expression = _horner([d.subs({x: x_0}) for d in derivatives], x - x_0)
+        *lower, result = [d.subs({x: x_0}) for d in derivatives]
+        for order, coefficient in reversed(list(enumerate(lower, start=1))):  # Taylor's series by Horner's rule
+            result = coefficient + (x - x_0) * result / order
+        expression = result
     return expression
-
-
-def _horner(derivatives: Sequence[Expression], z: Expression) -> Expression:
-    result = derivatives[-1]
-    for order in range(len(derivatives) - 1, 0, -1):
-        result = derivatives[order - 1] + z * result / order
-    return result
 
 
 def node_row(

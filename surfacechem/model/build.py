@@ -38,12 +38,8 @@ NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 class Motion:
     """What the stages that let the gap and the interface move leave for each other."""
 
-    mechanical: list[Expression] = field(default_factory=list)
-    """Elastic and kinetic energies of the bodies [J/m^2]."""
     given: dict[str, Expression] = field(default_factory=dict)
-    """What works in a jump [J/m^2], potentials of the far-field tractions above all, by the account of that work."""
-    pulls: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
-    """Stiffness, displacement and traction of the far field, and the gap, by the account of the work."""
+    """Work of an impact against a drive [J/m^2], by its account."""
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)

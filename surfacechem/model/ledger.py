@@ -112,7 +112,8 @@ def totals(build: Build) -> None:
         if S != 0:
             quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, S))
-    energies += build.motion.mechanical
+    moved = (f"E_{kind}_{axis}" for axis in build.motion.far_fields for kind in ("spring", "kinetic"))
+    energies += [symengine.Symbol(name) for name in moved if build.is_named(name)]
     build.name(Quantity("E_total", "J/m^2", "total energy"), sum(energies, symengine.Integer(0)))
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
@@ -197,7 +198,10 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
         if sharing != [INTERFACE]:
             return None, None
         moved = balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
-        flux = flux + sum(_arriving(INTERFACE, flows)) - moved
+        for flow in flows:
+            if flow.source != flow.target and INTERFACE in (flow.source, flow.target):
+                flux += flow.rate if flow.target == INTERFACE else -flow.rate
+        flux -= moved
     elif body.name in node.energies:
         rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
         recovered = rate - symengine.Add(*others)
@@ -224,13 +228,6 @@ def _received(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str,
         for channel, heat in flow.channels.items():
             channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
     return channels, elsewhere
-
-
-def _arriving(place: str, flows: list[Passage]) -> Iterator[Expression]:
-    """Power and heat that arrive at a place, less what leaves it."""
-    for flow in flows:
-        if flow.source != flow.target and place in (flow.source, flow.target):
-            yield flow.rate if flow.target == place else -flow.rate
 
 
 def _part(build: Build, k: int, body: Body, name: str, heat: Expression) -> Expression:

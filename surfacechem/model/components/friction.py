@@ -6,7 +6,7 @@ Such a variable, as the age of a contact, is evolved as its logarithm.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 import symengine
 
@@ -15,7 +15,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, derivative, exp, where
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import ACROSS, ALONG, Direction
+from surfacechem.model.components.mounting import ACROSS, ALONG
 from surfacechem.model.sliding.formulations import displacement, in_parallel
 from surfacechem.model.sliding.resistance import resist, resistance, stick_limit
 from surfacechem.model.system import Given, Margin, State
@@ -45,7 +45,10 @@ def friction(build: Build) -> Iterator[Power]:
             build.motion.works[law] = f"W_{label}"
             text = f"work done against {law.title}"
             yield Power(WORK, OUTSIDE, MECHANICS, power, build.motion.works[law], text)
-            _reversal(build, resisted)
+            for v in (d.velocity for d in resisted):
+                if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
+                    reason = "sliding reverses" if len(resisted) == 1 else f"{v} changes its sign"
+                    build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
         else:
             stick_limit(build, law, bound, met)
     if not build.motion.slips and in_parallel(build):
@@ -62,13 +65,6 @@ def pressed(build: Build, law: Friction) -> dict[str, Expression]:
         return {}
     p, least = build.variables.get("p", law), build.bound(law).least.get("p")
     return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
-
-
-def _reversal(build: Build, directions: Collection[Direction]) -> None:
-    for v in (d.velocity for d in directions):
-        if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
-            reason = "sliding reverses" if len(directions) == 1 else f"{v} changes its sign"
-            build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
 
 
 def memory(build: Build, law: Friction, bound: Friction) -> None:

@@ -41,7 +41,10 @@ def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
             found.setdefault(ends, []).append(h)
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
-            yield _external_heat(build, member, Q)
+            heat, node = build.variables.get(Q, "the energy balance"), build.thermal.node_of.get(member)
+            T = build.variables.get("T_c", "the external heat") if node is None else node.T
+            text = f"external heat into {member}"
+            yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
     if build.interface.temperature is None and build.interface.loss:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
@@ -232,14 +235,6 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
-def _external_heat(build: Build, member: str, name: str) -> Power:
-    Q = build.variables.get(name, "the energy balance")
-    text = f"external heat into {member}"
-    node = build.thermal.node_of.get(member)
-    T = build.variables.get("T_c", "the external heat") if node is None else node.T
-    return Power(HEAT, OUTSIDE, member, Q, f"H_{name[2:]}", text, entropy=Q / T)
-
-
 def _mean_channels(build: Build) -> dict[str, Expression]:
     """Conductances of the paths with the closure `mean`, by what carries the heat."""
     channels: dict[str, Expression] = {}
@@ -260,15 +255,6 @@ def _into_both(build: Build, channels: dict[str, Expression]) -> Iterator[Power]
     flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
     total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
     sum_h = symengine.Add(*channels.values())
-    _warn_of_uphill(build, bodies)
-    produced = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
-    text = "heat flow from interface to each body"
-    yield Power(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)
-    yield Power(HEAT, INTERFACE, bodies[1], total, channels=parts)
-
-
-def _warn_of_uphill(build: Build, bodies: list[str]) -> None:
-    """Say where an interface heats a body that is hotter than itself."""
     (cold, _), (hot, name) = sorted((build.at_start(build.thermal.node_of[body].T), body) for body in bodies)
     if hot > cold:
         harmonic = 2 * cold * hot / (cold + hot)
@@ -277,3 +263,7 @@ def _warn_of_uphill(build: Build, bodies: list[str]) -> None:
             f"than itself, between {harmonic:.6g} K and {hot:.6g} K. Their entropy production together is positive. "
             "Where no heat should flow uphill, give paths from each body to the interface."
         )
+    produced = build.stretch * sum_h * difference**2 * (lower.T + upper.T) / (lower.T * upper.T * centre.T)
+    text = "heat flow from interface to each body"
+    yield Power(HEAT, INTERFACE, bodies[0], total, flux.name, text, parts, produced)
+    yield Power(HEAT, INTERFACE, bodies[1], total, channels=parts)

@@ -163,8 +163,11 @@ def free_energy(build: Build) -> Energy:
     gaps = _gaps(build, bounds)
     energies, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
+    # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
+    centre = build.thermal.members.get("interface")
+    known = {symengine.Symbol(x) for x in ("phi", "g_n", "g_t", "u_t", "u_t2", "J_c", centre, *build.bonding) if x}
     for law, F in energies.items():
-        build.refuse_foreign(F, _known(build), law)
+        build.refuse_foreign(F, known, law)
         psi += F
         build.law_ranges(law)
         build.law_margins(bounds[law], gaps[law])
@@ -305,14 +308,6 @@ def _in_sides(build: Build, given: Expression) -> Expression:
 def _by_side(g: Any) -> dict[Any, Any]:
     side = symengine.Symbol("side")
     return {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
-
-
-def _known(build: Build) -> set[Any]:
-    """What the balance of the interface accounts for: its own temperature, bonds, gaps and the stretch of its area."""
-    names = {"phi", "g_n", "g_t", "u_t", "u_t2", "J_c", *build.bonding}
-    if build.interface.temperature is not None:
-        names.add(build.thermal.node_of["interface"].name)
-    return {symengine.Symbol(name) for name in names}
 
 
 def _tractions(build: Build, psi: Expression) -> None:

@@ -22,6 +22,7 @@ LENGTH = MICROMETRE
 """Scale of gaps [m] and of their velocities [m/s]: displacements of a micrometre are rounded at 1e-22 m."""
 
 AXES = {"n": "normal gap", "t": "tangential displacement", "t2": "transverse displacement"}
+GAPS = {"n": "g_n", "t": "u_t", "t2": "u_t2"}
 KEYS = {"n": "normal", "t": "tangential", "t2": "transverse"}
 
 
@@ -73,12 +74,13 @@ def held(build: Build, axis: str) -> Held | None:
     """The mounting of a direction; a far-field traction alone is a dead load."""
     scene = build.scene
     law: Mounting | None = getattr(scene, KEYS[axis])
+    pulls = driven(build, f"F_{axis}")
     if law is not None:
-        if not (law.k or law.m or law.c_b or law.c_g or pulled(build, axis)):
+        if not (law.k or law.m or law.c_b or law.c_g or pulls):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
         _refuse_restitution(law, axis)
         return Held(law, axis, law.path)
-    if pulled(build, axis):
+    if pulls:
         return Held(Mounting(), axis, f"loading.F_{axis}" if f"F_{axis}" in scene.loading else "programme")
     return None
 
@@ -101,11 +103,6 @@ def held_across(build: Build, along: Held) -> Held | None:
     if given or any(friction.transverse is not None for friction in build.interface.frictions):
         return Held(along.law, "t2", along.by, along)
     return None
-
-
-def pulled(build: Build, axis: str) -> bool:
-    """Whether a history or the programme gives a far-field traction."""
-    return driven(build, f"F_{axis}")
 
 
 def driven(build: Build, name: str) -> bool:
@@ -139,6 +136,16 @@ class FarField:
     w: Expression
     w_dot: Expression
     F: Expression
+
+    @property
+    def gap(self) -> symengine.Symbol:
+        """What the far field pulls at."""
+        return symengine.Symbol(GAPS[self.axis])
+
+    @property
+    def works(self) -> bool:
+        """Whether it does work."""
+        return bool(self.w_dot != 0 or self.F != 0)
 
     def stored(self, g: Expression) -> Expression:
         """Elastic energy of the bodies [J/m^2]."""
@@ -174,13 +181,6 @@ class FarField:
         shares = zip((body.name for body in build.scene.bodies), (self.beta_1, 1 - self.beta_1), strict=True)
         return {place: share * part for body, share in shares for place, part in build.thermal.volume(body).items()}
 
-    def _damper(self, build: Build, power: Expression) -> Power:
-        """What the damper in the bodies dissipates, over their volume."""
-        label, text = f"bulk_damper_{self.axis}", f"the damper of the bodies, {AXES[self.axis]}"
-        damped, takers = symengine.Symbol(f"D_{label}"), self.takers(build)
-        produced = symengine.Add(*(share * damped / build.thermal.places[at].T for at, share in takers.items()))
-        return Power(DISSIPATION, MECHANICS, takers, power, label, text, entropy=produced)
-
     def yielding(self, g: Expression, traction: Expression) -> Expression:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
@@ -201,18 +201,18 @@ class FarField:
         ):
             if energy != 0:
                 quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
-                build.motion.mechanical.append(build.name(quantity, energy))
+                build.name(quantity, energy)
         bulk = self.w_dot - rate
         power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
             what = f"work of the far field on the {text}"
             yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{self.axis}", what)
-            build.motion.pulls[f"W_{self.axis}"] = (self.k, self.w, self.F, g)
-        if self.F != 0:
-            build.motion.given[f"W_{self.axis}"] = self.F * g
         if self.c_b != 0:
             damped = self.c_b * bulk * (self.w_dot - moves)
-            yield self._damper(build, damped)
+            label, what = f"bulk_damper_{self.axis}", f"the damper of the bodies, {text}"
+            symbol, takers = symengine.Symbol(f"D_{label}"), self.takers(build)
+            produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in takers.items()))
+            yield Power(DISSIPATION, MECHANICS, takers, damped, label, what, entropy=produced)
         if self.c_g != 0:
             label = build.unique(f"contact_damper_{self.axis}")
             rubbed = self.c_g * rate * moves

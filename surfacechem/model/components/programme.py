@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -32,7 +31,9 @@ def programme(build: Build) -> None:
     if not stages:
         return
     words = {float(i): stage.name for i, stage in enumerate(stages)} | {float(len(stages)): "after the last stage"}
-    _refuse_twins(stages)
+    for i, item in enumerate(stages):
+        if item.name in [other.name for other in stages[:i]]:
+            raise InputError(f"two stages are called '{item.name}'. Give each a name of its own.", item.place)
     waits = {float(i): _awaited(stage) for i, stage in enumerate(stages) if _awaited(stage)}
     stage = build.mode("stage", 0.0, words, waits=waits)
     for name in dict.fromkeys(name for item in stages for name in item.rates):
@@ -40,12 +41,6 @@ def programme(build: Build) -> None:
             message = f"a programme cannot move '{name}'.{suggestion(name, LOADABLE)}"
             raise InputError(message, stages[0].place)
         build.variables.define(name, partial(_driven, build, name, stage), "driven", "programme")
-
-
-def _refuse_twins(stages: Sequence[Stage]) -> None:
-    for i, stage in enumerate(stages):
-        if stage.name in [other.name for other in stages[:i]]:
-            raise InputError(f"two stages are called '{stage.name}'. Give each a name of its own.", stage.place)
 
 
 def _awaited(stage: Stage) -> str:

@@ -10,13 +10,12 @@ import symengine
 
 from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Edge
-from surfacechem.model.balances import elastic_energy
 from surfacechem.model.build import Build
 
 
 def load_steps(build: Build) -> None:
     """The transition that loads make by their jumps, where a gap in equilibrium or a spring feels them."""
-    springs = [elastic_energy(k, w, g) for k, w, _, g in build.motion.pulls.values()]
+    springs = [far.stored(far.gap) for far in build.motion.far_fields.values() if far.works]
     felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))
     steps = {name: load for name, load in build.loads.items() if load.jumps() and felt & _histories(build, name)}
     if not steps:
