@@ -86,3 +86,17 @@ MICROMETRE = 1e-6
 
 PICOMETRE = 1e-12
 """Length [m] without a meaning for bodies: a hundredth of an atom."""
+
+TIGHTEST = 1e-13
+"""Tightest relative tolerance that is chosen for a run: below some 450 EPS errors of steps are their rounding."""
+
+LAST = 3e-14
+"""Tolerance of the run that is held against one at TIGHTEST, near enough to it to have the same digits."""
+
+LOOSEST = 1e-3
+"""Loosest tolerance that is chosen for a run: NEGLIGIBLE. With more a method does not have its order."""
+
+FLOOR = 1e-9
+"""What is smaller counts as this part of the whole where its error is made relative: times of events of a run, exact
+answers of their largest. NOTHING of it.
+"""

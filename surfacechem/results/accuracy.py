@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.tolerances import LAST, LOOSEST, TIGHTEST
+
 Array = NDArray[np.float64]
 
 TIGHTER = 1e-2
 """Without an exact solution the error is estimated from a second run whose tolerance is lower by this factor."""
 
-TIGHTEST = 1e-13
-"""Tolerances below this are rounding."""
-
 MARGIN = 1e-2
 """The tolerance of a step is this part of the accuracy asked for. Over the exact solutions the error of a run is below
-a hundred times its tolerance, but near singular ends."""
-
-LOOSEST = 1e-3
-"""No accuracy asks for a tolerance above this."""
-
-LAST = 3e-14
-"""Tolerance of the second run where the first has the tightest one."""
-
-FLOOR = 1e-9
-"""Times of events below this part of the run count as this when their errors are made relative; so do exact answers of
-the stability study below this part of their largest."""
-
-ROUNDING = float(np.finfo(float).eps)
-"""No error is claimed to be less than the last digit."""
+a hundred times its tolerance, but near singular ends.
+"""
 
 
 def first_tolerance(accuracy: float) -> float:
@@ -68,28 +55,28 @@ def relative_errors(values: Array, exact: Array, floor: float) -> Array:
 
 
 def errors_over_time(
-    values: Mapping[str, Array], true: Mapping[str, Array], floor: Callable[[str], float]
+    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float]
 ) -> dict[str, Array]:
-    """Relative errors of the variables that have true values, at the times that both have; ``floor`` gives the size of
-    a variable below which its errors are relative to this.
+    """Relative errors of the variables that have true values, at the times that both have; ``floors`` are sizes below
+    which errors are relative to these.
     """
     found = {}
     for name, exact in true.items():
         n = min(len(values[name]), len(exact))
-        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floor(name))
+        found[name] = relative_errors(values[name][:n], np.asarray(exact)[:n], floors[name])
     return found
 
 
 def largest_errors(
-    values: Mapping[str, Array], true: Mapping[str, Array], floor: Callable[[str], float]
+    values: Mapping[str, Array], true: Mapping[str, Array], floors: Mapping[str, float]
 ) -> dict[str, float]:
     """The largest relative error of each variable that has true values: how far a run is from an exact solution, or
     from another run.
 
-    >>> largest_errors({"T": np.array([301.0, 303.0])}, {"T": np.array([300.0, 300.0])}, {"T": 1.0}.__getitem__)
+    >>> largest_errors({"T": np.array([301.0, 303.0])}, {"T": np.array([300.0, 300.0])}, {"T": 1.0})
     {'T': 0.01}
     """
-    errors = errors_over_time(values, true, floor)
+    errors = errors_over_time(values, true, floors)
     return {name: float(np.max(found, initial=0.0)) for name, found in errors.items()}
 
 

@@ -11,17 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.results.accuracy import (
-    FLOOR,
     MARGIN,
-    ROUNDING,
-    TIGHTEST,
     UNKNOWN,
     Accuracy,
     CellErrors,
@@ -34,6 +30,7 @@ from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
 from surfacechem.solve import ASKING
 from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.tolerances import EPS, FLOOR, TIGHTEST
 
 Array = NDArray[np.float64]
 
@@ -70,7 +67,11 @@ def accuracy(
     if not len(trajectory.result.times):
         return unknown("the run ended at its start")
     if way == "balances":
-        return from_balances(trajectory, "balances only: what they miss is not seen")
+        if len(trajectory.result.times) < 2:
+            return unknown("the run ended before its second output")
+        books = audit(trajectory)
+        errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
+        return Accuracy(stated(errors), "balances only: what they miss is not seen", errors)
     unused = ""
     if exact is not None and way != "estimate" and len(trajectory.result.times) < 2:
         unused = f"; with one output nothing is compared with the exact solution {exact[0]}"
@@ -98,7 +99,7 @@ def against_exact(
     from surfacechem.results.matching import exact_values
 
     exact = exact_values(name, options, scene, trajectory)
-    errors = largest_errors(computed(trajectory), exact, partial(floor, trajectory))
+    errors = largest_errors(computed(trajectory), exact, floors(trajectory))
     if found := event_times(trajectory):
         expected = event_times(second or _second(trajectory))
         if not difference(found, expected):
@@ -141,7 +142,7 @@ def unknown(why: str) -> Accuracy:
 
 def stated(errors: Mapping[str, float]) -> float:
     """The error of a whole run: the largest, and never less than the last digit."""
-    return max(*errors.values(), ROUNDING)
+    return max(*errors.values(), EPS)
 
 
 def second_run(run: Run, kind: str = "run") -> str:
@@ -161,7 +162,7 @@ def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]
     if len(times) > 1:
         shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
         ours, theirs = ({name: values[shared] for name, values in states(run).items()} for run in (first, second))
-        errors = largest_errors(ours, theirs, partial(floor, first))
+        errors = largest_errors(ours, theirs, floors(first))
     if found and not note:
         errors |= event_errors(found, expected, first.run.times[-1])
     return errors, note
@@ -193,15 +194,6 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
     return replace(estimate, error=worst, variables=errors, source=f"{estimate.source}, {cells.source}")
 
 
-def from_balances(trajectory: Trajectory, source: str) -> Accuracy:
-    """What the residuals of the balances tell of the error."""
-    if len(trajectory.result.times) < 2:
-        return unknown("the run ended before its second output")
-    books = audit(trajectory)
-    errors = {"energy": books.energy_error, "entropy": books.entropy_error, "sites": books.site_error}
-    return Accuracy(stated(errors), source, errors)
-
-
 def states(trajectory: Trajectory) -> dict[str, Array]:
     """States at the output times, by name; those inside bodies together."""
     system = trajectory.model.system
@@ -216,29 +208,16 @@ def computed(trajectory: Trajectory) -> dict[str, Array]:
     return states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
 
 
-def floors(trajectory: Trajectory) -> Array:
-    """Sizes of the states below which their errors are relative to these, shape (states,): those at which the absolute
-    tolerance is as much as the relative one, and at most their scales.
+def floors(trajectory: Trajectory) -> dict[str, float]:
+    """Sizes below which errors are relative to these. Of a state that at which the absolute tolerance is as much as the
+    relative one, and at most its scale; of a profile the largest of its states; of a named quantity its largest value.
     """
-    run, problem = trajectory.run, trajectory.result.problem
-    scales = np.array([state.scale for state in trajectory.model.system.states])
-    return np.asarray(np.minimum(problem.atol / run.rtol, scales))
-
-
-def floor(trajectory: Trajectory, name: str) -> float:
-    """Size of a variable below which its errors are relative to this; for named quantities the largest value."""
-    system, known = trajectory.model.system, dict(zip(_names(trajectory), floors(trajectory), strict=True))
-    for profile in system.profiles:
-        if name == profile.name:
-            return float(max((known[state] for state in profile.states), default=0.0))
-    if name in known:
-        return float(known[name])
-    values = trajectory.outputs[:, [item.name for item in system.outputs].index(name)]
-    return float(np.max(np.abs(values), initial=0.0))
-
-
-def _names(trajectory: Trajectory) -> list[str]:
-    return [state.name for state in trajectory.model.system.states]
+    run, system = trajectory.run, trajectory.model.system
+    sizes = np.minimum(trajectory.result.problem.atol / run.rtol, [state.scale for state in system.states])
+    found = dict(zip((state.name for state in system.states), sizes.tolist(), strict=True))
+    found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
+    largest = np.max(np.abs(trajectory.outputs), axis=0, initial=0.0).tolist()
+    return dict(zip((item.name for item in system.outputs), largest, strict=True)) | found
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
@@ -280,12 +259,15 @@ def verified(first: Trajectory) -> tuple[Trajectory, Accuracy]:
     wanted = asked(first.run)
     while True:
         last = first.run.rtol <= TIGHTEST
-        second = first.model.resolve(first, second_tolerance(first.run.rtol))
+        second = _second(first)
         found = replace(compared(first, second), asked=wanted)
         if second.status == "failed" or found.error <= wanted:
             return first, found
         if last:
-            return first, replace(found, source=f"{found.source}; {_missed(first, wanted)}")
+            missed = f"{wanted:.0e} is not reached at the tightest tolerance"
+            if (lost := rounding_of_time(first)) > wanted / 10:
+                missed = f"{wanted:.0e} is out of reach, as rounding of the time alone changes a state by {lost:.0e}"
+            return first, replace(found, source=f"{found.source}; {missed}")
         first = second
 
 
@@ -311,16 +293,10 @@ def rounding_of_time(trajectory: Trajectory) -> float:
     It is large where a state runs towards a singular end.
     """
     result = trajectory.result
-    size = np.maximum(np.abs(result.outputs), floors(trajectory))
-    change = np.finfo(float).eps * np.abs(trajectory.rates) * result.times[:, None]
+    known = floors(trajectory)
+    size = np.maximum(np.abs(result.outputs), [known[state.name] for state in trajectory.model.system.states])
+    change = EPS * np.abs(trajectory.rates) * result.times[:, None]
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
-
-
-def _missed(trajectory: Trajectory, wanted: float) -> str:
-    lost = rounding_of_time(trajectory)
-    if lost > wanted / 10:
-        return f"{wanted:.0e} is out of reach, as rounding of the time alone changes a state by {lost:.0e}"
-    return f"{wanted:.0e} is not reached at the tightest tolerance"
 
 
 def reasons(model: Model, run: Run) -> list[tuple[str, str, str]]:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,7 +25,7 @@ from surfacechem.contracts import grids
 from surfacechem.model.system import System
 from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors
 from surfacechem.results.dataset import profile_values
-from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_errors, floor
+from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_errors, floors
 from surfacechem.results.event_table import event_times
 from surfacechem.results.solution import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
@@ -241,7 +240,7 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
     exact, values = _curves(better), _curves(worse)
     pairs = {name: _on_same(values[name], exact[name], shared) for name in exact if name in values}
     ours, theirs = ({name: pair[k] for name, pair in pairs.items()} for k in (0, 1))
-    errors = largest_errors(ours, theirs, partial(floor, better))
+    errors = largest_errors(ours, theirs, floors(better))
     if other:
         errors[EVENTS] = math.inf
     elif found:

@@ -18,7 +18,7 @@ from surfacechem.format import Case
 from surfacechem.format.plans import STATISTICS, Plan
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
-from surfacechem.results.accuracy import ROUNDING, UNKNOWN, CellErrors, second_tolerance
+from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
 from surfacechem.results.event_table import event_times
@@ -27,6 +27,7 @@ from surfacechem.runs import spectrum
 from surfacechem.runs.spectrum import Statistics
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.tolerances import EPS
 
 
 @dataclass(frozen=True)
@@ -202,4 +203,4 @@ def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics
     """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
     pairs = [(getattr(done.statistics[i], which), getattr(exact, which)) for which in STATISTICS]
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
-    return max(max(errors), ROUNDING)
+    return max(max(errors), EPS)

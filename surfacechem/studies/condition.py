@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
-from surfacechem.results.accuracy import FLOOR, relative_errors
+from surfacechem.results.accuracy import relative_errors
 from surfacechem.studies.regimes import Exact, Refused, Stops, Trial
+from surfacechem.tolerances import FLOOR
 
 Array = NDArray[np.float64]
 Answer = Mapping[str, Array]

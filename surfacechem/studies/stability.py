@@ -214,7 +214,7 @@ def _outcome(expected: Expectation, done: Trajectory) -> tuple[str, float, str]:
         return WRONG, 0.0, f"{len(done.jumps)} events, not {expected.events}"
     known = {*expected.also, *(state.name for state in done.model.system.states)}
     exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in known}
-    errors = largest_errors(computed(done), exact, lambda name: least(exact[name]))
+    errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
     worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
     return SOLVED, digits_of(errors[worst]), f"in {worst}"
 

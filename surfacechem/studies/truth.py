@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.results.accuracy import ROUNDING, TIGHTEST, errors_over_time
-from surfacechem.results.error_estimates import computed, difference, event_errors, floor
+from surfacechem.results.accuracy import errors_over_time
+from surfacechem.results.error_estimates import computed, difference, event_errors, floors
 from surfacechem.results.event_table import event_times
 from surfacechem.results.matching import exact_values
 from surfacechem.solve import ASKING, solver
 from surfacechem.solve.run import Model, Trajectory
 from surfacechem.studies.grid import FAULTS
+from surfacechem.tolerances import EPS, TIGHTEST
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]
@@ -159,7 +160,7 @@ class Truth:
 
     def errors(self, values: Values, events: Values) -> Errors:
         """Errors of values and of times of events, over the output times that both have reached."""
-        found = errors_over_time(values, self.values, self.floors.__getitem__)
+        found = errors_over_time(values, self.values, self.floors)
         return Errors(
             {
                 "final": {name: float(error[-1]) for name, error in found.items()},
@@ -187,7 +188,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         return numerical(subject, variables)
     trajectory = subject.tight(subject.methods()[0], TIGHTEST)
     result = trajectory.result
-    nudged = replace(trajectory, result=replace(result, times=result.times * (1 - ROUNDING)))
+    nudged = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
     try:
         exact, moved = (
             exact_values(reference.name, reference.options, subject.case.scene, run) for run in (trajectory, nudged)
@@ -201,7 +202,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     beside = _of_run("", trajectory, variables, {}, {}) if alone else numerical(subject, variables)
     noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {}).by_kind
     uncertain = {
-        kind: {**errors, **{name: error + ROUNDING for name, error in noise[kind].items()}}
+        kind: {**errors, **{name: error + EPS for name, error in noise[kind].items()}}
         for kind, errors in beside.uncertainty.by_kind.items()
     }
     others = [*(name for name in beside.values if name not in known), *(["events"] if beside.events else [])]
@@ -255,8 +256,16 @@ def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Tr
 
 
 def _of_run(source: str, run: Trajectory, variables: Sequence[str], values: Values, events: Values) -> Truth:
-    floors = {name: floor(run, name) for name in variables}
-    return Truth(source, run.status, run.result.times, values, floors, events, run.run.times[-1])
+    known = floors(run)
+    return Truth(
+        source,
+        run.status,
+        run.result.times,
+        values,
+        {name: known[name] for name in variables},
+        events,
+        run.run.times[-1],
+    )
 
 
 def _limit(loose: Array, tight: Array) -> Array:
