@@ -100,3 +100,8 @@ FLOOR = 1e-9
 """What is smaller counts as this part of the whole where its error is made relative: times of events of a run, exact
 answers of their largest. NOTHING of it.
 """
+
+CONSERVED = 1e-10
+"""Rates slower than this part of the fastest are zero, of a conserved quantity: eigenvalues err by EPS times the
+condition of their vectors, 1e5 at most in scaled rows.
+"""

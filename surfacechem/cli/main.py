@@ -136,7 +136,7 @@ def check(
 ) -> None:
     """Say a case back in words, without running it."""
     from surfacechem.results.error_estimates import reasons
-    from surfacechem.runs.check import cautions, groups, lumping_warnings, warnings
+    from surfacechem.runs.check import consistent_start, groups, start_warnings, warnings
     from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import check_summary
     from surfacechem.solve import AUTO
@@ -149,9 +149,9 @@ def check(
         problem = model.problem(settings, values)
     except InputError as error:
         raise simulation.case.located(error) from None
-    numbers = groups(model, scene, values, settings.times[-1])
-    lumped = lumping_warnings(model, values, settings.times[-1])
-    found = [*warnings(system), *cautions(model, problem), *lumped]
+    start, end = consistent_start(model, values), settings.times[-1]
+    numbers = groups(model, scene, values, start, end)
+    found = [*warnings(system), *start_warnings(model, problem, start, end)]
     why = reasons(model, settings) if settings.solver == AUTO else ()
     settings = model.chosen(settings)
     typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))

@@ -9,21 +9,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.compile.program import compile_function
 from surfacechem.contracts.terms import Law, Varying
 from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.system import System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.extremes import cautioned
-from surfacechem.runs.lumping import lumpings
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Problem
 from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
+from surfacechem.tolerances import CONSERVED, DIGITS, ROUNDING, SOLVED, TINY
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-10
-"""Rates slower than this part of the fastest are zero: a conserved quantity."""
+SMALL = 0.1
+"""Biot number up to which a lump is taken for good: it errs by 3 % then."""
+
+LONG = 2.0
+"""Fourier number from which on a slab in perfect contact has become even: 1 % of a difference is left."""
 
 
 @dataclass(frozen=True)
@@ -59,25 +63,19 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
         K, M = model.program.derivatives(inputs)
-        change = _newton_step(np.where(algebraic, K, M), model.program.residual(inputs))
-        if change is None:
+        matrix, residual = np.where(algebraic, K, M), model.program.residual(inputs)
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
+            return None
+        try:
+            change = np.linalg.solve(matrix, -residual)
+        except np.linalg.LinAlgError:
             return None
         y, ydot = y + np.where(algebraic, change, 0.0), ydot + np.where(algebraic, 0.0, change)
-        if np.all(np.abs(change) <= 1e-12 * np.maximum(np.abs(np.where(algebraic, y, ydot)), 1e-300)):
+        if np.all(np.abs(change) <= ROUNDING * np.maximum(np.abs(np.where(algebraic, y, ydot)), TINY)):
             break
     inputs = np.concatenate([[0.0], y, ydot, parameters])
-    outputs = model.output_function(inputs)
-    names = [item.name for item in system.outputs]
-    return Start(y, ydot, M, K, dict(zip(names, outputs.tolist(), strict=True)), inputs)
-
-
-def _newton_step(matrix: Array, residual: Array) -> Array | None:
-    if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
-        return None
-    try:
-        return np.asarray(np.linalg.solve(matrix, -residual), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        return None
+    outputs = dict(zip((item.name for item in system.outputs), model.output_function(inputs).tolist(), strict=True))
+    return Start(y, ydot, M, K, outputs, inputs)
 
 
 def rates(start: Start) -> NDArray[np.complex128]:
@@ -87,23 +85,22 @@ def rates(start: Start) -> NDArray[np.complex128]:
     rows = np.maximum(np.abs(start.M).max(axis=1), np.abs(start.K).max(axis=1))
     scale = np.where(rows > 0, rows, 1.0)[:, None]
     alpha, beta = eigvals(-start.K / scale, start.M / scale, homogeneous_eigvals=True)
-    finite = np.abs(beta) > 1e-14 * np.abs(alpha)
+    finite = np.abs(beta) > SOLVED * np.abs(alpha)
     values = np.asarray(alpha[finite] / beta[finite], dtype=np.complex128)
     largest = np.max(np.abs(values), initial=0.0)
-    return np.asarray(values[np.abs(values) > ROUNDING * largest])
+    return np.asarray(values[np.abs(values) > CONSERVED * largest])
 
 
-def groups(model: Model, scene: Scene, values: Mapping[str, float], end: float) -> list[Group]:
-    """The numbers of a scene, as far as its parameters and its initial state tell them."""
-    found = [*_bond_energy(scene), *_activation(scene, values)]
-    start = consistent_start(model, values)
+def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:
+    """The numbers of a scene, as far as its parameters and its consistent initial state tell them."""
+    found = [*_of_parameters(scene, values)]
     if start is None:
         return found
     return [
         *found,
         *_affinity(scene, start, model.system),
-        *_heat(model.system, scene, start, end),
-        *(Group(*row[:2], "1", row[2]) for body in lumpings(model.system, start.inputs, end) for row in body.rows()),
+        *_heat_paths(model.system, scene, start, end),
+        *(Group(*row[:2], "1", row[2]) for body in lumpings(model.system, start, end) for row in body.rows()),
         *_time_scales(start, end),
         *(
             Group("t / t_own", end / t, "1", f"length of the run in units of the {p.text}")
@@ -117,33 +114,26 @@ def number(value: float | Varying) -> float:
     return value.value if isinstance(value, Varying) else float(value)
 
 
-def _bond_energy(scene: Scene) -> Iterator[Group]:
-    C, T_0 = capacity_with_interface(scene), scene.T_0
-    laws = [law for law in scene.interface.potentials if law.name() == "bond-energy"]
-    if not (C and T_0 and laws):
-        return
-    kappa = {
-        name: sum(number(getattr(law, name)) * number(vars(law)["K"]) for law in laws) / (T_0 * C)
-        for name in ("K_0", "K_2")
-    }
-    x = (scene.initial.get("phi", 0.0) - number(vars(laws[0])["phi_eq"])) ** 2
-    if kappa["K_0"]:
-        yield Group("kappa_0", kappa["K_0"], "1", "K_0 / (T_0 C): bond energy against heat content")
-    if kappa["K_2"]:
-        verdict = "valid" if kappa["K_2"] * x < 1 else "NOT valid"
-        text = f"K_2 / (T_0 C); kappa_2 (phi_i - phi_eq)^2 = {kappa['K_2'] * x:.6g} must be below 1: {verdict}"
-        yield Group("kappa_2", kappa["K_2"], "1", text)
-
-
-def capacity_with_interface(scene: Scene) -> float:
-    """Heat capacity at T_0 of all that shares the interface's temperature; of both bodies where there is no medium."""
-    node = scene.interface.temperature
+def _of_parameters(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
+    """Energy of bonds against heat content, and activation energies against the temperature at the start."""
+    # Heat capacity at T_0 of all that shares the interface's temperature; of both bodies where there is no medium.
+    node, T_0 = scene.interface.temperature, scene.T_0
     bodies = [body for body in scene.bodies if node is None or body.temperature == node]
-    capacities = [(body.energy, "C") for body in bodies] + [(law, "C_c") for law in scene.interface.potentials]
-    return sum(number(getattr(law, name)) for law, name in capacities if hasattr(law, name))
-
-
-def _activation(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
+    stores = [(body.energy, "C") for body in bodies] + [(law, "C_c") for law in scene.interface.potentials]
+    C = sum(number(getattr(law, name, 0.0)) for law, name in stores)
+    bonds = [law for law in scene.interface.potentials if law.name() == "bond-energy"]
+    if C and T_0 and bonds:
+        kappa_0, kappa_2 = (
+            sum(number(getattr(law, name)) * number(vars(law)["K"]) for law in bonds) / (T_0 * C)
+            for name in ("K_0", "K_2")
+        )
+        if kappa_0:
+            yield Group("kappa_0", kappa_0, "1", "K_0 / (T_0 C): bond energy against heat content")
+        if kappa_2:
+            part = kappa_2 * (scene.initial.get("phi", 0.0) - number(vars(bonds[0])["phi_eq"])) ** 2
+            verdict = "valid" if part < 1 else "NOT valid"
+            text = f"K_2 / (T_0 C); kappa_2 (phi_i - phi_eq)^2 = {part:.6g} must be below 1: {verdict}"
+            yield Group("kappa_2", kappa_2, "1", text)
     temperatures = [values[name] for name in ("initial.T_c", "initial.T", "initial.T_1") if name in values]
     for law in scene.interface.reactions:
         energy = number(getattr(law, "E_a", 0.0))
@@ -156,25 +146,24 @@ def _affinity(scene: Scene, start: Start, system: System) -> Iterator[Group]:
     temperatures = dict(start.outputs) | {s.name: y for s, y in zip(system.states, start.y.tolist(), strict=True)}
     node = scene.interface.temperature
     T = temperatures.get(node if isinstance(node, str) else "T_c")
-    if T is None or not start.outputs.get("mu"):
-        return
-    yield Group("mu / (k_B T_c)", start.outputs["mu"] / (BOLTZMANN * T), "1", "affinity per bond at the start")
+    if T is not None and start.outputs.get("mu"):
+        yield Group("mu / (k_B T_c)", start.outputs["mu"] / (BOLTZMANN * T), "1", "affinity per bond at the start")
 
 
-def _heat(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
+def _heat_paths(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
     """Heat paths and dissipation against capacities, over the whole run."""
-    capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.is_temperature}
+    stored = np.diag(start.M)
+    capacities = {s.name: c for s, c in zip(system.states, stored, strict=True) if s.is_temperature}
     for profile in system.profiles:
         capacities[profile.surface] = sum(capacities.get(name, 0.0) for name in (profile.surface, *profile.states))
     nodes = {body.name: body.temperature for body in scene.bodies} | {"interface": scene.interface.temperature}
     for law in scene.heat:
         ends = [capacities.get(str(nodes.get(name)), 0.0) for name in law.between]
-        smallest = min((c for c in ends if c > 0), default=None)
-        if smallest and hasattr(law, "h"):
+        if hasattr(law, "h") and any(c > 0 for c in ends):
             text = f"heat exchange {law.between[0]} - {law.between[1]} over the run against the smaller capacity"
-            yield Group("h t / C", number(law.h) * end / smallest, "1", text)
+            yield Group("h t / C", number(law.h) * end / min(c for c in ends if c > 0), "1", text)
     heat = sum(value for name, value in start.outputs.items() if name.startswith("D_"))
-    content = sum(c * y for c, y in zip(np.diag(start.M), start.y, strict=True) if c > 0 and y > 1)
+    content = float(stored @ np.where((stored > 0) & (start.y > 1), start.y, 0.0))
     if heat and capacities and content > 0:
         text = "dissipation at the start, kept up over the run, against heat content"
         yield Group("D t / (C T)", heat * end / content, "1", text)
@@ -193,43 +182,28 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
 
 def warnings(system: System) -> list[str]:
     """What is given but has no effect, beside what the assembly found."""
-    formulas = [*_audited(system), *_heated(system)]
-    read = {symbol for row in [*system.residual(), *map(system.expand, formulas)] for symbol in row.free_symbols}
-    idle = [
-        p for p in system.parameters if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
-    ]
-    return [*system.warnings, *(f"{p.path} = {p.at(0.0):g} has no effect on the equations." for p in idle)]
-
-
-def cautions(model: Model, problem: Problem) -> list[str]:
-    """What the start gives reason to be cautious of."""
-    start = [np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]]
-    return cautioned(model.system, np.concatenate(start)[None])
-
-
-def lumping_warnings(model: Model, values: Mapping[str, float], end: float) -> list[str]:
-    """Bodies that should not be one lump, and by how much they err."""
-    start = consistent_start(model, values) if model.system.conductors else None
-    found = lumpings(model.system, start.inputs, end) if start is not None else []
-    return [warning for body in found for warning in body.warnings()]
-
-
-def _audited(system: System) -> list[object]:
-    return (
-        [a.rate for a in system.ledger]
-        + [m.masked for m in system.margins]
-        + [i.expression for i in system.outputs]
-        + [c.resistance for c in system.conductors]
-        + [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
-    )
-
-
-def _heated(system: System) -> list[object]:
-    """Parts of the heat of jumps; what slides or snaps makes all of it in the interface, none in supports."""
+    formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
+    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.conductors]]
+    formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
+    # What slides or snaps makes all of its heat in the interface, none in supports.
     jumps = [item for item in system.edges if (item.equilibrates or item.reset) and not item.measure]
     supported = any(item.heat == "joint" for item in jumps)
     makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
-    return [sink.share for sinks in makers for sink in sinks]
+    formulas += [sink.share for sinks in makers for sink in sinks]
+    read = {symbol for row in [*system.residual(), *map(system.expand, formulas)] for symbol in row.free_symbols}
+    idle = [
+        f"{p.path} = {p.at(0.0):g} has no effect on the equations."
+        for p in system.parameters
+        if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
+    ]
+    return [*system.warnings, *idle]
+
+
+def start_warnings(model: Model, problem: Problem, start: Start | None, end: float) -> list[str]:
+    """What the start gives reason to be cautious of, and bodies that should not be one lump."""
+    first = np.concatenate([np.zeros(1), problem.y0, np.zeros(len(problem.y0)), problem.parameters[0]])
+    lumps = lumpings(model.system, start, end) if start is not None else []
+    return [*cautioned(model.system, first[None]), *(text for body in lumps for text in body.warnings())]
 
 
 def laws_of(scene: Scene) -> list[Law]:
@@ -239,6 +213,83 @@ def laws_of(scene: Scene) -> list[Law]:
     return [*bodies, *interface.potentials, *interface.reactions, *interface.frictions, *scene.heat]
 
 
-def significant(value: float) -> str:
-    """Four digits are enough to judge a group by."""
-    return f"{value:.4g}" if math.isfinite(value) else str(value)
+# -- bodies that are one lump -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Lumping:
+    """A body's numbers: h L / k at its contact, infinite in perfect contact, and k t / (C L) over the run.
+
+    A slab insulated behind, cooled through a conductance h at its face, relaxes at the rate zeta^2 alpha / L^2 with
+    zeta tan(zeta) = Bi; a lump at Bi alpha / L^2, which is faster. Source: Carslaw & Jaeger (1959), Conduction of Heat
+    in Solids, section 3.11.
+    """
+
+    number: int
+    body: str
+    is_lump: bool
+    biot: float
+    fourier: float
+
+    @property
+    def fast(self) -> float:
+        """Part by which a lump would relax too fast.
+
+        >>> round(Lumping(1, "lower", True, 0.1, 1.0).fast, 4), round(Lumping(1, "lower", True, 1.0, 1.0).fast, 4)
+        (0.0336, 0.351)
+        """
+        return self.biot / slowest(self.biot) ** 2 - 1
+
+    @property
+    def left(self) -> float:
+        """Part of a difference within the body that is left at the end, its face held."""
+        return math.exp(-(math.pi**2) * self.fourier / 4)
+
+    def rows(self) -> Iterator[tuple[str, float, str]]:
+        """Names, values and meanings for a summary."""
+        if math.isfinite(self.biot):
+            verdict = "" if not self.biot else f"; as a lump it would relax {self.fast:.2%} too fast"
+            yield f"Bi_{self.number}", self.biot, f"h L / k of {self.body} at the start{verdict}"
+        yield f"Fo_{self.number}", self.fourier, f"k t / (C L) of {self.body}: length of the run against conduction"
+
+    def warnings(self) -> Iterator[str]:
+        """What is wrong with a lump, and by how much."""
+        if not self.is_lump:
+            return
+        remedy = "Give its `conduction` a number of cells."
+        if math.isfinite(self.biot) and self.biot > SMALL:
+            yield (
+                f"{self.body} is one lump, but its Biot number is {self.biot:.3g}: cooled by itself it would relax "
+                f"{self.fast:.1%} too fast. {remedy}"
+            )
+        if not math.isfinite(self.biot) and self.fourier < LONG:
+            yield (
+                f"{self.body} is one lump in perfect contact, but the run is short against conduction in it: "
+                f"{self.left:.1%} of a difference within it would be left at the end. {remedy}"
+            )
+
+
+def slowest(biot: float) -> float:
+    """The first root of zeta tan(zeta) = Bi.
+
+    >>> round(slowest(1.0), 6), round(slowest(1e-12) ** 2 / 1e-12, 9)
+    (0.860334, 1.0)
+    """
+    z = math.sqrt(biot / (1 + biot / 3)) if biot < 2 else math.pi / 2 * biot / (1 + biot)
+    for _ in range(50):
+        change = (z * math.sin(z) - biot * math.cos(z)) / (math.sin(z) * (1 + biot) + z * math.cos(z))
+        z -= change
+        if abs(change) <= DIGITS * z:
+            break
+    return z
+
+
+def lumpings(system: System, start: Start, end: float) -> list[Lumping]:
+    """The numbers of the bodies that say how they conduct, at the start."""
+    found = []
+    for c in system.conductors:
+        expressions = [system.expand(item) for item in (c.resistance, c.capacity, c.conductance or 0)]
+        resistance, capacity, h = compile_function(system.inputs, expressions)(start.inputs).tolist()
+        biot = h * resistance if c.conductance is not None else math.inf
+        found.append(Lumping(c.number, c.body, c.is_lump, biot, end / (resistance * capacity)))
+    return found

@@ -13,14 +13,14 @@ from surfacechem.results.event_table import entropy_destroyed, event_counts, eve
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
-    from surfacechem.model.system import Profile, System
+    from surfacechem.model.system import System
+    from surfacechem.results.accuracy import Accuracy
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
     from surfacechem.runs.check import Group
     from surfacechem.runs.sweep_dataset import SweepSolution
-    from surfacechem.runs.sweeps import Sweep, SweepAccuracy
     from surfacechem.scene import Scene
-    from surfacechem.solve.run import Run, Trajectory
+    from surfacechem.solve.run import Run
 
 REGIMES = {
     "isothermal": "bodies and interface are kept at one temperature; heat is what has to be supplied for it.",
@@ -52,9 +52,9 @@ def duration(seconds: float) -> str:
     >>> duration(0.00123), duration(75.0)
     ('1.23 ms', '75 s')
     """
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
+    for unit, count in (("s", 1), ("ms", 1_000), ("us", 1_000_000)):
+        if seconds * count >= 1:
+            return f"{seconds * count:.3g} {unit}"
     return f"{seconds:.1g} s"
 
 
@@ -68,14 +68,18 @@ def states(system: System) -> str:
 
 def run_summary(solution: Solution, written: Path | None) -> str:
     """What was solved, how it ended, how accurate and how fast it was, and where it is."""
-    trajectory, books = solution.trajectory, solution.audit
-    system = trajectory.model.system
+    from surfacechem.solve import solver
+
+    trajectory, books, counters = solution.trajectory, solution.audit, solution.trajectory.result.counters
+    run, model = trajectory.run, trajectory.model
+    speed = f"run {duration(trajectory.seconds)}, compile {duration(model.compile_seconds)}"
+    rejected = f", {counters.rejected} rejected" if solver(run.solver).counts_rejected else ""
     lines = [
         solution.title or "untitled",
-        labelled("solved", f"{states(system)}; {system.regime}; {_method(trajectory.run)}"),
+        labelled("solved", _solved(model.system, run)),
         labelled(solution.status, solution.reason),
-        *([labelled("error", _accuracy(solution))] if solution.accuracy else []),
-        labelled("time", f"{_time(solution)}; {_work(trajectory)}"),
+        *([labelled("error", _accuracy(solution.accuracy))] if solution.accuracy else []),
+        labelled("time", f"{speed}; {counters.steps} steps{rejected}, {counters.residuals} residuals"),
         *([labelled("events", event_summary(trajectory.jumps, books.energy_scale))] if trajectory.jumps else []),
         labelled("balances", _balances(books)),
         *(labelled("pair", str(verdict)) for verdict in solution.verdicts if verdict.consistent),
@@ -85,32 +89,59 @@ def run_summary(solution: Solution, written: Path | None) -> str:
     return "\n".join(lines)
 
 
+def _solved(system: System, run: Run) -> str:
+    return f"{states(system)}; {system.regime}; {run.solver} at rtol {run.rtol:g}"
+
+
+def _accuracy(accuracy: Accuracy) -> str:
+    worst = max(accuracy.variables, key=lambda name: accuracy.variables[name], default="")
+    where = f" in {worst}" if worst else ""
+    asked = "" if accuracy.asked is None else f"; {accuracy.asked:.0e} was asked"
+    return accuracy.source if math.isnan(accuracy.error) else f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
+
+
+def _balances(books: Audit) -> str:
+    residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
+    if not books.least:
+        return f"{residuals}; nothing dissipates"
+    if books.violations:
+        worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
+        return f"{residuals}; ENTROPY DESTROYED by {worst}"
+    if books.destroys:
+        return f"{residuals}; ENTROPY DESTROYED by all laws together"
+    least = min(books.least.values())
+    error = ", within the error of the run" if least < 0 else ""
+    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){error})"
+
+
 def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
     """What was swept, how the runs ended, how accurate and how fast they were, and where they are."""
-    sweep, accuracy = solution.sweep, solution.accuracy
-    axes = [f"{name} ({_span(axis.values)}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
+    sweep, lines = solution.sweep, [solution.title or "untitled"]
+    spans = {
+        name: f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis.values) > 1 else f"{axis.values[0]:g}"
+        for name, axis in solution.axes.items()
+    }
+    axes = [f"{name} ({spans[name]}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
+    lines.append(labelled("swept", " by ".join(axes)))
+    lines.append(labelled("solved", _solved(solution.system, sweep.run)))
+    lines.append(labelled("ended", f"{len(sweep)} runs: {solution.ends}"))
+    if accuracy := solution.accuracy:
+        known = accuracy.errors[np.isfinite(accuracy.errors)]
+        missing = len(accuracy.errors) - len(known)
+        unknown = f"; unknown in {missing} runs" if missing else ""
+        error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
+        lines.append(labelled("error", error))
     speed = f"run {duration(sweep.seconds)}, compile {duration(sweep.model.compile_seconds)}"
-    lines = [
-        solution.title or "untitled",
-        labelled("swept", " by ".join(axes)),
-        labelled("solved", f"{states(solution.system)}; {solution.system.regime}; {_method(sweep.run)}"),
-        labelled("ended", f"{len(sweep)} runs: {solution.ends}"),
-        *([labelled("error", _sweep_accuracy(accuracy))] if accuracy else []),
-        labelled("time", f"{speed}; {sweep.steps} steps"),
-        *([labelled("events", events)] if (events := _sweep_events(solution)) else []),
-        labelled("balances", _sweep_balances(sweep)),
-        *([labelled("written", str(written))] if written else []),
-    ]
+    lines.append(labelled("time", f"{speed}; {sweep.steps} steps"))
+    if events := _sweep_events(solution):
+        lines.append(labelled("events", events))
+    energy, entropy, sites = (f"{sweep.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
+    count = sum(books.destroys for books in sweep.audits)
+    verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
+    lines.append(labelled("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"))
+    if written:
+        lines.append(labelled("written", str(written)))
     return "\n".join(lines)
-
-
-def _sweep_accuracy(accuracy: SweepAccuracy) -> str:
-    """The largest error that is known, and of how many runs none is."""
-    known = accuracy.errors[np.isfinite(accuracy.errors)]
-    missing = len(accuracy.errors) - len(known)
-    if not len(known):
-        return f"unknown ({accuracy.source})"
-    return f"{known.max():.2g} ({accuracy.source})" + (f"; unknown in {missing} runs" if missing else "")
 
 
 def _sweep_events(solution: SweepSolution) -> str:
@@ -131,62 +162,6 @@ def _sweep_events(solution: SweepSolution) -> str:
     return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
 
 
-def _sweep_balances(sweep: Sweep) -> str:
-    """The worst of all runs."""
-    worst = ", ".join(
-        f"{name} {sweep.worst(kind):.1e}"
-        for name, kind in (("energy", "energy"), ("entropy", "entropy"), ("sites", "site"))
-    )
-    count = sum(books.destroys for books in sweep.audits)
-    return f"{worst}; " + (f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy")
-
-
-def _span(values: Sequence[float]) -> str:
-    return f"{values[0]:g} to {values[-1]:g}" if len(values) > 1 else f"{values[0]:g}"
-
-
-def _method(run: Run) -> str:
-    return f"{run.solver} at rtol {run.rtol:g}"
-
-
-def _time(solution: Solution) -> str:
-    trajectory = solution.trajectory
-    return f"run {duration(trajectory.seconds)}, compile {duration(trajectory.model.compile_seconds)}"
-
-
-def _work(trajectory: Trajectory) -> str:
-    from surfacechem.solve import solver
-
-    counters = trajectory.result.counters
-    rejected = [f"{counters.rejected} rejected"] if solver(trajectory.run.solver).counts_rejected else []
-    return ", ".join([f"{counters.steps} steps", *rejected, f"{counters.residuals} residuals"])
-
-
-def _accuracy(solution: Solution) -> str:
-    accuracy = solution.accuracy
-    assert accuracy is not None
-    worst = max(accuracy.variables, key=lambda name: accuracy.variables[name], default="")
-    where = f" in {worst}" if worst else ""
-    if math.isnan(accuracy.error):
-        return accuracy.source
-    asked = "" if accuracy.asked is None else f"; {accuracy.asked:.0e} was asked"
-    return f"{accuracy.error:.2g}{where}{asked} ({accuracy.source})"
-
-
-def _balances(books: Audit) -> str:
-    residuals = f"energy {books.energy_error:.1e}, entropy {books.entropy_error:.1e}, sites {books.site_error:.1e}"
-    if not books.least:
-        return f"{residuals}; nothing dissipates"
-    if books.destroys and not books.violations:
-        return f"{residuals}; ENTROPY DESTROYED by all laws together"
-    if books.violations:
-        worst = ", ".join(f"{law} ({books.least[law]:.3g} W/(m^2 K))" for law in books.violations)
-        return f"{residuals}; ENTROPY DESTROYED by {worst}"
-    least = min(books.least.values())
-    error = ", within the error of the run" if least < 0 else ""
-    return f"{residuals}; every law dissipates (least {least:.2g} W/(m^2 K){error})"
-
-
 def check_summary(
     title: str,
     system: System,
@@ -197,69 +172,39 @@ def check_summary(
     choices: Sequence[Sequence[str]] = (),
 ) -> str:
     """A scene said back in words, with its numbers and what is odd about it."""
-    sections = [
-        title or "untitled",
-        labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}"),
-        labelled("run", _plan(system, run)),
-        _section("Choices", choices),
-        _section("States", _state_rows(system)),
-        _section("Roles", [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]),
-        _section("Modes", _mode_rows(system)),
-        _section("Transitions", [(item.name, item.reason) for item in system.edges]),
-        _section("Laws", _law_rows(scene)),
-        _section("Numbers", [(g.name, _value(g), g.text) for g in groups]),
-        _section("Warnings", [(warning,) for warning in warnings]),
-    ]
-    return "\n".join(section for section in sections if section)
-
-
-def _plan(system: System, run: Run) -> str:
-    parts = [f"{_method(run)}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
-    inside = [t for t in system.breakpoints if 0 < t < run.times[-1]]
-    if inside:
-        parts.append(f"{len(inside)} breakpoint{'s' if len(inside) > 1 else ''}")
-    if any(not margin.terminal for margin in system.margins):
-        parts.append("kinks: " + ", ".join(m.reason for m in system.margins if not m.terminal))
-    return "; ".join(parts)
-
-
-def _section(heading: str, rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join([heading, *(f"  {line}" for line in columns(rows))]) if rows else ""
-
-
-def _state_rows(system: System) -> list[tuple[str, ...]]:
-    kinds = {True: "algebraic", False: "evolved"}
-    return [
-        (
-            s.name,
-            f"[{s.quantity.unit}]",
-            kinds[s.algebraic],
-            f"{'guess' if s.algebraic else 'from'} {s.initial:g}",
-            s.quantity.long_name,
-        )
-        for s in system.states
-        if s.name not in system.inside
-    ] + [_profile_row(system, profile) for profile in system.profiles]
-
-
-def _profile_row(system: System, profile: Profile) -> tuple[str, ...]:
-    starts = {state.name: state.initial for state in system.states}
-    start = f"from {starts[profile.states[0]]:g}" if profile.states else ""
-    text = f"temperatures across {profile.body}, in {len(profile.points) - 1} cells"
-    return profile.name, "[K]", "evolved", start, text
-
-
-def _mode_rows(system: System) -> list[tuple[str, str]]:
-    return [(mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())) for mode in system.modes]
-
-
-def _law_rows(scene: Scene) -> list[tuple[str, str]]:
     from surfacechem.runs.check import laws_of
 
-    return [(law.contract, law.name()) for law in laws_of(scene)]
-
-
-def _value(group: Group) -> str:
-    from surfacechem.runs.check import significant
-
-    return significant(group.value) + ("" if group.unit == "1" else f" {group.unit}")
+    plan = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
+    if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
+        plan.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")
+    if kinks := [margin.reason for margin in system.margins if not margin.terminal]:
+        plan.append(f"kinks: {', '.join(kinks)}")
+    starts, several = {state.name: state.initial for state in system.states}, []
+    for s in system.states:
+        if s.name not in system.inside:
+            kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
+            several.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
+    for p in system.profiles:
+        start = f"from {starts[p.states[0]]:g}" if p.states else ""
+        text = f"temperatures across {p.body}, in {len(p.points) - 1} cells"
+        several.append((p.name, "[K]", "evolved", start, text))
+    values = [f"{g.value:.4g}" if g.unit == "1" else f"{g.value:.4g} {g.unit}" for g in groups]
+    sections: dict[str, Sequence[Sequence[str]]] = {
+        "Choices": choices,
+        "States": several,
+        "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
+        "Modes": [
+            (mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
+            for mode in system.modes
+            if len(mode.words) > 1
+        ],
+        "Transitions": [(item.name, item.reason) for item in system.edges],
+        "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
+        "Numbers": [(g.name, value, g.text) for g, value in zip(groups, values, strict=True)],
+        "Warnings": [(warning,) for warning in warnings],
+    }
+    lines = [title or "untitled", labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}")]
+    lines.append(labelled("run", "; ".join(plan)))
+    for heading, rows in sections.items():
+        lines += [heading, *(f"  {line}" for line in columns(rows))] if rows else []
+    return "\n".join(lines)

@@ -19,7 +19,7 @@ from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.laws.longrange import ElectrostaticFlatFlat, LennardJonesFlatFlat, VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
-from surfacechem.runs.check import cautions
+from surfacechem.runs.check import start_warnings
 from surfacechem.scene import Interface, Mounting, Scene, Sites
 from surfacechem.solve.run import Model, Run
 
@@ -132,7 +132,7 @@ MORE = {
 
 def told_by_check(made):
     model = Model(assemble(made))
-    return cautions(model, model.problem(Run(np.linspace(0.0, 1.0, 2)), model.values()))
+    return start_warnings(model, model.problem(Run(np.linspace(0.0, 1.0, 2)), model.values()), None, 1.0)
 
 
 @pytest.mark.parametrize("name", LESS)
