@@ -105,3 +105,11 @@ CONSERVED = 1e-10
 """Rates slower than this part of the fastest are zero, of a conserved quantity: eigenvalues err by EPS times the
 condition of their vectors, 1e5 at most in scaled rows.
 """
+
+SAME = 1e-9
+"""Numbers of a scene and of an exact solution that are the same: cases are written with nine digits and converted."""
+
+MISMATCH = 1e-6
+"""Part of an equation by which an exact solution may miss it: differences in time keep seven digits near events, where
+they are worst. Scenes that differ in more than their sixth digit are told apart.
+"""

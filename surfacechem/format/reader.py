@@ -6,13 +6,13 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.substances import Fluid, Property
+from surfacechem.contracts.substances import Property
 from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
@@ -25,7 +25,6 @@ from surfacechem.format.sections import (
     REFERENCE,
     BodySection,
     CellAccuracy,
-    ConductionSection,
     Document,
     FarSide,
     InterfaceSection,
@@ -33,13 +32,13 @@ from surfacechem.format.sections import (
     MediumSection,
     ReferenceSection,
     RunSection,
-    StageSection,
     Threshold,
 )
 from surfacechem.quantities import VARIABLES
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.scene import Body, Conduction, Interface, Medium, Mounting, Scene, Sites, Stage
 from surfacechem.solve.run import DEFAULT_RTOL, OWN, Run
+from surfacechem.tolerances import NOTHING
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
@@ -52,9 +51,6 @@ TAKEN = ("interface", "surroundings", "reference")
 
 FIRST_CELLS = 16
 """Cells of a body before a run has chosen them."""
-
-SUM = 1e-9
-"""How far fractions that are written in decimals may miss one in their sum."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +80,18 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     nothing = Tree(None, tree.place)
     bodies = top.get("bodies", nothing).mapping()
     interface = top.get("interface", nothing).mapping(keys(InterfaceSection))
-    if "bodies" in top:
-        _check_bodies(top["bodies"], bodies)
+    if "bodies" in top and len(bodies) != 2:
+        raise top["bodies"].error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
+    for name, body in bodies.items():
+        if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
+            raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
+    # Temperatures of body 1, body 2 and the interface; some names may only stand for that of their owner.
     owners = [body.mapping().get("temperature") for body in bodies.values()] + [interface.get("temperature")]
-    temperatures = _temperature_names(owners)
+    names = [str(owner.value) if owner is not None and is_name(owner) else "" for owner in owners]
+    for name, owner in zip(names, owners, strict=True):
+        if owner is not None and (name in RESERVED or (name in OWNERS and names[OWNERS[name]] != name)):
+            raise owner.error(f"'{name}' is {VARIABLES[name].long_name}, which has its own; use another name.")
+    temperatures = tuple(dict.fromkeys(filter(None, names)))
     context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies))
     mechanism = None
     if "mechanism" in interface:
@@ -98,24 +102,6 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         coverages = (variable.name for variable in mechanism.variables)
         context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})
     return read(Document, tree, context), mechanism
-
-
-def _check_bodies(tree: Tree, bodies: Mapping[str, Tree]) -> None:
-    if len(bodies) != 2:
-        raise tree.error(f"exactly two bodies are needed, not {len(bodies)}; the first is body 1.")
-    for name, body in bodies.items():
-        if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
-            raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
-
-
-def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
-    """Names of the temperatures of body 1, body 2 and the interface; some may only name that of their owner."""
-    names = [str(tree.value) if tree is not None and is_name(tree) else None for tree in owners]
-    for name, tree in zip(names, owners, strict=True):
-        owner = OWNERS.get(str(name))
-        if tree is not None and (name in RESERVED or (owner is not None and names[owner] != name)):
-            raise tree.error(f"'{name}' is {VARIABLES[str(name)].long_name}, which has its own; use another name.")
-    return tuple(dict.fromkeys(name for name in names if name is not None))
 
 
 # -- scene ------------------------------------------------------------------------------------------------------------
@@ -142,26 +128,24 @@ def scene_of(case: Document, mechanism: Mechanism | None) -> Scene:
 def _body(name: str, section: BodySection) -> Body:
     stores = section.more or section.has("capacity")
     energy = BodySection.energy(section.tree)(**section.more, place=section.tree.place) if stores else None
-    conduction = _conduction(section.conduction) if section.conduction else None
-    return Body(name, section.temperature, energy, conduction)
-
-
-def _conduction(section: ConductionSection) -> Conduction:
-    accuracy = section.cells.accuracy if isinstance(section.cells, CellAccuracy) else None
-    cells = 0 if section.cells == LUMP else section.cells if isinstance(section.cells, int) else FIRST_CELLS
+    if (given := section.conduction) is None:
+        return Body(name, section.temperature, energy)
+    accuracy = given.cells.accuracy if isinstance(given.cells, CellAccuracy) else None
+    cells = 0 if given.cells == LUMP else given.cells if isinstance(given.cells, int) else FIRST_CELLS
     if cells % 2:
-        raise section.error(f"cells must be even, so that half of them show the error; got {cells}.", "cells")
-    far = section.far if isinstance(section.far, FarSide) else None
-    return Conduction(
-        thickness=section.thickness,
-        conductivity=section.conductivity,
+        raise given.error(f"cells must be even, so that half of them show the error; got {cells}.", "cells")
+    far = given.far if isinstance(given.far, FarSide) else None
+    conduction = Conduction(
+        thickness=given.thickness,
+        conductivity=given.conductivity,
         cells=cells,
         accuracy=accuracy,
-        grading=section.grading,
+        grading=given.grading,
         far=far.temperature if far else None,
         h_far=far.h if far else None,
-        place=section.tree.place,
+        place=given.tree.place,
     )
+    return Body(name, section.temperature, energy, conduction)
 
 
 def _interface(case: Document, mechanism: Mechanism | None) -> Interface:
@@ -203,7 +187,7 @@ def _partition(case: Document) -> tuple[float, float]:
         raise section.error("an interface with a temperature divides its heat by itself; remove it.", "partition")
     if not isinstance(shares, Mapping):
         return shares, 0.0
-    if abs(sum(shares.values()) - 1) > SUM:
+    if abs(sum(shares.values()) - 1) > NOTHING:  # fractions are written in decimals
         raise section.error(f"the fractions of the heat must add up to 1, not {sum(shares.values()):g}.", "partition")
     if shares.get("surroundings") and case.surroundings is None:
         message = "the surroundings have no temperature. Add `surroundings: {temperature: ...}`."
@@ -226,7 +210,7 @@ def _sites(section: InterfaceSection, bodies: Sequence[str]) -> Sites | None:
 
 
 def _medium(section: MediumSection) -> Medium:
-    properties = {}
+    properties, fluid = {}, None
     for key, declared in keys(MediumSection).items():
         name, value = declared.attribute, getattr(section, declared.attribute)
         if name not in VARIABLES or value is None:
@@ -235,25 +219,21 @@ def _medium(section: MediumSection) -> Medium:
             about = VARIABLES[value.quantity].long_name
             raise section.error(f"{value.name()} is a law of the {about}, not of the {key}.", key)
         properties[name] = value
-    return Medium(_fluid(section), properties, section.thickness, tuple(section.temperatures))
-
-
-def _fluid(section: MediumSection) -> Fluid | None:
     if section.fluid is None:
         for name in ("pressure", "temperatures"):
             if section.has(name):
                 raise section.error(f"`{name}` belongs to a fluid. Add `fluid:`, or remove it.", name)
-        return None
-    if section.pressure is None:
+    elif section.pressure is None:
         raise section.error("the fluid needs a `pressure`, for example `pressure: 1 atm`.")
-    from surfacechem.media.coolprop import CoolPropFluid
+    else:
+        from surfacechem.media.coolprop import CoolPropFluid
 
-    fluid = CoolPropFluid(section.fluid, section.pressure)
-    try:
-        fluid.check()
-    except InputError as error:
-        raise section.error(error.message, "fluid") from None
-    return fluid
+        fluid = CoolPropFluid(section.fluid, section.pressure)
+        try:
+            fluid.check()
+        except InputError as error:
+            raise section.error(error.message, "fluid") from None
+    return Medium(fluid, properties, section.thickness, tuple(section.temperatures))
 
 
 def _normal(case: Document) -> Mounting | None:
@@ -282,28 +262,27 @@ def _stiffness(body: BodySection) -> float | None:
 
 
 def _stages(case: Document) -> tuple[Stage, ...]:
-    stages = tuple(_stage(name, section) for entry in case.programme for name, section in entry.items())
+    stages = []
+    for name, section in ((name, section) for entry in case.programme for name, section in entry.items()):
+        stage = Stage(name, section.more, place=section.tree.place)
+        if section.has("for") and section.has("until"):
+            raise section.error("the stage has two ends: give `for` or `until`.", "until")
+        if not isinstance(section.until, Mapping):
+            stages.append(replace(stage, duration=section.duration, event=section.until or ""))
+            continue
+        ((variable, value),) = section.until.items()
+        if not isinstance(value, Threshold):
+            stages.append(replace(stage, variable=variable, value=value))
+            continue
+        ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
+        if len(ends) != 1:
+            raise value.error("give `rises-to` or `falls-to`.")
+        stages.append(replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None))
     for stage in stages[:-1]:
         if stage.duration is None and not stage.variable and not stage.event:
-            raise case.error(
-                f"only the last stage may be without end: give {stage.name} `for` or `until`.", "programme"
-            )
-    return stages
-
-
-def _stage(name: str, section: StageSection) -> Stage:
-    stage = Stage(name, section.more, place=section.tree.place)
-    if section.has("for") and section.has("until"):
-        raise section.error("the stage has two ends: give `for` or `until`.", "until")
-    if not isinstance(section.until, Mapping):
-        return replace(stage, duration=section.duration, event=section.until or "")
-    ((variable, value),) = section.until.items()
-    if not isinstance(value, Threshold):
-        return replace(stage, variable=variable, value=value)
-    ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
-    if len(ends) != 1:
-        raise value.error("give `rises-to` or `falls-to`.")
-    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
+            message = f"only the last stage may be without end: give {stage.name} `for` or `until`."
+            raise case.error(message, "programme")
+    return tuple(stages)
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
@@ -355,20 +334,18 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
 
 def _find(name: str, base: Path, tree: Tree) -> Path:
     """Beside the case, in the package, or where Cantera itself looks."""
-    for folders in ((base, shipped.mechanisms()), _of_cantera()):
-        for folder in folders:
-            path = document.beside(folder, name, tree.place)
-            if path is not None:
-                return path
+
+    def of_cantera() -> Iterator[Path]:
+        import cantera  # slow, hence last
+
+        yield from (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
+
+    for folder in chain((base, shipped.mechanisms()), of_cantera()):
+        path = document.beside(folder, name, tree.place)
+        if path is not None:
+            return path
     known = [path.stem for path in shipped.mechanisms().glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
-
-
-def _of_cantera() -> Iterator[Path]:
-    """The folders in which Cantera itself looks for mechanisms."""
-    import cantera
-
-    yield from (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
 
 
 # -- run and exact solution -------------------------------------------------------------------------------------------
@@ -394,25 +371,26 @@ def run_of(section: RunSection) -> Run:
 
 
 def _times(section: RunSection) -> tuple[float, ...]:
-    if section.times is None and section.until is None:
+    """Output times [s], listed or spaced."""
+    if (listed := section.times) is not None:
+        for name in ("until", "outputs", "spacing", "first"):
+            if section.has(name):
+                raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
+        if max(listed, default=0.0) == 0.0:
+            raise section.error("at least one time after 0 is needed.", "times")
+        times = tuple(listed) if listed[0] == 0.0 else (0.0, *listed)
+    elif section.until is None:
         raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
-    times = _spaced(section, section.until) if section.times is None else _listed(section, section.times)  # type: ignore[arg-type]
+    else:
+        times = _spaced(section, section.until)
     if any(b <= a for a, b in pairwise(times)):
         message = "output times must increase from each to the next."
-        raise section.error(message, "until" if section.times is None else "times")
+        raise section.error(message, "until" if listed is None else "times")
     return times
 
 
-def _listed(section: RunSection, times: Sequence[float]) -> tuple[float, ...]:
-    for name in ("until", "outputs", "spacing", "first"):
-        if section.has(name):
-            raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
-    if max(times, default=0.0) == 0.0:
-        raise section.error("at least one time after 0 is needed.", "times")
-    return tuple(times) if times[0] == 0.0 else (0.0, *times)
-
-
 def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
+    """Output times [s], evenly or by ratios."""
     count, first = section.outputs, section.first
     if section.spacing == LINEAR:
         if first is not None:
@@ -422,9 +400,8 @@ def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
         raise section.error("logarithmic spacing needs `first`: the first output time after 0.", "spacing")
     if first > end:
         raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first")
-    steps = max(count - 2, 1)
     ratio = math.log(end) - math.log(first)
-    return (0.0, *(first * math.exp(ratio * i / steps) for i in range(count - 2)), end)
+    return (0.0, *(first * math.exp(ratio * i / max(count - 2, 1)) for i in range(count - 2)), end)
 
 
 def exact_solution_of(tree: Tree) -> ExactSolution | None:

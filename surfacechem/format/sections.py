@@ -58,6 +58,9 @@ LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
 MOST_AXES = 2
 
+STEEPEST = 1e6
+"""Ratio of the widths of the first and the last cell at most, so that they keep their order in doubles."""
+
 
 def _variables(names: Sequence[str], content: Content) -> dict[str, Key]:
     """Keys that are variables, in their units."""
@@ -95,7 +98,7 @@ class ConductionSection(Section):
         REQUIRED,
     )
     grading: float = quantity(
-        "1", "width of the cells at the far side over that at the contact", 1.0, at_least=1e-6, at_most=1e6
+        "1", "width of the cells at the far side over that at the contact", 1.0, at_least=1 / STEEPEST, at_most=STEEPEST
     )
     far: str | FarSide = key(
         Shapes(

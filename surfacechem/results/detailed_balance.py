@@ -16,8 +16,9 @@ import numpy as np
 
 from surfacechem.results.audit import Audit
 from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import NEGLIGIBLE
 
-ROUNDED = 1e-3
+ROUNDED = NEGLIGIBLE
 """Departures below this are rounding of published numbers."""
 
 

@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.model.system import System
 from surfacechem.solve.run import Trajectory
-
-ROUNDING = 1e-12
-"""Part of its largest size below zero that a quantity may be by rounding: a choice, some 4,500 roundings, more than the
-terms of a formula add up to. What is below zero by less goes untold."""
+from surfacechem.tolerances import ROUNDING
 
 
 def capped_rates(trajectory: Trajectory) -> list[str]:

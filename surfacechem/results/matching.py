@@ -20,19 +20,14 @@ from surfacechem.references.base import Reference, SceneView
 from surfacechem.results.event_table import SIDE
 from surfacechem.scene import Scene
 from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import DIGITS, MISMATCH, QUARTER_EPS, ROUNDING, SAME, SQRT_EPS
 
 Array = NDArray[np.float64]
 Solution = Callable[[Array], dict[str, Array]]
 """Exact values under the names of the scene, at any times."""
 
-MISMATCH = 1e-6
-"""Largest part of an equation by which a solution may miss it; differences in time are good to 1e-7 or better."""
-
-SAME, NOTHING = 1e-9, 1e-12
-"""Relative difference of numbers that are the same, and the part of a scale that counts as nothing."""
-
-ROUNDING = 8 * float(np.finfo(float).eps)
-"""Last digits of a difference."""
+LAST_DIGITS = 2 * DIGITS
+"""Last digits of a difference of five values."""
 
 PROBES = 7
 """Times at which the equations are tested; as many stretches between events, where there are so many."""
@@ -45,8 +40,15 @@ smaller jump is taken for a change, and what is beyond it counts as an error."""
 EDGE = 0.01
 """Part of a stretch near its ends in which nothing is tested: a run knows the times of its events only so well."""
 
-BRIEF = 1e-7
-"""Part of the time so far below which a stretch is too short for differences in time."""
+BRIEF = 8 * SQRT_EPS
+"""Part of the time so far below which an arc is too short for differences in time: their steps are STEP of it, 1e-11 of
+the time, of which its last digit is 2e-5.
+"""
+
+STEP = QUARTER_EPS
+"""Step of differences in time over five points, in parts of the time that an arc has lasted: truncation is of fourth
+order, 2e-16, and rounding 1e-12.
+"""
 
 
 def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Trajectory) -> dict[str, Array]:
@@ -113,7 +115,7 @@ def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) 
 
 
 def _same(a: float, b: float, scale: float) -> bool:
-    return abs(a - b) <= max(SAME * max(abs(a), abs(b)), NOTHING * scale)
+    return abs(a - b) <= max(SAME * max(abs(a), abs(b)), ROUNDING * scale)
 
 
 def _solution(reference: Reference, view: SceneView, t: Array) -> dict[str, Array]:
@@ -243,7 +245,7 @@ def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple
 
     InputError where the solution leaves a state open.
     """
-    step = 1e-4 * since
+    step = STEP * since
     exact = solution(np.concatenate([t - 2 * step, t - step, t, t + step, t + 2 * step]))
     names = [state.name for state in run.model.system.states]
     missing = [name for name in names if name not in exact]
@@ -251,4 +253,4 @@ def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple
         raise InputError(f"it says nothing of {', '.join(missing)}.")
     values = np.array([exact[name] for name in names]).reshape(len(names), 5, len(t))
     slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
-    return values[:, 2].T, slope.T, (ROUNDING * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
+    return values[:, 2].T, slope.T, (LAST_DIGITS * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T

@@ -21,18 +21,15 @@ from surfacechem.results.netcdf import Column, versions
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
+from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
 
-LOST = 1e-4
-"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result."""
-
-ROUNDING = 1e-12
-"""Values beyond a range by less than this part of their largest have not left it."""
+LOST = NEGLIGIBLE / 10
+"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
+digits none is left that counts.
+"""
 
 LARGE, WITHIN = 1e-2, 10
 """Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
-
-LOST_HEAT = 1e-9
-"""Heat that rounding of a flux may carry in a run, relative to the total energy."""
 
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
@@ -122,8 +119,8 @@ class Solution(Results):
         everywhere, duration = self.trajectory.everywhere, self.trajectory.result.t
         largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
         # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
-        content = self.trajectory.roundings.get("E_total", 0.0) / np.finfo(float).eps
-        felt = LOST_HEAT * max(_largest(everywhere["E_total"]), content)
+        content = self.trajectory.roundings.get("E_total", 0.0) / EPS
+        felt = FLOOR * max(_largest(everywhere["E_total"]), content)
         lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
         advice = "let the two share one temperature, or use the heat_into variables, which are exact"
         return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []

@@ -21,12 +21,12 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import Account, Margin, Named, System
 from surfacechem.quantities import Quantity
 from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import FEWEST
 
-BROKEN = 1e-12
-"""Survival below which a run has ruptured and ends."""
-
-INTACT = 1e-6
-"""With more survivors at the end the mean is not known."""
+INTACT = FEWEST**0.5
+"""With more survivors at the end, 1e-6, the mean is not known: what is left then is less than half of the decades to
+FEWEST, at which a run has ruptured and ends.
+"""
 
 MEDIAN, MODE = "half of the bonds are broken", "the density of ruptures is stationary"
 
@@ -94,7 +94,7 @@ def with_rupture(system: System, variable: str) -> System:
         ledger=(*system.ledger, Account(mean, survival * speed, "statistics")),
         margins=(
             *system.margins,
-            Margin("intact", survival - BROKEN, "all bonds broke"),
+            Margin("intact", survival - FEWEST, "all bonds broke"),
             Margin("median", survival - 0.5, MEDIAN, terminal=False),
             Margin("mode", _total(system, falling), MODE, terminal=False),
         ),
