@@ -60,7 +60,7 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
     _check_start(exact, run)
-    _check(solution, run)
+    check_equations(solution, run)
     return exact
 
 
@@ -178,7 +178,7 @@ def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
                 raise InputError(f"it starts from {state.name} = {start:.9g}, the scene from {ours:.9g}.")
 
 
-def _check(solution: Solution, run: Trajectory) -> None:
+def check_equations(solution: Solution, run: Trajectory) -> None:
     """Refuse a solution that does not satisfy the scene's equations."""
     if len(run.result.times) < 2:
         return  # the run ended at its start
