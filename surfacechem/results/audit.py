@@ -240,7 +240,7 @@ def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen
     part[1 : 1 + 2 * n] = max(EPS, SLACK * trajectory.run.rtol)
     least[1 : 1 + n] = SLACK * result.problem.atol
     filler, filled = model.program.filler, model.program.filled(rows.copy())
-    read = filler.reads(rows) if filler else None
+    read = filler.reads(rows) if filler else np.empty(0)
     now = model.output_function(filled)[:, columns]
     found = EPS * np.abs(now)
     for j in range(rows.shape[1]):
