@@ -47,12 +47,7 @@ class Exact:
     @classmethod
     def of(cls, reference: R, read: Callable[[R, Array], Values] = Reference.solution, **more: Any) -> Exact:
         """What an exact solution says, as it is or as ``read`` off it; its parameters are the data."""
-        return cls(
-            lambda t: read(reference, t),
-            data=_data(reference),
-            again=lambda data, t: read(_changed(reference, data), t),
-            **more,
-        )
+        return cls(lambda t: read(reference, t), **_varied(reference, read), **more)
 
 
 @dataclass(frozen=True)
@@ -68,15 +63,13 @@ class Stops:
     @classmethod
     def of(cls, reason: str, reference: R, read: Callable[[R], float] = lambda one: one.end_time) -> Stops:
         """The end of an exact solution, or what is ``read`` off it; its parameters are the data."""
-        return cls(reason, read(reference), data=_data(reference), again=lambda data: read(_changed(reference, data)))
+        return cls(reason, read(reference), **_varied(reference, read))
 
 
-def _data(reference: Reference) -> dict[str, float]:
-    return {item.name: getattr(reference, item.name) for item in fields(reference)}  # type: ignore[arg-type]
-
-
-def _changed(reference: R, data: Mapping[str, float]) -> R:
-    return type(reference)(**{name: data[name] for name in _data(reference)})
+def _varied(reference: R, read: Callable[..., Any]) -> dict[str, Any]:
+    """The parameters of an exact solution as data, and what is read off it for other data."""
+    data = {item.name: getattr(reference, item.name) for item in fields(reference)}  # type: ignore[arg-type]
+    return {"data": data, "again": lambda data, *t: read(type(reference)(**data), *t)}
 
 
 @dataclass(frozen=True)

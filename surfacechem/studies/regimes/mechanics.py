@@ -16,6 +16,9 @@ from surfacechem.references.stick_slip import StickSlip
 from surfacechem.studies.regimes import Array, Exact, Regime, Stops, Trial
 
 SHORTEST = 1e-5
+"""Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
+bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
+"""
 
 
 class FilmRegime(Regime):
