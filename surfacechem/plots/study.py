@@ -165,7 +165,10 @@ def stability(dataset: xarray.Dataset) -> Figure:
         handles = [
             Patch(facecolor="none", edgecolor="none", label=f"{MARKS[n]}  {text}") for n, text in MEANING.items()
         ]
-        plot.legend(handles=handles, loc="outside lower center", ncols=4, handlelength=0, frameon=False, fontsize=8)
+        wide = {"ncols": min(4, max(1, int(size[0] / 1.9)))}  # the longest of the texts takes 1.9 inches
+        plot.legend(
+            handles=handles, loc="outside lower center", ncols=across, handlelength=0, frameon=False, fontsize=8
+        )
     return plot
 
 

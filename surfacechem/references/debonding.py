@@ -43,9 +43,15 @@ class SuddenDebonding(UniformBody):
         return {**super().from_scene(scene), **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
 
     @property
+    def traction(self) -> float:
+        """Traction [Pa] at which the interface debonds."""
+        return self.t_n
+
+    @property
     def released_energy(self) -> float:
         """Energy [J/m^2] that ends as heat."""
-        return 0.5 * self.t_n**2 * (1.0 / self.k + self.compliance) - 0.5 * self.K_0 * self.phi_i * (2.0 - self.phi_i)
+        elastic = 0.5 * self.traction**2 * (1.0 / self.k + self.compliance)
+        return elastic - 0.5 * self.K_0 * self.phi_i * (2.0 - self.phi_i)
 
     @property
     def final_temperature(self) -> float:
@@ -101,13 +107,7 @@ class PulledToDebonding(SuddenDebonding):
 
     @property
     def traction(self) -> float:
-        """Traction [Pa] at which the interface debonds."""
         return self.t_n * self.phi_i * self.T_0 / self.T_i
-
-    @property
-    def released_energy(self) -> float:
-        """Energy [J/m^2] that ends as heat."""
-        return super().released_energy + 0.5 * (self.traction**2 - self.t_n**2) * (1.0 / self.k + self.compliance)
 
     def quantities(self, t: Array) -> Quantities:
         if self.verdict == "impossible":

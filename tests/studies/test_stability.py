@@ -207,6 +207,10 @@ def test_the_figure_is_drawn_from_the_file(study, tmp_path):
     text = (tmp_path / "again.svg").read_text()
     for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits", "possible"):
         assert f"<!-- {word} -->" in text
+    plot = study.figure()
+    plot.draw_without_rendering()
+    legend = plot.legends[0].get_window_extent()
+    assert 0 <= legend.x0 < legend.x1 <= plot.bbox.width  # however few values a regime has
     done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "--variables", "digits"])
     assert done.exit_code == 2
     assert "the figure of a study has no choice of variables" in done.output
