@@ -165,10 +165,9 @@ def stability(dataset: xarray.Dataset) -> Figure:
         handles = [
             Patch(facecolor="none", edgecolor="none", label=f"{MARKS[n]}  {text}") for n, text in MEANING.items()
         ]
-        wide = {"ncols": min(4, max(1, int(size[0] / 1.9)))}  # the longest of the texts takes 1.9 inches
-        plot.legend(
-            handles=handles, loc="outside lower center", ncols=across, handlelength=0, frameon=False, fontsize=8
-        )
+        columns = min(4, max(1, int(size[0] / 1.9)))  # the longest of the texts takes 1.9 inches
+        look: Any = {"ncols": columns, "handlelength": 0, "frameon": False, "fontsize": 8}
+        plot.legend(handles=handles, loc="outside lower center", **look)
     return plot
 
 
