@@ -13,7 +13,7 @@ TIGHT, TIGHTER = 1e-10, 1e-12
 SAFETY, ROUNDING = 10.0, 1e-11
 """Allowed times the errors of both, and what rounding of hand-written formulas may add."""
 
-FEW, MANY = range(3), range(100, 140)
+FEW, MANY = range(2), range(100, 140)
 
 
 def compare(family, seed: int) -> None:

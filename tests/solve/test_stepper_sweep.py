@@ -52,7 +52,7 @@ def test_exothermic(rtol: float) -> None:
 def test_smooth_tables(name: str) -> None:
     table = MAKERS[name]()
     model = Model(assemble(table.scene))
-    for rtol in TOLERANCES:
+    for rtol in TOLERANCES[::2]:
         trajectory = model.solve(Run(times=with_start(table), rtol=rtol))
         assert trajectory.status == "finished", trajectory.reason
         assert max(errors(table, trajectory).values()) < CONDITION * rtol
@@ -64,7 +64,7 @@ def test_extreme_tables(name: str) -> None:
     """Layers of 1e-300 s and slopes beyond 1e200: solved, or where the tolerance does not resolve them, given up."""
     table = MAKERS[name]()
     model = Model(assemble(table.scene))
-    for rtol in TOLERANCES:
+    for rtol in TOLERANCES[::2]:
         trajectory = model.solve(Run(times=with_start(table), rtol=rtol))
         if rtol > COARSE and not trajectory.result.success:
             continue
