@@ -11,6 +11,14 @@ EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")
 """Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
 
 
+LONG = (*EVERY_CASE, "test_docs", "test_random_scenes", "test_heat_of_jumps", "test_conduction", "test_reversals")
+"""Files that take longest: they go first, so that no worker is left alone with one of them at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: item.path.stem not in LONG)
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """With ``--dist loadfile``, files that run every case go to the same worker."""

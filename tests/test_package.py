@@ -1,5 +1,6 @@
 """What is built and installed is complete."""
 
+import os
 import subprocess
 import sys
 import tarfile
@@ -44,6 +45,20 @@ def test_wheel_holds_the_package_its_cases_and_its_mechanisms(wheel):
     inside = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert inside >= files("surfacechem", ".py") | data
     assert {name.split("/")[0] for name in inside} == {"surfacechem"}
+
+
+def test_the_wheel_runs_by_itself(dist, tmp_path):
+    """From a folder of its own, without the checkout; that it needs nothing else is seen where it is installed first."""
+    (path,) = dist.glob("*.whl")
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(tmp_path), str(path)]
+    subprocess.run(command, check=True)
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    code = "import surfacechem; print(surfacechem.__file__, surfacechem.run('exothermic').accuracy.error)"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    place, error = done.stdout.split()
+    assert Path(place).is_relative_to(tmp_path)
+    assert float(error) < 1e-8
 
 
 def test_wheel_has_the_command_and_the_license(wheel):
