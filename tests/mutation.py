@@ -34,17 +34,17 @@ LONGEST = 600
 
 OF_BALANCES = [
     ["balances"],
-    ["zoo", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "bonds"],
+    ["zoo", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "chemistry"],
     ["tables", "tables_bonds", "tables_mechanics"],
-    ["paces", "events_mechanics", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
+    ["start", "hybrid", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
-    ["folds", "breaking", "bounds", "pulled", "media", "first_trials", "instants", "reactor", "evaluated"],
-    ["impact", "plane", "plane_springs", "creeping_mass", "load_jumps", "local_jumps", "neighbours"],
+    ["folds", "breaking", "bound", "pulled", "media", "instant", "reactor", "evaluated"],
+    ["impact", "plane", "plane_springs", "creep", "load_path", "neighbours"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],
-    ["bonds", "friction_memory", "heat_paths", "limits"],
-    ["tables_bonds", "tables_mechanics", "contact_laws", "media", "kinks_at_breaks"],
+    ["chemistry", "friction_memory", "heat_paths", "limits"],
+    ["tables_bonds", "tables_mechanics", "contact_laws", "media", "segments"],
 ]
 
 

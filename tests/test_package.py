@@ -48,7 +48,7 @@ def test_wheel_holds_the_package_its_cases_and_its_mechanisms(wheel):
 
 
 def test_the_wheel_runs_by_itself(dist, tmp_path):
-    """From a folder of its own, without the checkout; that it needs nothing else is seen where it is installed first."""
+    """From a folder of its own, without the checkout."""
     (path,) = dist.glob("*.whl")
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(tmp_path), str(path)]
     subprocess.run(command, check=True)

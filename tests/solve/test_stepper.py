@@ -1,6 +1,7 @@
 """The compiled stepper: hard problems with known answers, events, batches, failures."""
 
 import mpmath
+import numba
 import numpy as np
 import pytest
 import symengine as se
@@ -16,11 +17,27 @@ from solver_problems import (
     robertson_dae,
 )
 
+import surfacechem
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
 from surfacechem.solve.radau.solver import Radau, consistent, output_rates, solve_many
-from surfacechem.solve.radau.tables import COLLOCATION, GAMMA, INVERSE, NODES, PAIR_VALUES, STAGES
+from surfacechem.solve.radau.tables import (
+    COLLOCATION,
+    DEFECT,
+    FROM_PARTS,
+    GAMMA,
+    INVERSE,
+    NEWTON_NODES,
+    NODES,
+    PAIR_VALUES,
+    SCAN_RATES,
+    SCAN_VALUES,
+    SCANNED,
+    STAGES,
+    TO_PARTS,
+)
+from surfacechem.solve.radau.work import ROWS, combine
 
 radau = Radau()
 
@@ -399,3 +416,106 @@ def test_a_return_code_without_words_ends_the_step():
 
     with pytest.raises(StepError, match="return code -60"):
         _Stretch(Library(), 0.0, 1.0, np.zeros(1))
+
+
+# -- tables of the Radau family, and their products with the stages ---------------------------------------------------
+
+each_member = pytest.mark.parametrize("k", range(3))
+
+
+@numba.njit
+def product(table, rows, terms, values, states, out):
+    combine(table.ctypes.data, table.shape[1], rows, terms, values.ctypes.data, states, out.ctypes.data)
+
+
+@pytest.mark.parametrize("states", [1, 2, 3, 4, 5, 7, 8, 30])
+@pytest.mark.parametrize("stages", STAGES)
+def test_any_number_of_states(stages, states):
+    """What runs over the end of a row is written over, or lies behind the last stage."""
+    random = np.random.default_rng(states)
+    table, values = random.normal(size=(7, 7)), random.normal(size=(ROWS, states))
+    out = np.zeros((ROWS, states))
+    product(table, stages, stages, values, states, out)
+    expected = np.einsum("ij,jm->im", table[:stages, :stages], values[:stages])
+    np.testing.assert_allclose(out[:stages], expected, rtol=1e-13, atol=1e-14)
+
+
+@each_member
+def test_parts_are_eigenvectors(k):
+    """The inverse of the collocation matrix in its real eigenbasis: a number and a rotation with growth each pair."""
+    s = STAGES[k]
+    blocks = np.zeros((s, s))
+    blocks[0, 0] = GAMMA[k]
+    for i, value in zip(range(1, s, 2), PAIR_VALUES[k], strict=False):
+        blocks[i : i + 2, i : i + 2] = [[value.real, -value.imag], [value.imag, value.real]]
+    found = FROM_PARTS[k, :s, :s] @ blocks @ -TO_PARTS[k, :s, :s]
+    np.testing.assert_allclose(found, INVERSE[k, :s, :s], rtol=1e-11, atol=1e-11)
+
+
+@each_member
+def test_scanned_points_lie_on_the_polynomial(k):
+    s, points = STAGES[k], SCANNED[k, : 4 * k + 9]
+    polynomial = np.poly1d([*np.random.default_rng(k).normal(size=s), 0.0])
+    stages = polynomial(NODES[k, :s])
+    rows = slice(len(points)), slice(s)
+    np.testing.assert_allclose(SCAN_VALUES[k][rows] @ stages, polynomial(points), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(SCAN_RATES[k][rows] @ stages, polynomial.deriv()(points), rtol=1e-11, atol=1e-12)
+    assert np.all(np.diff(points) > 0)
+    assert list(SCAN_VALUES[k, len(points) - 1, :s]) == [0.0] * (s - 1) + [1.0]
+
+
+@each_member
+def test_the_scanned_correction_is_that_of_dense_output(k):
+    s, points = STAGES[k], SCANNED[k, : 4 * k + 9]
+    shape = DEFECT[k, s + 1]
+    for i in range(s, -1, -1):
+        shape = shape * (points - NEWTON_NODES[k, i]) + DEFECT[k, i]
+    np.testing.assert_allclose(SCAN_VALUES[k, : len(points), s], shape * points, atol=1e-12)
+
+
+# -- steps serve the ledger too where the states hardly feel what it integrates ---------------------------------------
+
+RTOL = 1e-11
+
+
+def booked(rate, end, x_0=0.0, group=0):
+    """A quadrature beside x' = 1 - x: its values at the end of a run, and the steps and refusals."""
+    t, x, dx = se.symbols("t x dx")
+    program = compile_program(t, [x], [dx], [], [dx - 1 + x], ledger=[rate(t, x, dx)], groups=(group,))
+    result = radau.solve(problem(program, [x_0], [0.0, end], RTOL, times=[end]))
+    assert result.status == Status.FINISHED
+    return result.ledger[0], result.counters
+
+
+def wall(t):
+    """Power of the repulsion 1/g^9 on the gap g = 1/10 + (t - 1)^2."""
+    return -9 * (se.Rational(1, 10) + (t - 1) ** 2) ** -10 * 2 * (t - 1)
+
+
+def test_work_on_a_gap_that_is_moved_through_a_steep_wall():
+    work, counters = booked(lambda t, x, dx: wall(t), 1.5)
+    exact = 0.35**-9 - 1.1**-9
+    assert work == pytest.approx(exact, abs=1e-9 * 0.1**-9)
+    assert counters.rejected > 0
+    open_work, few = booked(lambda t, x, dx: wall(t), 1.5, group=-1)
+    assert abs(open_work - exact) > 1e-6 * 0.1**-9
+    assert few.steps < counters.steps
+
+
+def test_logarithm_of_a_coverage_that_starts_at_zero():
+    """The integral of ln(x) dx from 0 is x ln(x) - x."""
+    entropy, _ = booked(lambda t, x, dx: dx * se.log(se.Max(x, 1e-300)), 1.0)
+    x = 1 - np.exp(-1.0)
+    assert entropy == pytest.approx(x * np.log(x) - x, abs=1e-8)
+
+
+def test_a_rate_that_is_noise_does_not_hold_up_a_run():
+    """The rate is the rounding of x + 10^6."""
+    _, counters = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0)
+    _, alone = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0, group=-1)
+    assert counters.steps < 10 * alone.steps + 100
+
+
+@pytest.mark.parametrize("name", ["l-selectin-tether", "elastic-bonds-at-a-gap"])
+def test_bonds_that_start_at_full_coverage(name):
+    assert surfacechem.run(name).audit.entropy_error < 1e-8

@@ -1,20 +1,25 @@
 """Events of moving gaps: at the start, at breakpoints, coincident, brief, without end; energies and verdicts."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import tables_mechanics as scenes
-from scenes import SITES, path, perfect_contact, varying
+from scenes import SITES, bodies, path, perfect_contact, varying
 from tables_mechanics import solve
 
+from surfacechem.format import load_text
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
-from surfacechem.laws.cohesive import TensileStrength
-from surfacechem.laws.contact import BondedContact, InterfaceCapacity, Penalty, TangentialStiffness
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength
+from surfacechem.laws.contact import BondedContact, InterfaceCapacity, NormalStiffness, Penalty, TangentialStiffness
 from surfacechem.laws.factors import Linear, LinearInTemperature
-from surfacechem.laws.friction import Coulomb
+from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
+from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
 from surfacechem.solve.jumps import ADMISSIBLE
 from surfacechem.solve.run import Model, Run
@@ -276,3 +281,269 @@ def test_work_on_a_contact_at_rest():
 def test_bonds_form_only_while_sticking():
     factor = Linear(of="sticking", about=1.0, slope=1.0)
     assert (factor.factor(x=1.0), factor.factor(x=0.0)) == (1.0, 0.0)
+
+
+# -- scenes that one tries first, against closed forms worked out by hand ---------------------------------------------
+
+P, MU, K = 1e5, 0.5, 1e10
+"""A slider of stiffness K sticks up to MU P."""
+
+DIGITS = 65.0 * 300.0 * float(np.finfo(float).eps)
+"""Heat that the last digit of the temperature of both bodies stands for [J/m^2]."""
+
+
+def finished(
+    until, potentials=(), frictions=(), limits=(), initial=None, loading=None, closed=1e-9, rtol=1e-11, **scene
+):
+    interface = Interface("T", potentials, frictions, sites=SITES if limits else None, limits=limits)
+    start = {"T": 300.0} | (initial or {})
+    whole = Scene(bodies("T", "T"), interface, loading=loading or {}, T_0=300.0, initial=start, **scene)
+    trajectory = Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21), rtol=rtol))
+    assert trajectory.status == "finished", trajectory.reason
+    books = audit(trajectory)
+    assert np.max(np.abs(books.energy)) < closed * books.energy_scale + DIGITS
+    assert books.violations == ()
+    return trajectory
+
+
+def events(trajectory):
+    return [(jump.edge.name, jump.t) for jump in trajectory.jumps]
+
+
+def final(trajectory, name):
+    return trajectory.result.y[[state.name for state in trajectory.model.system.states].index(name)]
+
+
+def block(history, until=1.0, initial=None, closed=1e-9, **mount):
+    loading = {"p": Hold(level=P), "w_t": history}
+    mounting = Mounting(k=K, **mount)
+    return finished(until, (), [Coulomb(mu=MU)], initial=initial, loading=loading, closed=closed, tangential=mounting)
+
+
+def test_a_free_body_leaves_a_zone_with_the_energy_it_brought():
+    zone, m, v, g = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14), 1e-2, -5.0, 1e-7
+    start = {"g_n": g, "v_n": v}
+    trajectory = finished(1e-6, [zone], initial=start, loading={"F_n": Hold(level=0.0)}, normal=Mounting(m=m))
+    assert [name for name, _ in events(trajectory)] == ["touch", "release"]
+    left = v**2 + 2 / m * (zone.energy(g_n=g) - zone.energy(g_n=float(final(trajectory, "g_n"))))
+    assert final(trajectory, "v_n") == pytest.approx(math.sqrt(left), rel=1e-10)
+
+
+def test_two_strengths_reached_at_once_break_the_interface_once():
+    limits = [TensileStrength(t_max=1e6), TensileStrength(t_max=1e6)]
+    trajectory = finished(
+        2.0,
+        [BondEnergy(K_0=0.01)],
+        limits=limits,
+        initial={"phi": 1.0},
+        loading={"w_n": Ramp(rate=1e-6)},
+        normal=Mounting(k=1e12),
+    )
+    assert events(trajectory) == [("debond", pytest.approx(1.0, rel=1e-12))]
+    assert trajectory.jumps[0].released == pytest.approx(0.5 - 0.005, rel=1e-12)
+
+
+def test_sliding_begins_before_the_interface_debonds():
+    loading = {"w_n": Ramp(rate=1e-6), "w_t": Ramp(rate=1e-6)}
+    trajectory = finished(
+        2.0,
+        [BondedContact(E_n=1e13), BondEnergy(K_0=0.01)],
+        [MohrCoulomb(mu=0.5, c=5e5)],
+        [TensileStrength(t_max=5e5)],
+        {"phi": 1.0},
+        loading,
+        normal=Mounting(k=1e12),
+        tangential=Mounting(k=1e12),
+    )
+    # 1/k + 1/E = 1.1e-12 m/Pa; joint release of both springs less the bonds
+    assert events(trajectory) == [
+        ("slip forward", pytest.approx(0.5, rel=1e-12)),
+        ("debond", pytest.approx(0.55, rel=1e-12)),
+    ]
+    assert trajectory.jumps[1].released == pytest.approx(0.5 * 5e5**2 * 1.1e-12 - 0.005, rel=1e-9)
+
+
+@pytest.mark.parametrize(("excess", "slips"), [(-1e-12, 0), (1e-9, 6)])
+def test_a_limit_that_is_all_but_touched_and_one_that_is_passed(excess, slips):
+    amplitude = MU * P / K * (1 + excess)
+    trajectory = block(Harmonic(amplitude=amplitude, frequency=1.0), until=3.0)
+    assert len([name for name, _ in events(trajectory) if name.startswith("slip")]) == slips
+
+
+def test_a_limit_that_is_reached_at_the_start():
+    trajectory = block(Ramp(start=MU * P / K, rate=1e-6), until=3.0)
+    assert events(trajectory) == [("slip forward", 0.0)]
+    assert final(trajectory, "u_t") == pytest.approx(3e-6, rel=1e-9)
+
+
+PULSE = Table(times=[0.0, 0.5, 0.5 + 5e-10, 0.5 + 1e-9, 1.0], values=[0.0, 0.0, 2 * MU * P / K, 0.0, 0.0])
+"""A billionth of the run, to twice the limit."""
+
+
+def test_a_brief_pulse_makes_a_slider_slip():
+    """Twice the limit forward, then back until the spring holds the limit the other way, which it does not pass."""
+    trajectory = block(PULSE, closed=1e-6)  # the pulse lasts ten million last digits of its time
+    times = [0.5 + 2.5e-10, 0.5 + 5e-10]
+    assert [name for name, _ in events(trajectory)] == ["slip forward", "stop"]
+    assert [t for _, t in events(trajectory)] == pytest.approx(times, abs=3e-16)
+
+
+def test_a_brief_pulse_pushes_a_mass():
+    """Impulse of the force above the limit, and its stop by friction an eighth of the pulse after it."""
+    trajectory = block(PULSE, initial={"v": 0.0, "u_t": 0.0}, closed=1e-5, m=1.0)
+    assert events(trajectory)[-1][0] == "stop"
+    assert events(trajectory)[-1][1] == pytest.approx(0.5 + 1.125e-9, abs=1e-15)
+    assert final(trajectory, "v") == 0.0
+
+
+def test_stages_that_end_at_forces_times_and_events():
+    stages = (
+        Stage("approach", {"w_n": -1e-7}, event="touch"),
+        Stage("press", {"w_n": -1e-7}, variable="p", value=1e5),
+        Stage("hold", {}, duration=1.0),
+        Stage("slide", {"w_t": 1e-7}, event="slip forward"),
+        Stage("further", {"w_t": 1e-7}, duration=0.5),
+        Stage("pull", {"w_n": 1e-7}, event="release"),
+        Stage("leave", {"w_n": 1e-7}),
+    )
+    trajectory = finished(
+        20.0,
+        [Penalty(E_n=1e13)],
+        [Coulomb(mu=0.3)],
+        initial={"w_n": 1e-7, "w_t": 0.0, "g_n": 1e-7},
+        normal=Mounting(k=1e12),
+        tangential=Mounting(k=1e12),
+        programme=stages,
+        rtol=1e-12,
+    )
+    # p = 1e5 Pa at w = -1.1e-7 m, sliding at 0.3 p / k = 3e-8 m; released 1.1 s after the pull begins
+    found = dict(reversed(events(trajectory)))
+    names = ("touch", "end of press", "end of hold", "slip forward", "end of further", "release")
+    assert [found[name] for name in names] == pytest.approx([1.0, 2.1, 3.1, 3.4, 3.9, 5.0], rel=1e-9)
+
+
+def test_a_contact_that_softens_with_temperature_cools_as_it_is_loaded():
+    """S = C (T / T_0 - 1) + 1/2 E_0 a g^2 stays, with the stiffness E_0 [1 - a (T - T_0)] and C = 3 J/(m^2 K)."""
+    contact = NormalStiffness(E_n=varying(1e13, LinearInTemperature(slope=-1e-3)))
+    load = Harmonic(amplitude=-1e-6, frequency=0.1)
+    trajectory = finished(20.0, [contact], loading={"w_n": load}, normal=Mounting(k=1e13))
+    values = trajectory.everywhere
+    capacity = sum(body.energy.C for body in bodies())
+    T = 300.0 * (1 - 0.5 * 1e10 * values["g_n"] ** 2 / capacity)
+    assert values["T"] == pytest.approx(T, rel=1e-10)
+    assert np.ptp(values["T"]) > 1e-3
+
+
+# -- a thousand events and more lose nothing: every jump is exact to rounding, and none is told that does not happen --
+
+BODIES = bodies("T", "T", C_1=1.0, C_2=1.0)
+
+
+def solved(interface, loading, mounts, end, rtol, initial=None):
+    scene = Scene(BODIES, interface, (), loading, None, 300.0, {"T": 300.0, **(initial or {})}, **mounts)
+    return Model(assemble(scene)).solve(Run(np.linspace(0.0, end, 11).tolist(), rtol, max_steps=10**6))
+
+
+@pytest.mark.parametrize(("rtol", "lost"), [(1e-11, 1e-9), (1e-13, 1e-11)])
+def test_a_mass_bounces_a_thousand_times(rtol, lost):
+    """Nothing takes energy from a mass that falls on a spring: it comes back to where it was let go."""
+    height = 1e-3
+    trajectory = solved(
+        Interface("T", [Penalty(E_n=1e8)]),
+        {"F_n": Hold(level=-10.0)},
+        {"normal": Mounting(k=0.0, m=1.0)},
+        20.0,
+        rtol,
+        {"g_n": height},
+    )
+    assert len(trajectory.jumps) > 1000
+    assert audit(trajectory).energy_error < lost
+    energy = {float(0.5 * jump.before.y[1] ** 2) for jump in trajectory.jumps}
+    np.testing.assert_allclose(sorted(energy), 10.0 * height, rtol=10 * lost)
+
+
+def swung(friction, V, end, rtol):
+    loading = {"p": Hold(level=1e3), "w_t": Ramp(rate=V)}
+    return solved(Interface("T", frictions=[friction]), loading, {"tangential": Mounting(k=1e5, m=1.0)}, end, rtol)
+
+
+def test_a_mass_sticks_and_slips_a_thousand_times():
+    """Period and slip of each cycle are the same to rounding, and all work is heat."""
+    V, omega, drop = 5e-3, np.sqrt(1e5), (0.4 - 0.2) * 1e3 / 1e5
+    trajectory = swung(Coulomb(mu=0.2, mu_s=0.4), V, 500.0, 1e-11)
+    begun = [jump for jump in trajectory.jumps if jump.edge.name == "slip forward"]
+    assert len(trajectory.jumps) > 1000
+    period = 2 * drop / V + 2 * (np.pi - np.arctan(omega * drop / V)) / omega
+    np.testing.assert_allclose(np.diff([jump.t for jump in begun]), period, rtol=1e-9)
+    assert audit(trajectory).energy_error < 1e-12
+    assert all(abs(jump.before.y[1]) < 1e-11 * V for jump in trajectory.jumps)
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-11, 1e-13])
+def test_sliding_that_only_just_stops_does_so_at_rest(rtol):
+    """Static and kinetic friction alike and no damper: the velocity touches zero once in each of 1000 periods."""
+    V, omega = 1e-3, np.sqrt(1e5)
+    trajectory = swung(Coulomb(mu=0.3), V, 3.0 + 1000 * 2 * np.pi / omega, rtol)
+    assert all(abs(jump.before.y[1]) < 1e-9 * V for jump in trajectory.jumps)
+    assert all(jump.released < 1e-18 for jump in trajectory.jumps)
+    assert audit(trajectory).energy_error < max(rtol, 1e-11)
+
+
+# -- output times have no part in a run: steps, events and states are the same to the last bit whatever is asked for --
+
+LUMPS = """
+T_0: 300 K
+bodies:
+  a: {temperature: T, capacity: constant, C: 2 J/m^2/K, stiffness: 2e12 Pa/m}
+  b: {temperature: T, capacity: constant, C: 1 J/m^2/K, stiffness: 6e12 Pa/m}
+"""
+
+COHESIVE = f"""
+title: A mass that bounces against a cohesive zone
+{LUMPS}
+interface:
+  temperature: T
+  potential:
+    - exponential-cohesive-zone:
+        t_max: {{value: 2 MPa, times: [power: {{exponent: -1}}]}}
+        g_0: 300 nm
+        E_n: 3e13 Pa/m
+mechanics:
+  normal: {{m: 0.2 kg/m^2, c_b: 2e4 Pa s/m, c_g: 1e4 Pa s/m, beta_1: 0.3}}
+loading: {{w_n: {{harmonic: {{mean: 0.2 um, amplitude: 1 um, frequency: 60 kHz}}}}}}
+initial: {{T: 280 K, g_n: 100 nm, v_n: 5 mm/s}}
+run: {{until: 400 us}}
+"""
+
+RINGING = f"""
+title: Debonding that rings
+{LUMPS}
+interface:
+  temperature: T
+  sites: 1e18 1/m^2
+  potential:
+    - bonded-contact: {{E_n: 1.5e13 Pa/m}}
+    - bond-energy: {{K_0: 2 J/m^2}}
+  limits:
+    - tensile-strength: {{t_max: {{value: 9 MPa, times: [power: {{exponent: -1}}]}}}}
+mechanics: {{normal: {{m: 5 kg/m^2, c_b: 1e5 Pa s/m}}}}
+loading: {{w_n: {{harmonic: {{amplitude: 6 um, frequency: 2 kHz}}}}}}
+initial: {{T: 300 K, phi: 1, g_n: 0}}
+run: {{until: 3 ms}}
+"""
+
+
+@pytest.mark.parametrize("text", [COHESIVE, RINGING])
+def test_outputs_change_nothing(text):
+    simulation = Simulation(load_text(text))
+    run, found = simulation.case.run, []
+    for n in (2, 31, 301, 777):
+        times = np.linspace(0.0, run.times[-1], n).tolist()
+        trajectory = simulation.model.solve(replace(run, times=times))
+        assert trajectory.status == "finished"
+        result, jumps = trajectory.result, trajectory.jumps
+        events = np.array([[jump.t, jump.released, *jump.after.y] for jump in jumps])
+        blocks = (events, result.steps.t, result.steps.y, result.steps.ydot, result.y, result.ledger)
+        found.append((len(jumps), result.counters.steps, result.counters.rejected, *(b.tobytes() for b in blocks)))
+    assert len(set(found)) == 1
+    assert found[0][0] > 10
