@@ -11,7 +11,7 @@ though one of the two alone may run uphill: into the hotter body, from an interf
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import symengine
 
@@ -30,12 +30,15 @@ Conductances = dict[tuple[str, str], list[Expression]]
 
 def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
     """Fluxes between nodes and external heat; returns the conductances."""
-    found: Conductances = {}
-    for law in build.scene.heat:
-        if law.between[0] == law.between[1]:
-            raise InputError(f"a heat path needs two different ends, not {law.between[0]} twice.", _ends(law))
-    for paths in _by_ends(build):
-        found[paths[0].ends] = yield from _between(build, paths)
+    groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
+    for law in (law for law in build.scene.heat if not _made_across(law)):
+        for ends, channels in _paths(build, law):
+            _, together = groups.setdefault(frozenset(ends), (ends, {}))
+            for channel, h in channels.items():
+                together[channel] = together.get(channel, symengine.Integer(0)) + h
+    found = {ends: list(channels.values()) for ends, channels in groups.values()}
+    for ends, channels in groups.values():
+        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
     for law in (law for law in build.scene.heat if _made_across(law)):
         for ends, h in (yield from _through_film(build, law)).items():
             found.setdefault(ends, []).append(h)
@@ -49,9 +52,6 @@ def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
         build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
-    if channels := _mean_channels(build):
-        found[BOTH] = list(channels.values())
-        yield from _into_both(build, channels)
     return found
 
 
@@ -92,37 +92,19 @@ def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
     return channels
 
 
-def check_closure(build: Build, law: HeatTransfer) -> None:
-    """Closures other than the direct one need two bodies."""
-    if not set(law.between) <= {body.name for body in build.scene.bodies}:
+def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
+    """The nodes of the ends of a path, which are two; closures other than the direct one are of the two bodies."""
+    a, b = law.between
+    if a == b:
+        raise InputError(f"a heat path needs two different ends, not {a} twice.", _ends(law))
+    first, second = end_node(build, a, law), end_node(build, b, law)
+    if law.closure != "direct" and not {a, b} <= {body.name for body in build.scene.bodies}:
         raise InputError(f"`closure: {law.closure}` belongs to a path between the two bodies.", law.place)
-
-
-@dataclass(frozen=True)
-class _Path:
-    """A conductance between two ends [W/(m^2 K)], by what carries the heat."""
-
-    ends: tuple[str, str]
-    channels: Mapping[str, Expression]
-
-
-def _by_ends(build: Build) -> list[list[_Path]]:
-    """The heat paths, those between the same two ends together."""
-    groups: dict[frozenset[str], list[_Path]] = {}
-    for law in build.scene.heat:
-        if law.closure == "mean" or _made_across(law):
-            continue
-        for path in _paths(build, law):
-            groups.setdefault(frozenset(path.ends), []).append(path)
-    return list(groups.values())
-
-
-def _two_temperatures(build: Build, law: HeatTransfer) -> None:
-    """A path between two bodies that share one temperature carries nothing."""
-    first, second = (end_node(build, end, law) for end in law.between)
+    if first is second and law.closure == "mean":
+        raise InputError("`closure: mean` is of two bodies with temperatures of their own.", law.place)
     if first is second:
-        a, b = law.between
         raise InputError(f"the heat path between {a} and {b} has one temperature, {first.name}; remove it.", law.place)
+    return first, second
 
 
 def _made_across(law: HeatTransfer) -> bool:
@@ -141,9 +123,7 @@ def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dic
     and :math:`q_2` likewise. Without a film, r = 0, each wall would have its own path; without resistance of the walls
     the first coefficient is 6/r, and the second takes back what the two paths in series conduct beyond 1/r.
     """
-    check_closure(build, law)
-    _two_temperatures(build, law)
-    centre, ends = end_node(build, "interface", law), [end_node(build, end, law) for end in law.between]
+    ends, centre = _two_nodes(build, law), end_node(build, "interface", law)
     bound = build.variables.bind(law, f"heat.{law.name()}")
     r_1, r, r_2 = build.variables.call(bound, bound.resistances)
     build.law_ranges(law)
@@ -166,36 +146,28 @@ def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dic
     return walls
 
 
-def _paths(build: Build, law: HeatTransfer) -> Iterator[_Path]:
-    """The path of a law, or through the medium two paths of twice the conductance."""
-    a, b = law.between
-    _two_temperatures(build, law)
+def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], dict[str, Expression]]]:
+    """Ends and conductances of a law, by what carries the heat; through the medium two paths of twice as much each."""
+    (a, b), nodes = law.between, _two_nodes(build, law)
     channels = conductances(build, law)
-    if law.closure == "direct":
-        yield _Path((a, b), channels)
-        return
-    check_closure(build, law)
-    double = {name: 2 * h for name, h in channels.items()}
-    for ends in ((a, "interface"), ("interface", b)):
-        if end_node(build, ends[0], law) is not end_node(build, ends[1], law):
-            yield _Path(ends, double)
+    if law.closure == "medium":
+        centre = end_node(build, "interface", law)
+        for ends, node in zip(((a, "interface"), ("interface", b)), nodes, strict=True):
+            if node is not centre:
+                yield ends, {name: 2 * h for name, h in channels.items()}
+    else:
+        yield (a, b) if law.closure == "direct" else BOTH, channels
 
 
-def _between(build: Build, paths: list[_Path]) -> Generator[Power, None, list[Expression]]:
+def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Expression]) -> Iterator[Power]:
     """All paths between two ends: a flux of each channel where there are several, and their sum."""
-    a, b = paths[0].ends
+    (a, b), area = ends, _area(build, ends)
     from_node, to_node = end_node(build, a), end_node(build, b)
-    area = _area(build, (a, b))
-    channels: dict[str, Expression] = {}
-    for path in paths:
-        for channel, h in path.channels.items():
-            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
     difference = from_node.T - to_node.T
     flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
     total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
     produced = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
     yield Power(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
-    return list(channels.values())
 
 
 def named_flux(
@@ -235,19 +207,7 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
-def _mean_channels(build: Build) -> dict[str, Expression]:
-    """Conductances of the paths with the closure `mean`, by what carries the heat."""
-    channels: dict[str, Expression] = {}
-    for law in (law for law in build.scene.heat if law.closure == "mean"):
-        check_closure(build, law)
-        if end_node(build, law.between[0]) is end_node(build, law.between[1]):
-            raise InputError("`closure: mean` is of two bodies with temperatures of their own.", law.place)
-        for channel, h in conductances(build, law).items():
-            channels[channel] = channels.get(channel, symengine.Integer(0)) + h
-    return channels
-
-
-def _into_both(build: Build, channels: dict[str, Expression]) -> Iterator[Power]:
+def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Power]:
     """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)]."""
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -160,7 +160,11 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
 def free_energy(build: Build) -> Energy:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
-    gaps = _gaps(build, bounds)
+    # The tangential gap of a potential where that is not the elastic one: the displacement, or none.
+    parallel = in_parallel(build)
+    gaps: dict[Potential, Mapping[str, Expression]] = {law: {} for law in bounds}
+    gaps |= {law: {"g_t": symengine.Integer(0)} for law in bounds if arrangement(law) == "none"}
+    gaps |= {law: {"g_t": displacement(build)} for law in parallel}
     energies, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
     # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
@@ -181,8 +185,10 @@ def free_energy(build: Build) -> Energy:
         )
     _tractions(build, psi)
     if depends(psi, symengine.Symbol("g_n")):
+        # A potential that may pull bodies that touch says what part of it the contact bears.
         borne = [
-            _per_reference_area(build, b, b.repulsion) if _attracts(b) else energies[law] for law, b in bounds.items()
+            energies[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
+            for law, b in bounds.items()
         ]
         sides = {} if build.find_mode("side") is None else _by_side(symengine.Symbol("g_n"))
         contact = partial(_contact_pressure, build, [symengine.sympify(F).xreplace(sides) for F in borne])
@@ -191,14 +197,6 @@ def free_energy(build: Build) -> Energy:
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
     return replace(energy, psi=psi)
-
-
-def _gaps(build: Build, laws: Iterable[Potential]) -> dict[Potential, dict[str, Expression]]:
-    """The tangential gap of each potential where that is not the elastic one: the displacement, or none."""
-    parallel = in_parallel(build)
-    gaps: dict[Potential, Expression] = dict.fromkeys(parallel, displacement(build)) if parallel else {}
-    gaps |= {law: symengine.Integer(0) for law in laws if arrangement(law) == "none"}
-    return {law: {"g_t": gaps[law]} if law in gaps else {} for law in laws}
 
 
 def _energies(
@@ -230,11 +228,6 @@ def _energies(
     return found, Energy(symengine.Integer(0), rubs, rubbed)
 
 
-def _attracts(law: Potential) -> bool:
-    """Whether a potential may pull bodies that touch, so that it says what part of it the contact bears."""
-    return law.repulsion is not None
-
-
 def _contact_pressure(build: Build, borne: Sequence[Expression]) -> Expression:
     """Sum of what each potential presses [Pa], per current area."""
     pressed = (positive(-derivative(F, symengine.Symbol("g_n"))) for F in borne)
@@ -246,7 +239,7 @@ def _warn_of_net_pressure(build: Build) -> None:
 
     A law with an adhesive strength of its own has it back.
     """
-    attracting = [law.name() for law in build.interface.potentials if _attracts(law)]
+    attracting = [law.name() for law in build.interface.potentials if law.repulsion is not None]
     readers = [*build.interface.frictions, *build.interface.reactions, *build.scene.heat]
     relieved = [law for law in readers if law_reads(law, "p") and not getattr(law, "t_n_max", 0)]
     net = [law.name() for law in relieved if not (isinstance(law, UnderPressure) and law.pressure == "contact")]
