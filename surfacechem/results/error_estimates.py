@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -150,22 +150,37 @@ def second_run(run: Run, kind: str = "run") -> str:
     return f"estimate: a second {kind} at rtol {run.rtol:.0e} that sees what lasts 1/{run.samples:.0f} of it"
 
 
-def apart(first: Trajectory, second: Trajectory) -> tuple[dict[str, float], str]:
+def apart(ours: Trajectory, theirs: Trajectory, first: int = 0) -> tuple[dict[str, float], str]:
     """Largest differences of two runs in each state and in the times of events, and in which events they differ.
 
-    Of a run that ended before its second output only the events and the end are known.
+    States are compared from the ``first`` output that both have; of a run that ended before its second one only the
+    events and the end are known.
     """
-    found, expected = event_times(first), event_times(second)
+    found, expected = event_times(ours), event_times(theirs)
     note = difference(found, expected)
-    times = first.result.times[: len(second.result.times)]
+    count = min(len(ours.result.times), len(theirs.result.times))
     errors: dict[str, float] = {}
-    if len(times) > 1:
-        shared = np.flatnonzero(np.full(len(times), True) if note else beside_jumps(times, first, second))
-        ours, theirs = ({name: values[shared] for name, values in states(run).items()} for run in (first, second))
-        errors = largest_errors(ours, theirs, floors(first))
+    if count > 1:
+        times = theirs.result.times[:count]
+        alike = np.full(count, True) if note else beside_jumps(times, ours, theirs)
+        shared = first + np.flatnonzero(alike[first:])
+        points = [{profile.name: profile.points for profile in run.model.system.profiles} for run in (ours, theirs)]
+        values, true = ({name: each[shared] for name, each in states(run).items()} for run in (ours, theirs))
+        for name in points[0].keys() & points[1].keys():
+            values[name], true[name] = _at_same_places(values[name], true[name], points[0][name], points[1][name])
+        errors = largest_errors(values, {name: true[name] for name in true if name in values}, floors(theirs))
     if found and not note:
-        errors |= event_errors(found, expected, first.run.times[-1])
+        errors |= event_errors(found, expected, ours.run.times[-1])
     return errors, note
+
+
+def _at_same_places(a: Array, b: Array, x_a: Sequence[float], x_b: Sequence[float]) -> tuple[Array, Array]:
+    """Two profiles at the places of the one that has fewer."""
+    if x_a == x_b:
+        return a, b
+    from scipy.interpolate import CubicSpline  # slow to import, and only profiles need it
+
+    return (CubicSpline(x_a, a, axis=1)(x_b), b) if len(x_a) > len(x_b) else (a, CubicSpline(x_b, b, axis=1)(x_a))
 
 
 def beside_jumps(times: Array, first: Trajectory, second: Trajectory) -> NDArray[np.bool_]:

@@ -18,15 +18,12 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts import grids
 from surfacechem.model.system import System
-from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors, largest_errors
-from surfacechem.results.dataset import profile_values
-from surfacechem.results.error_estimates import EVENTS, beside_jumps, difference, event_errors, floors
-from surfacechem.results.event_table import event_times
+from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors
+from surfacechem.results.error_estimates import EVENTS, apart
 from surfacechem.results.solution import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.run import Run, Trajectory
@@ -196,12 +193,12 @@ def refined(scene: Scene, found: CellErrors, parts: Mapping[str, float]) -> Scen
 
 def resolves(scene: Scene, parts: Mapping[str, float]) -> bool:
     """Whether half of the cells resolve layers of these ``parts`` of the bodies, with two or more in a quarter."""
-    return all(law.cells >= 8 and _resolves(law, parts[name]) for name, law in _laws(scene))
 
+    def fine(law: Conduction, layer: float) -> bool:
+        at = replace(law, cells=law.cells // 2).points
+        return all(b - a <= layer + (min(a, 1 - b) if law.far is not None else a) for a, b in pairwise(at))
 
-def _resolves(law: Conduction, layer: float) -> bool:
-    at = replace(law, cells=law.cells // 2).points
-    return all(b - a <= layer + (min(a, 1 - b) if law.far is not None else a) for a, b in pairwise(at))
+    return all(law.cells >= 8 and fine(law, parts[name]) for name, law in _laws(scene))
 
 
 def judged(near: Mapping[str, float], far: Mapping[str, float], rtol: float) -> CellErrors:
@@ -232,41 +229,8 @@ def differences(better: Trajectory, worse: Trajectory) -> dict[str, float]:
 
     The initial values are given, and none of the cells'.
     """
-    expected, found = event_times(better), event_times(worse)
-    count = min(len(better.result.times), len(worse.result.times))
-    times = better.result.times[1:count]
-    other = bool(difference(found, expected)) or better.status != worse.status
-    shared = 1 + np.flatnonzero(np.full(len(times), True) if other else beside_jumps(times, better, worse))
-    exact, values = _curves(better), _curves(worse)
-    pairs = {name: _on_same(values[name], exact[name], shared) for name in exact if name in values}
-    ours, theirs = ({name: pair[k] for name, pair in pairs.items()} for k in (0, 1))
-    errors = largest_errors(ours, theirs, floors(better))
-    if other:
-        errors[EVENTS] = math.inf
-    elif found:
-        errors |= event_errors(found, expected, better.run.times[-1])
-    return errors
-
-
-def _curves(run: Trajectory) -> dict[str, tuple[Sequence[float], Array]]:
-    """States and profiles of a run over time, with the places of profiles."""
-    system = run.model.system
-    lone = [(s.name, j) for j, s in enumerate(system.states) if s.name not in system.inside]
-    found: dict[str, tuple[Sequence[float], Array]] = {name: ((), run.result.outputs[:, j]) for name, j in lone}
-    return found | {profile.name: (profile.points, profile_values(run, profile)) for profile in system.profiles}
-
-
-def _on_same(
-    ours: tuple[Sequence[float], Array], theirs: tuple[Sequence[float], Array], shared: NDArray[np.int64]
-) -> tuple[Array, Array]:
-    """Values of two runs at the same times and at the places of the one that has fewer."""
-    (x, first), (other, second) = ours, theirs
-    first, second = first[shared], second[shared]
-    if len(x) > len(other):
-        first = CubicSpline(x, first, axis=1)(other)
-    elif x != other:
-        second = CubicSpline(other, second, axis=1)(x)
-    return first, second
+    errors, note = apart(worse, better, first=1)
+    return {**errors, EVENTS: math.inf} if note or better.status != worse.status else errors
 
 
 def missed(scene: Scene, errors: CellErrors, found: Accuracy | None = None) -> tuple[str, ...]:

@@ -221,9 +221,9 @@ def test_cells_are_chosen_by_an_accuracy():
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(spatial, "TRIALS", 1)
     simulation = two("{accuracy: 1e-5}")
-    chosen, trajectory, errors = simulation._resolved(simulation.case.run, {})
+    chosen, (trajectory,), errors = simulation._resolved(simulation.case.run, {})
     assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
-    assert errors == chosen._halved(trajectory, given=False)
+    assert errors == [chosen._halved(trajectory, given=False)]
 
 
 def test_the_error_of_the_cells_is_estimated():
