@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import cache
 from itertools import combinations_with_replacement
 
 import cantera as ct
@@ -21,6 +22,11 @@ SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))
 
 
 def load(name, bonds=None):
+    return _loaded(name, None if bonds is None else tuple(bonds))
+
+
+@cache
+def _loaded(name, bonds):
     return load_mechanism(mechanisms() / name, bonds=bonds)
 
 
@@ -29,9 +35,10 @@ def cantera_of(mechanism):
     return ct.Interface(yaml=without_load(mechanism.text), name=mechanism.phase)
 
 
+@cache
 def without_load(text):
     """A mechanism whose loaded rates are the Arrhenius rates that they are without load; others stay as written."""
-    plain = YAML(typ="safe").load(text)
+    plain = json.loads(text) if text.startswith("{") else YAML(typ="safe").load(text)
     types = {entry["type"]: kind_of(entry["type"]) for entry in plain.get("reactions", []) if "type" in entry}
     loaded = {name: law for name, law in types.items() if not law.native}
     for entry in plain.get("reactions", []):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_mechanism import _quiet, compare  # noqa: F401 - a fixture
+from test_rates import _quiet, compare  # noqa: F401 - a fixture
 
 import surfacechem
 from mechanisms import mechanism_texts, number, states

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
-from test_mechanism import _quiet, compare  # noqa: F401 - a fixture
+from test_rates import _quiet, compare  # noqa: F401 - a fixture
 
 from mechanisms import states
 from surfacechem.errors import InputError
