@@ -33,7 +33,7 @@ from surfacechem.model.ledger import flow, regime, sinks, state, totals
 from surfacechem.model.refit import Fit
 from surfacechem.model.sliding.creep import stands_for_velocity
 from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
-from surfacechem.model.system import START, Outside, Profile, Role, System
+from surfacechem.model.system import START, Capped, Caution, Outside, Pace, Pair, Profile, Range, Role, System
 from surfacechem.scene import Scene
 
 __all__ = ["LOADABLE", "TRACTIONS", "assemble"]
@@ -114,11 +114,11 @@ def _system(
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
         roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
-        ranges=tuple(build.ranges),
-        capped=tuple(build.capped),
-        pairs=tuple(build.pairs),
-        paces=tuple(build.paces),
-        cautions=tuple(build.cautions),
+        ranges=build.noted(Range),
+        capped=build.noted(Capped),
+        pairs=build.noted(Pair),
+        paces=build.noted(Pace),
+        cautions=build.noted(Caution),
         profiles=layers,
         conductors=tuple(conductors(build)),
         regime=regime(build),

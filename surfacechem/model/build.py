@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import symengine
 
@@ -22,6 +22,8 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
 from surfacechem.tolerances import NOTHING
 from surfacechem.tolerances import ROUNDING as DIGITS
+
+N = TypeVar("N")
 
 MANY = range(2, 1000)
 
@@ -96,16 +98,13 @@ class Build:
     """All that passes energy on, from which the ledger and the balances of energy follow."""
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
-    ranges: list[Range] = field(default_factory=list)
-    capped: list[Capped] = field(default_factory=list)
     modes: list[Mode] = field(default_factory=list)
     registers: list[Register] = field(default_factory=list)
     edges: list[Edge] = field(default_factory=list)
     equilibria: list[Equilibrium] = field(default_factory=list)
     motion: Motion = field(default_factory=Motion)
-    pairs: list[Pair] = field(default_factory=list)
-    paces: list[Pace] = field(default_factory=list)
-    cautions: list[Caution] = field(default_factory=list)
+    notes: list[Range | Capped | Pair | Pace | Caution] = field(default_factory=list)
+    """What is watched along a run, and told where it matters; no equation depends on it."""
     warnings: list[str] = field(default_factory=list)
     used_names: set[str] = field(default_factory=set)
 
@@ -145,6 +144,10 @@ class Build:
     def constant(self, name: str, path: str, spec: Spec, value: float, *, internal: bool = False) -> Expression:
         """A scene-level number as a run-time parameter."""
         return self.parameters.constant(name, path, spec, value, internal)
+
+    def noted(self, kind: type[N]) -> tuple[N, ...]:
+        """The notes of one kind."""
+        return tuple(note for note in self.notes if isinstance(note, kind))
 
     def bound(self, law: Friction) -> Friction:
         """A friction law with its parameters as symbols, made once."""
@@ -278,7 +281,7 @@ class Build:
     def law_ranges(self, law: Law) -> None:
         """Ranges of variables that a run watches for a law."""
         for name, (low, high) in law.ranges.items():
-            self.ranges.append(Range(str(self.variables.get(name, law)), low, high, law.title))
+            self.notes.append(Range(str(self.variables.get(name, law)), low, high, law.title))
 
     def refuse_never_positive(self, law: Law, own: Mapping[str, Expression]) -> None:
         """A law that divides by what is zero, whatever the state, is none for this scene."""

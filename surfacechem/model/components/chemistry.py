@@ -149,7 +149,7 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
         f"{law.title} forms bonds across an open gap, which it does not read. Where they form in contact only let its "
         "rate fall with the gap, by `gap-attachment` or a factor of g_n"
     )
-    build.cautions.append(Caution(where(g_n > TOUCHING, -formed * rate, 0), text))
+    build.notes.append(Caution(where(g_n > TOUCHING, -formed * rate, 0), text))
 
 
 def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
@@ -176,7 +176,7 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     if found := exponents(rate):
-        build.capped.append(Capped(law.title, tuple(found)))
+        build.notes.append(Capped(law.title, tuple(found)))
     return rate
 
 

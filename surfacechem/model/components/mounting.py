@@ -193,7 +193,7 @@ class FarField:
         """
         moves = rate if moves is None else moves
         text = AXES[self.axis]
-        build.paces += self.paces(text)
+        build.notes += self.paces(text)
         spring, kinetic = self.stored(g), self.m * rate**2 / 2
         for name, energy, what in (
             ("spring", spring, "elastic energy of the bodies"),

@@ -120,7 +120,7 @@ def _name_departure(build: Build, label: str, title: str, log_ratio: Expression,
         inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
     quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
     build.name(quantity, value.subs(inside))
-    build.pairs.append(Pair(quantity.name, title, label))
+    build.notes.append(Pair(quantity.name, title, label))
 
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:

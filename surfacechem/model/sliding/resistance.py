@@ -118,7 +118,7 @@ def _caution(build: Build, law: Friction, bound: Friction) -> None:
             f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on is "
             "what sticking bears"
         )
-        build.cautions.append(Caution(static - kinetic, text))
+        build.notes.append(Caution(static - kinetic, text))
 
 
 def formula_along(law: Friction, d: Direction) -> tuple[str, ...]:
