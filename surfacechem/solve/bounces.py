@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, compile_function
+from surfacechem.compile.program import Function
 from surfacechem.model.system import System
 from surfacechem.solve.contract import Result, Status
+from surfacechem.solve.equilibria import compiled
 from surfacechem.solve.jumps import Jump
 from surfacechem.tolerances import PICOMETRE
 
@@ -48,8 +49,7 @@ class Rebounds:
 
     @cached_property
     def _times(self) -> Function:
-        known = [item.returns for item in self.system.edges if item.returns is not None]
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in known])
+        return compiled(self.system, (edge.returns for edge in self.system.edges if edge.returns is not None))
 
     def see(self, jump: Jump) -> None:
         """Remember a jump where it is a rebound, or ends them."""

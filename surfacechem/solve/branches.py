@@ -9,22 +9,19 @@ found lies where the laws hold: a search ends at the ends of their domains.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import Function, compile_function
-from surfacechem.model.system import System
 from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, PICOMETRE, TINY
 
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
 
-CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": DIGITS, "maxiter": 300, "disp": False}
-"""How closely a root of the tractions is found: to rounding."""
+CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": (1 + NEGLIGIBLE) * DIGITS, "maxiter": 300, "disp": False}
+"""How closely a root of the tractions is found: to rounding, a little more than the least that Brent's method takes."""
 
 FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
@@ -198,22 +195,3 @@ def equilibrium(driving: Field, scale: Array, free: Indices, at: Array, least: f
     # Where nothing bears what is out of balance, Newton's method has no step for it, and that is no rest.
     borne = np.abs(change) @ scale[free] * max(last, 2 * DIGITS)
     return at if np.all(np.abs(driving(at[None])[0, free]) <= 2 * borne) else None
-
-
-class Domain:
-    """The margins of a system at which a law ends and which gaps in equilibrium move, compiled when first needed."""
-
-    def __init__(self, system: System) -> None:
-        gaps = {state.symbol for state in system.states if state.name in {e.state for e in system.equilibria}}
-        ends = [(system.expand(item.expression), item.reason) for item in system.margins if item.domain]
-        self.inputs = system.inputs
-        self.ends = {reason: end for end, reason in ends if end.free_symbols & gaps}
-
-    @cached_property
-    def _margins(self) -> Function:
-        return compile_function(self.inputs, list(self.ends.values()))
-
-    def beyond(self, inputs: Array) -> str:
-        """Why a law does not hold at the inputs, where the gaps have left its domain; empty where all hold."""
-        values = self._margins(inputs) if self.ends else np.empty(0)
-        return next((reason for value, reason in zip(values, self.ends, strict=True) if not value > 0), "")

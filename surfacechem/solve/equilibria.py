@@ -65,6 +65,11 @@ class Point:
         return np.concatenate(([self.t], self.y, self.ydot, self.parameters))
 
 
+def compiled(system: System, expressions: Iterable[Expression]) -> Function:
+    """Machine code of expressions of a system, of its inputs."""
+    return compile_function(system.inputs, [system.expand(item) for item in expressions])
+
+
 @dataclass(frozen=True)
 class Way:
     """A direction in the space of the gaps: what moves, the gap that counts the way, and the tractions along it."""
@@ -101,18 +106,15 @@ class Equilibria:
         self.followers = [1 + self.states.index(name) for name in system.follows]
         """Columns of the states that follow the normal gap where it jumps, among the inputs."""
 
-    def _compiled(self, expressions: Iterable[Expression]) -> Function:
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in expressions])
-
     @cached_property
     def _balance(self) -> Function:
         """Driving traction and size of its parts, for each gap."""
-        return self._compiled(item for e in self.items for item in (e.residual, e.size))
+        return compiled(self.system, (item for e in self.items for item in (e.residual, e.size)))
 
     @cached_property
     def _company(self) -> Function:
         """How far other gaps move with each."""
-        return self._compiled(e.along.get(name, 0) for e in self.items for name in self.states)
+        return compiled(self.system, (e.along.get(name, 0) for e in self.items for name in self.states))
 
     @cached_property
     def _tangents(self) -> Function:
@@ -122,22 +124,22 @@ class Equilibria:
             residual = self.system.expand(e.residual)
             with_it = (self.system.expand(w) * derivative(residual, symbols[x]) for x, w in e.along.items())
             found += [residual, derivative(residual, symbols[e.state]) + sum(with_it)]
-        return self._compiled(found)
+        return compiled(self.system, found)
 
     @cached_property
     def _active(self) -> Function:
         """Zero for gaps that are held."""
-        return self._compiled(e.active for e in self.items)
+        return compiled(self.system, (e.active for e in self.items))
 
     @cached_property
     def _follow(self) -> Function:
         """States that follow the normal gap where it jumps."""
-        return self._compiled(self.system.follows.values())
+        return compiled(self.system, self.system.follows.values())
 
     @cached_property
     def _next_pushes(self) -> Function:
         """Rate at which the loads alone change the driving traction of each gap."""
-        return self._compiled(derivative(self.system.expand(e.residual), self.system.t) for e in self.items)
+        return compiled(self.system, (derivative(self.system.expand(e.residual), self.system.t) for e in self.items))
 
     # -- gaps along a way -----------------------------------------------------------------------------------------
 
@@ -388,7 +390,7 @@ class Equilibria:
     @cached_property
     def _tangent_of_folds(self) -> list[Function | None]:
         """Tangent stiffness of the edges that are folds."""
-        return [self._compiled([edge.fold.tangent]) if edge.fold else None for edge in self.system.edges]
+        return [compiled(self.system, [edge.fold.tangent]) if edge.fold else None for edge in self.system.edges]
 
     @cached_property
     def _shapes_of_folds(self) -> list[Function | None]:
@@ -399,7 +401,8 @@ class Equilibria:
                 found.append(None)
                 continue
             warming = [rise.get(name, 0) for rise in fold.warming for name in self.states]
-            found.append(self._compiled([*fold.falls, *warming, *(entry for row in fold.stiffness for entry in row)]))
+            stiffness = [entry for row in fold.stiffness for entry in row]
+            found.append(compiled(self.system, [*fold.falls, *warming, *stiffness]))
         return found
 
     def _shape(self, index: int, point: Point) -> tuple[Array, Array, Way]:
@@ -467,7 +470,7 @@ class Equilibria:
                 continue
             tangent = self.system.expand(fold.tangent)
             change = sum((derivative(tangent, s.symbol) * s.dot for s in states), derivative(tangent, t))
-            found.append(self._compiled([tangent, change, *alone]))
+            found.append(compiled(self.system, [tangent, change, *alone]))
         return found
 
     def in_time(self, index: int, point: Point, end: float) -> Point:

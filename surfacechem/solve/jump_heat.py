@@ -7,10 +7,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, compile_function
+from surfacechem.compile.program import Function
 from surfacechem.expressions import derivative
 from surfacechem.model.automaton import INTERFACE, Sink
 from surfacechem.model.system import System
+from surfacechem.solve.equilibria import compiled
 from surfacechem.tolerances import ULPS
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ class JumpHeat:
             for name, s in self.nodes.items()
             for item in (s.T, s.energy, derivative(s.energy, s.T), *(share.get(name, 0) for share in shares))
         ]
-        return compile_function(self.system.inputs, [self.system.expand(item) for item in columns])
+        return compiled(self.system, columns)
 
     def at(self, rows: Array) -> tuple[Array, Array, Array, Array]:
         """Temperature, energy, capacity and shares of what each maker makes, of each node, shape (rows, nodes)."""

@@ -13,13 +13,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, Program, compile_function
+from surfacechem.compile.program import Function, Program
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
-from surfacechem.solve.branches import Domain
-from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point
+from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point, compiled
 from surfacechem.solve.jump_heat import JumpHeat
 from surfacechem.solve.load_path import LoadPath, LoadStep
 from surfacechem.tolerances import DIGITS, ROUNDING
@@ -129,15 +128,11 @@ class Jumper:
     @cached_property
     def _resets(self) -> list[Function]:
         """For each edge the new states, and then the new modes and registers."""
-        system = self.system
-        modes = [system.parameters[j].symbol for j in self.mode_columns]
+        states = [state.symbol for state in self.system.states]
+        modes = [self.system.parameters[j].symbol for j in self.mode_columns]
         return [
-            compile_function(
-                system.inputs,
-                [system.expand(edge.reset.get(s.symbol, s.symbol)) for s in system.states]
-                + [system.expand(edge.modes.get(m, m)) for m in modes],
-            )
-            for edge in system.edges
+            compiled(self.system, [*(edge.reset.get(x, x) for x in states), *(edge.modes.get(m, m) for m in modes)])
+            for edge in self.system.edges
         ]
 
     @cached_property
@@ -153,33 +148,35 @@ class Jumper:
         states, t = self.system.states, self.system.t
         guards = [self.system.expand(edge.guard) for edge in self.system.edges]
         rates = [sum((derivative(g, s.symbol) * s.dot for s in states), derivative(g, t)) for g in guards]
-        return compile_function(self.system.inputs, rates)
+        return compiled(self.system, rates)
 
     @cached_property
     def _books(self) -> Function:
         """What a jump conserves, the total entropy, and the potentials of the far-field tractions."""
         system = self.system
-        books = [system.jump_energy, system.find("S_total").expression, *system.given.values()]
-        return compile_function(system.inputs, [system.expand(item) for item in books])
+        return compiled(system, [system.jump_energy, system.find("S_total").expression, *system.given.values()])
 
     @cached_property
     def _energy(self) -> Function:
         """What a jump conserves, by itself: a search asks for it at many rows."""
-        return compile_function(self.system.inputs, [self.system.expand(self.system.jump_energy)])
+        return compiled(self.system, [self.system.jump_energy])
 
     @cached_property
     def _pulls(self) -> Function:
         """Stiffness, displacement and traction of the far field, and the gap, for each direction."""
-        items = [self.system.expand(item) for pull in self.system.pulls.values() for item in pull]
-        return compile_function(self.system.inputs, items)
+        return compiled(self.system, (item for pull in self.system.pulls.values() for item in pull))
 
     def _far_field(self, point: Point) -> Array:
         """Stiffness, displacement, traction and gap, each by direction, shape (4, directions)."""
         return np.asarray(self._pulls(point.inputs()).reshape(-1, 4).T)
 
     @cached_property
-    def _domain(self) -> Domain:
-        return Domain(self.system)
+    def _ends(self) -> list[tuple[str, Function]]:
+        """Why laws end where gaps in equilibrium move, and the limits at which they do."""
+        moved = {e.state for e in self.system.equilibria}
+        gaps = {state.symbol for state in self.system.states if state.name in moved}
+        ends = [m for m in self.system.margins if m.domain and self.system.expand(m.expression).free_symbols & gaps]
+        return [(m.reason, compiled(self.system, [m.expression])) for m in ends]
 
     @cached_property
     def _heat(self) -> JumpHeat:
@@ -310,9 +307,9 @@ class Jumper:
         else:
             raise ImpossibleError(NO_SHARES)
         # Touch leaves gaps where they are; any other jump may leave the domain of a law.
-        beyond = "" if edge.measure else self._domain.beyond(after.inputs())
-        if beyond:
-            raise ImpossibleError(f"{NO_DOMAIN}: {beyond}")
+        closed = [] if edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
+        if closed:
+            raise ImpossibleError(f"{NO_DOMAIN}: {closed[0]}")
         return after, shares
 
     def _rested(self, index: int, release: Release, shares: Array | None, balanced: float) -> Point | None:
@@ -412,7 +409,7 @@ class Jumper:
     def _magnitudes(self) -> Function:
         """Magnitudes of what a jump conserves and of the total entropy."""
         books = [self.system.jump_energy, self.system.find("S_total").expression]
-        return compile_function(self.system.inputs, [magnitude(self.system.expand(item)) for item in books])
+        return compiled(self.system, (magnitude(self.system.expand(item)) for item in books))
 
     def _rounding(self, point: Point, energy: float) -> float:
         """Energy that does not count at a point, beside what it was before [J/m^2]."""

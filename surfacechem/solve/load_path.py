@@ -20,11 +20,11 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import Function, compile_function
+from surfacechem.compile.program import Function
 from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.system import System
 from surfacechem.solve.branches import CLOSEST
-from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way
+from surfacechem.solve.equilibria import Equilibria, Heat, Point, Way, compiled
 from surfacechem.solve.jump_heat import JumpHeat
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class LoadStep:
 
     before: Point
     reached: float = 0.0
-    """Part of the way at which the last transition of this moment takes place."""
+    """Part of the way at which the last edge of this moment is taken."""
 
     def levels(self, system: System, after: Point) -> Array:
         """By how much each parameter changes as the loads go from before the step to after it."""
@@ -165,21 +165,21 @@ class LoadPath:
         return any(self.system.expand(x).free_symbols & hot for x in felt)
 
     @cached_property
-    def _margins(self) -> Function:
-        return compile_function(self.system.inputs, [self.system.expand(item.guard) for item in self.system.edges])
+    def _guards(self) -> Function:
+        return compiled(self.system, (edge.guard for edge in self.system.edges))
 
     def reach(self, index: int, step: LoadStep, before: Point) -> None:
-        """Go along the way of the loads to where a transition takes place that follows from them."""
+        """Go along the way of the loads to where an edge that follows from them is taken."""
         if self.equilibria.slip is None or not self.varies or self.system.edges[index].times:
             return
         change = step.levels(self.system, before)
 
-        def margin(part: float) -> float:
+        def guard(part: float) -> float:
             loaded = at_part(before, change, part)
             held = self._held(loaded, np.abs(before.y - step.before.y))
-            return float(self._margins(replace(held, parameters=loaded.parameters).inputs())[index])
+            return float(self._guards(replace(held, parameters=loaded.parameters).inputs())[index])
 
-        step.reached = _first(margin, step.reached)
+        step.reached = _first(guard, step.reached)
 
     def slides(self, after: Point) -> bool:
         """Whether a jump slides, and the shares of its heat change with the loads."""
