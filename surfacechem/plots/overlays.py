@@ -1,4 +1,4 @@
-"""What lies over the curves of a run: events as thin lines with their names, modes and stages as bands."""
+"""Overlays on the curves of a run: events as thin lines with their names, modes and stages as bands."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WIDE = 0.09
 
 
 def is_mode(values: xarray.DataArray) -> bool:
-    """Whether a variable is a mode of the automaton, as its long name says."""
+    """True for a mode of the automaton, as the long name of a variable says."""
     return str(values.attrs.get("long_name", "")).startswith("mode (")
 
 

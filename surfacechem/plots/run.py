@@ -213,7 +213,7 @@ def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
 
 
 def logarithmic(times: Array) -> bool:
-    """Whether the times want a logarithmic axis: they span decades and most of them are not in the last one.
+    """True for times that want a logarithmic axis: they span decades and most of them are not in the last one.
 
     >>> logarithmic(np.logspace(-6, 2, 50)), logarithmic(np.linspace(0, 5, 100_001))
     (True, False)

@@ -35,7 +35,7 @@ ERRORS = {
     "error_event": "error of the times of events",
     "energy_error": "energy residual",
 }
-"""What is drawn on x."""
+"""Variables on x, with their labels."""
 
 POINT, CASE = ("case", "solver", "tolerance"), ("case",)
 NUMBERS = {

@@ -1,4 +1,4 @@
-"""What all figures share: colours, symbols and units as text, headings, and datasets that are fit to be drawn."""
+"""The style of all figures: colours, symbols and units as text, headings, and datasets that are fit to be drawn."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def legend(ax: Axes) -> None:
 
 
 def meaning(values: xarray.DataArray, end: str = ":") -> str:
-    """What a variable is: its long name up to where details begin.
+    """The meaning of a variable: its long name up to where details begin.
 
     >>> meaning(xarray.DataArray(0.0, attrs={"long_name": "state of bonds: 1 is bonded"}))
     'State of bonds'
@@ -187,7 +187,7 @@ def unit_text(unit: str) -> str:
 
 
 def varies(values: Array) -> bool:
-    """Whether a curve is more than a constant with rounding."""
+    """True for a curve that is more than a constant with rounding."""
     finite = values[np.isfinite(values)]
     if len(finite) < 2:
         return len(finite) == 1

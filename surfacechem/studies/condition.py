@@ -1,4 +1,4 @@
-"""How well a problem determines its answer: the condition number, from the exact answer alone.
+"""The condition number of a problem, which tells how well it determines its answer, from the exact answer alone.
 
 A relative change eps of the data changes the answer by up to eps times this number, whatever solves the problem: so
 many of its digits are lost to the rounding of the data, and to the tolerance of a solver, whose error is that of a

@@ -33,7 +33,7 @@ FAULTS = (ArithmeticError, RuntimeError, ValueError)
 
 @dataclass
 class Cell:
-    """What one solver made of one problem at one value; studies add what they judge it by."""
+    """One solver at one problem and one value: outcome, counts and times; studies add what they judge it by."""
 
     outcome: str
     reason: str
@@ -47,7 +47,7 @@ class Cell:
     """Runs it once more."""
     solver: str = field(default="", kw_only=True)
     value: float = field(default=math.nan, kw_only=True)
-    """Where in the grid it is."""
+    """The value at which it was run; with the solver, its place in the grid."""
 
     def count(self, name: str) -> float:
         """A count of the solver; not a number where its library does not tell."""

@@ -88,7 +88,7 @@ class Curves:
 
     @property
     def loaded(self) -> bool:
-        """Whether a force changes any rate or constant."""
+        """True if a force changes any rate or constant."""
         rates = (self._log_rate([label], law.change) for label, law in self.laws.items())
         constants = (self._log_equilibrium(law.change, False) for law in self.laws.values())
         return any(depends(expression, FORCE) for expression in (*rates, *constants))
@@ -182,7 +182,7 @@ def cycles(curves: Curves) -> list[ReactionCycle]:
 
 
 def cycle_verdict(cycle: ReactionCycle, curves: Curves, temperatures: Array, forces: Array) -> str:
-    """Whether a cycle can come to rest, in words."""
+    """Verdict on a cycle, which comes to rest or does not, in words."""
     one_way = {step: times for step, times in cycle.steps if isinstance(step, str) and not curves.laws[step].reversible}
     if one_way and min(one_way.values()) < 0 < max(one_way.values()):
         return "goes round neither way, since it has one-way reactions in both directions"

@@ -126,7 +126,7 @@ def _reactions(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str
 
 
 def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str:
-    """Whether a reaction keeps detailed balance, in words."""
+    """Verdict on the detailed balance of a reaction, in words."""
     if curves.laws[label].reversible:
         return "consistent by construction: the reverse follows from K(g, T)"
     pair = next((pair for pair in curves.pairs if label in pair.labels), None)

@@ -35,7 +35,7 @@ COUNTS = {
     "jacobians": "Jacobians",
     "factorizations": "matrices factored",
 }
-"""What a solver counts."""
+"""Counts of a solver."""
 
 HEADING = ("solver", "rtol", "final", "max", "L2", "events", "energy", "time", "median", "longest", "in steps", *COUNTS)
 

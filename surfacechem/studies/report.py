@@ -1,4 +1,4 @@
-"""What a study of many runs hands over: a table in the terminal, a netCDF file, a figure, and one HTML page of it all.
+"""The outcome of a study of many runs: a table in the terminal, a netCDF file, a figure, and one HTML page of it all.
 
 A study declares what lies along its axes, the variables that are read off there, and the sections of its report; the
 dataset, the figure, the page and the files follow. The page needs no other file: its figure is inline SVG, the machine
@@ -75,7 +75,7 @@ class Page:
     command: str
     sections: Sequence[PageSection]
     omissions: Sequence[str] = ()
-    """What was left out, each with its reason."""
+    """Parts that were left out, each with its reason."""
     draw: Callable[[], Figure] | None = None
 
     def text(self) -> str:
@@ -139,14 +139,14 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Study:
-    """What a study hands back. ``dataset`` is the xarray Dataset, ``page`` the report; ``write`` saves all of it."""
+    """The result of a study: ``dataset`` is the xarray Dataset, ``page`` the report; ``write`` saves all of it."""
 
     kind: str
     title: str
     arguments: Sequence[str]
     """Those of the command line."""
     axes: Mapping[str, Sequence[Any]]
-    """What lies along each dimension."""
+    """The items along each dimension."""
     variables: Sequence[Variable]
     """The variables of the dataset, the coordinates first."""
     coordinates: Sequence[str]

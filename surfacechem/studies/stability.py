@@ -1,4 +1,4 @@
-"""What the solvers make of the dangerous regimes: solved to so many digits, refused for the right reason, or failed.
+"""The stability matrix: dangerous regimes solved to so many digits, refused for the right reason, or failed, by solver.
 
 >>> study = stability("seconds", solvers=["radau"], quick=True, rounds=0)
 >>> bool(study.dataset["digits"].min() > 9)
@@ -75,7 +75,7 @@ MEANING = (
 
 @dataclass
 class Attempt(Cell):
-    """What one solver made of one problem."""
+    """One solver at one problem: its outcome, and the digits it kept."""
 
     digits: float
     """-log10 of the largest relative error, of values or of the time of the end; none where the input is refused."""
@@ -196,7 +196,7 @@ def read(problem: Trial) -> Case:
 
 
 def _judged(problem: Trial, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
-    """What came of a run by the ``known`` condition of its problem."""
+    """Outcome of a run, judged by the ``known`` condition of its problem."""
     expected = problem.expected
     if isinstance(done, Exception):
         reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
@@ -368,7 +368,7 @@ def _kept(cells: Sequence[Attempt]) -> str:
 
 
 def _omissions(rows: Sequence[MatrixRow], solvers: Sequence[str], searched: bool) -> Iterator[str]:
-    """What the study could have had and has not, each with its reason."""
+    """Values, solvers, searches and steps that were left out, each with the reason."""
     every, taken = sum(len(row.regime.values) for row in rows), sum(len(row.values) for row in rows)
     if taken < every:
         yield f"{every - taken} of {every} values of the regimes, for the sake of time"

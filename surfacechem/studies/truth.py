@@ -1,4 +1,4 @@
-"""What runs are held against: the exact solution, else two different methods that agree; its uncertainty is stated.
+"""The reference of a study: the exact solution, else two different methods that agree; its uncertainty is stated.
 
 A method is run at two tight tolerances a decade apart and extrapolated in the tolerance, to which its error is taken to
 be proportional. Of several methods the two that agree best are believed, and how far they differ is the uncertainty, or
@@ -59,7 +59,7 @@ MEANING = {
     "l2": "root mean square in time of the relative error",
     "event": "largest relative error of the times of events",
 }
-"""What each error is; the last is not of variables."""
+"""The kinds of errors; the last is not of variables."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Subject:
         return self.model.solve(replace(run, solver=name, rtol=rtol, atol=atol, max_seconds=seconds))
 
     def unable(self, name: str) -> str:
-        """Why a solver cannot run this case; empty where it can."""
+        """The reason for which a solver cannot run this case; empty where it can."""
         if self.model.program.filler is not None and name not in ASKING:
             return "rates of the mechanism come from Cantera itself, which this solver cannot ask"
         try:
@@ -171,7 +171,7 @@ class Truth:
         )
 
     def objection(self, trajectory: Trajectory) -> str:
-        """Why a run has no errors: it failed, or came to another end; empty where it has."""
+        """The reason for which a run has no errors: it failed, or came to another end; empty where it has."""
         if trajectory.status == "failed":
             return trajectory.reason
         if trajectory.status != self.status:
@@ -188,6 +188,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         return numerical(subject, variables)
     trajectory = subject.tight(subject.methods()[0], TIGHTEST)
     result = trajectory.result
+    # A second evaluation at times one rounding earlier tells how far rounding moves the exact values.
     nudged = replace(trajectory, result=replace(result, times=result.times * (1 - EPS)))
     try:
         exact, moved = (
@@ -197,6 +198,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
         found = numerical(subject, variables)
         unused = f"the exact solution {reference.name} is not of this scene: {error.message}"
         return replace(found, source=f"{found.source}; {unused}")
+    # Variables and times of events that the exact solution does not state are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}
     alone = len(known) == len(variables) and not event_times(trajectory)
     beside = _of_run("", trajectory, variables, {}, {}) if alone else numerical(subject, variables)

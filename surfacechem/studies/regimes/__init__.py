@@ -46,7 +46,7 @@ class Exact:
 
     @classmethod
     def of(cls, reference: R, read: Callable[[R, Array], Values] = Reference.solution, **more: Any) -> Exact:
-        """What an exact solution says, as it is or as ``read`` off it; its parameters are the data."""
+        """The values of an exact solution, as they are or as ``read`` off it; its parameters are the data."""
         return cls(lambda t: read(reference, t), **_varied(reference, read), **more)
 
 
@@ -99,7 +99,7 @@ class Regime(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     symbol: ClassVar[str]
-    """What is taken over decades, as in a heading."""
+    """The parameter that is taken over decades, as in a heading."""
     values: ClassVar[tuple[float, ...]]
     space: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
