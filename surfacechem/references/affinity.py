@@ -19,7 +19,7 @@ class LinearAffinitySolution(Reference):
 
     Source: Sauer, Duong & Mandadapu (2021), section 5.7 (bonding reactions), linear law, integrated.
 
-    >>> sites = LinearAffinity(n_c=1e18, c_r=4e18, K_c=0.275, phi_eq=0.2 / 0.275, phi_i=0.05)
+    >>> sites = LinearAffinitySolution(n_c=1e18, c_r=4e18, K_c=0.275, phi_eq=0.2 / 0.275, phi_i=0.05)
     >>> f"{sites.solution(0.06043817678166709)['phi']:.12f}"
     '0.093562342248'
     """
@@ -61,7 +61,7 @@ class ExponentialAffinitySolution(Reference):
     Source: Sauer, Duong & Mandadapu (2021), section 5.7 (bonding reactions), exponential law with the Boltzmann
     constant, integrated.
 
-    >>> sites = ExponentialAffinity(n_c=5e17, C_r=2.5e38, K_c=0.05, T=310.0, phi_eq=0.4, phi_i=1.0)
+    >>> sites = ExponentialAffinitySolution(n_c=5e17, C_r=2.5e38, K_c=0.05, T=310.0, phi_eq=0.4, phi_i=1.0)
     >>> f"{sites.solution(1.20603953943341209e-9)['phi']:.12f}"
     '0.996949093794'
     """

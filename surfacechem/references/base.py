@@ -35,7 +35,7 @@ class Reference(ABC):
     """An exact solution. Subclasses become frozen, keyword-only dataclasses and state `quantities`."""
 
     name: ClassVar[str]
-    """Name of the class in kebab-case."""
+    """Name of the class in kebab-case; a last "Solution", which tells it from a law, is left out."""
     continuous: ClassVar[bool] = False
     """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""

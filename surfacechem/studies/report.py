@@ -4,9 +4,9 @@ A study declares what lies along its axes, the variables that are read off there
 dataset, the figure, the page and the files follow. The page needs no other file: its figure is inline SVG, the machine
 and the versions are in it. Each file appears whole or not at all.
 
->>> from surfacechem.studies.report import Page, Section, Table
->>> table = Table(("solver", "error"), [("radau", "1e-10")])
->>> page = Page("A study", "surfacechem precision exothermic", [Section("Errors", tables=[table])])
+>>> from surfacechem.studies.report import Page, PageSection, PageTable
+>>> table = PageTable(("solver", "error"), [("radau", "1e-10")])
+>>> page = Page("A study", "surfacechem precision exothermic", [PageSection("Errors", tables=[table])])
 >>> print(page.text())
 A study
 <BLANKLINE>
