@@ -16,7 +16,6 @@ from typer import Argument, Option
 from typer.core import TyperGroup
 
 from surfacechem.errors import InputError, OutputError, Place, SurfacechemError, suggestion
-from surfacechem.results.waiting import wait_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from surfacechem.runs.simulation import Simulation
     from surfacechem.solve.run import Run
 
-S = TypeVar("S")
+R = TypeVar("R")
 
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
 """Exit code of each way in which a run ends."""
@@ -146,7 +145,31 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     return replace(run, solver=OWN if run.solver == AUTO else run.solver, rtol=rtol, accuracy=None)
 
 
-def solved(run: Callable[[], S], quiet: bool, brief: bool = False) -> S:
+def wait_for(work: Callable[[], R]) -> R:
+    """Do the work in another thread, as compiled code does not look at signals: an interrupt is answered meanwhile.
+
+    >>> wait_for(lambda: 42)
+    42
+    """
+    done: list[R] = []
+    failed: list[BaseException] = []
+
+    def task() -> None:
+        try:
+            done.append(work())
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=task, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(0.5)
+    if failed:
+        raise failed[0]
+    return done[0]
+
+
+def solved(run: Callable[[], R], quiet: bool, brief: bool = False) -> R:
     """The solution, its dataset's columns and audit included, so that what follows only writes; ``brief`` where the
     stepper is called a few times only.
     """

@@ -22,6 +22,9 @@ MARGIN = 1e-2
 a hundred times its tolerance, but near singular ends.
 """
 
+UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
+"""Why the error of a run with cells is not known."""
+
 
 def first_tolerance(accuracy: float) -> float:
     """Relative tolerance of a step for an accuracy that is asked for.
@@ -78,10 +81,6 @@ def largest_errors(
     """
     errors = errors_over_time(values, true, floors)
     return {name: float(np.max(found, initial=0.0)) for name, found in errors.items()}
-
-
-UNKNOWN = "the error of the cells across bodies does not fall as their number grows"
-"""Why the error of a run with cells is not known."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -140,73 +140,57 @@ class Solution(Results):
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the time coordinate first."""
-        time = Column("time", ("time",), self.trajectory.result.times, "s", "time since the start")
-        along = [*quantity_columns([self.trajectory]), *profile_columns(self.trajectory)]
-        return (
-            time,
-            *along,
-            *self._ledger(),
-            *self._balances(),
-            *self._exact(along),
-            *event_columns([self.trajectory]),
-        )
-
-    def _ledger(self) -> list[Column]:
-        values = self.trajectory.result.ledger_outputs
-        accounts = [account.quantity for account in self.trajectory.model.system.ledger]
-        return [
-            Column(DATASET_NAMES.get(q.name, q.name), ("time",), values[:, j], q.unit, q.long_name)
-            for j, q in enumerate(accounts)
+        trajectory, books, accounts = self.trajectory, self.audit, self.trajectory.model.system.ledger
+        along = [*quantity_columns([trajectory]), *profile_columns(trajectory)]
+        columns = [Column("time", ("time",), trajectory.result.times, "s", "time since the start"), *along]
+        for account, values in zip(accounts, trajectory.result.ledger_outputs.T, strict=True):
+            q = account.quantity
+            columns.append(Column(DATASET_NAMES.get(q.name, q.name), ("time",), values, q.unit, q.long_name))
+        entropy = "total entropy minus the entropy supplied and produced"
+        columns += [
+            Column("energy_residual", ("time",), books.energy, "J/m^2", "total energy minus the energy supplied"),
+            Column("entropy_residual", ("time",), books.entropy, "J/(m^2 K)", entropy),
         ]
-
-    def _balances(self) -> list[Column]:
-        books = self.audit
-        rows = [
-            ("energy_residual", books.energy, "J/m^2", "total energy minus the energy supplied"),
-            ("entropy_residual", books.entropy, "J/(m^2 K)", "total entropy minus the entropy supplied and produced"),
-        ]
-        if any(account.kind == "bonds" for account in self.trajectory.model.system.ledger):
-            rows.append(("site_residual", books.sites, "1", "largest residual of the site balances"))
-        least = [
-            (f"least_sigma_{law}", np.float64(low), f"least entropy production of {law.replace('_', ' ')}")
-            for law, low in books.least.items()
-        ]
-        return [
-            *(Column(name, ("time",), values, unit, text) for name, values, unit, text in rows),
-            *(Column(name, (), low, "W/(m^2 K)", text) for name, low, text in least),
-        ]
-
-    def _exact(self, along: Sequence[Column]) -> list[Column]:
-        exact = self.accuracy.exact if self.accuracy else {}
+        if any(account.kind == "bonds" for account in accounts):
+            text = "largest residual of the site balances"
+            columns.append(Column("site_residual", ("time",), books.sites, "1", text))
+        for law, low in books.least.items():
+            text = f"least entropy production of {law.replace('_', ' ')}"
+            columns.append(Column(f"least_sigma_{law}", (), np.float64(low), "W/(m^2 K)", text))
         computed = {column.name: column for column in along}
-        pairs = [(computed[name], values) for name, values in exact.items()]
-        return [Column(f"{c.name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}") for c, values in pairs]
+        for name, values in (self.accuracy.exact if self.accuracy else {}).items():
+            c = computed[name]
+            columns.append(Column(f"{name}_exact", c.dimensions, values, c.unit, f"exact {c.long_name}"))
+        return (*columns, *event_columns([trajectory]))
 
     @cached_property
     def attributes(self) -> dict[str, str | float | int]:
         """Global attributes: scalars and strings only."""
-        run, result = self.trajectory.run, self.trajectory.result
+        run, result, books = self.trajectory.run, self.trajectory.result, self.audit
+        system = self.trajectory.model.system
         told = result.counters._asdict()
         if not solver(run.solver).counts_rejected:
             del told["rejected"]
-        counters = {f"count_{name}": int(value) for name, value in told.items()}
-        books = self.audit
+        error: dict[str, str | float] = {}
+        if found := self.accuracy:
+            error = {"error": float(found.error), "error_source": found.source}
+            error |= {} if found.asked is None else {"error_asked": float(found.asked)}
         return {
             **self._origin(run),
             **self._departures(),
             "status": self.status,
             "reason": self.reason,
             "warnings": "; ".join(self.warnings) or "none",
-            "regime": self.trajectory.model.system.regime,
+            "regime": system.regime,
             **self._reaction(),
             "solver": run.solver,
             "rtol": float(run.rtol),
-            **{f"cells_{p.number}": len(p.points) - 1 for p in self.trajectory.model.system.profiles},
-            **counters,
+            **{f"cells_{p.number}": len(p.points) - 1 for p in system.profiles},
+            **{f"count_{name}": int(value) for name, value in told.items()},
             "time_reached": float(result.t),
             "run_seconds": float(self.trajectory.seconds),
             "compile_seconds": float(self.trajectory.model.compile_seconds),
-            **self._error(),
+            **error,
             "energy_error": books.energy_error,
             "entropy_error": books.entropy_error,
             "site_error": books.site_error,
@@ -214,13 +198,6 @@ class Solution(Results):
             **({"detailed_balance": "; ".join(map(str, self.verdicts))} if self.verdicts else {}),
             "versions": versions(),
         }
-
-    def _error(self) -> dict[str, str | float]:
-        found = self.accuracy
-        if found is None:
-            return {}
-        asked = {} if found.asked is None else {"error_asked": float(found.asked)}
-        return {"error": float(found.error), "error_source": found.source, **asked}
 
     def _reaction(self) -> dict[str, str]:
         """Class of what the reactions do, where they have a heat; what the tolerance does not resolve is none."""

@@ -130,36 +130,30 @@ class SweepSolution(Results):
         """How each run ended, and what its balances, jumps and error are."""
         runs, audits = self.sweep.runs, self.sweep.audits
         destroyed = [entropy_destroyed(run.jumps) for run in runs]
-        rows: list[tuple[str, Sequence[Any] | Array, str, str]] = [
-            ("status", [run.status for run in runs], "1", "how the run ended"),
-            ("reason", [run.reason for run in runs], "1", "why the run ended"),
-            ("time_reached", [run.result.t for run in runs], "s", "time that the run reached"),
-            ("steps", [run.result.counters.steps for run in runs], "1", "steps of the run"),
-            (
-                "energy_error",
-                [books.energy_error for books in audits],
-                "1",
-                "largest energy residual relative to the energy exchanged",
+        destroys = [books.destroys or most > 0 for books, most in zip(audits, destroyed, strict=True)]
+        residuals = {
+            "energy": "largest energy residual relative to the energy exchanged",
+            "entropy": "largest entropy residual relative to what was exchanged",
+            "site": "largest residual of the site balances",
+        }
+        columns = [
+            self._of_each("status", [run.status for run in runs], "1", "how the run ended"),
+            self._of_each("reason", [run.reason for run in runs], "1", "why the run ended"),
+            self._of_each("time_reached", [run.result.t for run in runs], "s", "time that the run reached"),
+            self._of_each("steps", [run.result.counters.steps for run in runs], "1", "steps of the run"),
+            *(
+                self._of_each(f"{balance}_error", [getattr(books, f"{balance}_error") for books in audits], "1", text)
+                for balance, text in residuals.items()
             ),
-            (
-                "entropy_error",
-                [books.entropy_error for books in audits],
-                "1",
-                "largest entropy residual relative to what was exchanged",
-            ),
-            ("site_error", [books.site_error for books in audits], "1", "largest residual of the site balances"),
-            (
-                "destroys_entropy",
-                [books.destroys or most > 0 for books, most in zip(audits, destroyed, strict=True)],
-                "1",
-                "1 where a law or a jump does, else 0",
-            ),
+            self._of_each("destroys_entropy", destroys, "1", "1 where a law or a jump does, else 0"),
         ]
         if self.system.edges:
-            rows.append(("entropy_destroyed", destroyed, "J/(m^2 K)", "most entropy that a jump has destroyed"))
+            text = "most entropy that a jump has destroyed"
+            columns.append(self._of_each("entropy_destroyed", destroyed, "J/(m^2 K)", text))
         if self.accuracy:
-            rows.append(("error", self.accuracy.errors, "1", "largest relative error of the run"))
-        return [self._of_each(name, values, unit, text) for name, values, unit, text in rows]
+            text = "largest relative error of the run"
+            columns.append(self._of_each("error", self.accuracy.errors, "1", text))
+        return columns
 
     def _of_each(self, name: str, values: Sequence[Any] | Array, unit: str, text: str) -> Column:
         """A column of one value a run."""
