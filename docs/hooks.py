@@ -370,7 +370,7 @@ def made_solvers() -> str:
 @cache
 def stability_study() -> Any:
     """The matrix that the page on stability and its figure show: two solvers are quick enough for every build."""
-    return stability(solvers=["radau", "lsoda"], rounds=0)
+    return stability(solvers=["radau", "lsoda"], quick=True, rounds=0)
 
 
 def made_stability() -> str:
