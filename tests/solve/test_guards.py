@@ -13,6 +13,7 @@ from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.solve import solver
 from surfacechem.solve.contract import Margin, Status
 from surfacechem.solve.radau.solver import Radau
 from surfacechem.solve.run import Model, Run
@@ -263,6 +264,16 @@ def test_coincident_events_have_one_time(rtol):
     result = run(program, [1.0, 0.0], 10.0, rtol, (Margin.restart(), Margin.stop(), Margin.restart(), Margin.restart()))
     assert list(result.events.index) == [3, 0, 1, 2]
     assert len(set(result.events.t)) == 2
+
+
+@pytest.mark.parametrize("name", ["radau", "lsoda"])
+def test_what_is_not_in_play_is_not_looked_at(name):
+    """A limit that is crossed, one that starts at zero and falls, one that is no number there: none ends the run."""
+    program = clock(0.3 - X, -X, se.log(X - 2.0), 0.7 - X)
+    case = problem(program, [0.0], [0.0, 1.0], 1e-8, margins=STOP * 4, in_play=(False, False, False, True))
+    result = solver(name).solve(case)
+    assert (result.status, result.t) == (Status.EVENT, pytest.approx(0.7))
+    assert list(result.events.index) == [3]
 
 
 def test_a_margin_at_zero_that_rises_does_not_fire():
