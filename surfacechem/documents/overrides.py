@@ -85,55 +85,42 @@ def _split(text: str) -> tuple[str, str]:
 
 def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     if not keys:
-        return _replaced(tree, new)
+        varies = isinstance(tree.value, dict) and {"value", "times"} >= set(tree.value) >= {"value"}
+        plain = not isinstance(new.value, dict | list)
+        return replace(tree, value={**tree.value, "value": new}) if varies and plain else new
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    if len(keys) == 1 and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not _removes(new):
+    last, removes = len(keys) == 1, _removes(new)
+    if last and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not removes:
         return new  # a bare value is, for example, the level of a constant history
     if isinstance(tree.value, str) and tree.place.path in WHOLE:
         tree = replace(tree, value={WHOLE[tree.place.path]: tree})
     if tree.value is not None and not isinstance(tree.value, dict):
         raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
     known = tree.value or {}
-    if len(keys) == 1 and _removes(new):
-        return replace(tree, value=_without(known, keys[0], place))
-    child = known.get(keys[0], Tree(None, place))
-    return replace(tree, value={**known, keys[0]: _set(child, keys[1:], new, place)})
+    if not (last and removes):
+        child = known.get(keys[0], Tree(None, place))
+        return replace(tree, value={**known, keys[0]: _set(child, keys[1:], new, place)})
+    if keys[0] not in known:
+        raise InputError(f"there is no '{keys[0]}' to remove.{suggestion(keys[0], known)}", place)
+    return replace(tree, value={name: child for name, child in known.items() if name != keys[0]})
 
 
 def _removes(new: Tree) -> bool:
     return new.value is None or new.value == ""
 
 
-def _without(known: Mapping[str, Tree], key: str, place: Place) -> dict[str, Tree]:
-    if key not in known:
-        raise InputError(f"there is no '{key}' to remove.{suggestion(key, known)}", place)
-    return {name: child for name, child in known.items() if name != key}
-
-
-def _replaced(old: Tree, new: Tree) -> Tree:
-    varies = isinstance(old.value, dict) and {"value", "times"} >= set(old.value) >= {"value"}
-    if varies and not isinstance(new.value, dict | list):
-        return replace(old, value={**old.value, "value": new})
-    return new
-
-
 def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
-    """A value below an item of a list, which is found by its label."""
+    """A value below an item ``name: {...}`` or a bare name of a list, which is found by its label."""
     known = labels(tree.value)
     wanted = keys[0].removesuffix("[1]")
     if wanted not in known:
         names = [label for label in known if label]
         raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
     index = known.index(wanted)
-    gone = len(keys) == 1 and _removes(new)
-    changed = [] if gone else [_set_law(tree.value[index], keys[1:], new, place)]
+    item, changed = tree.value[index], [] if _removes(new) else [new]
+    if len(keys) > 1:
+        whole = item.value if isinstance(item.value, dict) else {item.value: Tree(None, item.place)}
+        ((name, inner),) = whole.items()
+        changed = [replace(item, value={name: _set(inner, keys[1:], new, place)})]
     return replace(tree, value=[*tree.value[:index], *changed, *tree.value[index + 1 :]])
-
-
-def _set_law(item: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
-    """A value below an item ``name: {...}`` or a bare name."""
-    if not keys:
-        return new
-    ((name, inner),) = item.value.items() if isinstance(item.value, dict) else ((item.value, Tree(None, item.place)),)
-    return replace(item, value={name: _set(inner, keys, new, place)})

@@ -90,7 +90,22 @@ def load_text(
     whole = csvtable.embedded(tree, str(base))
     if whole != tree:
         tree, text = whole, document.dump(whole)
-    return replace(_read(tree, text, name, str(base), mechanism_text), unused=unused)
+    case, mechanism = read_document(tree, str(base), mechanism_text)
+    return Case(
+        name=name,
+        title=case.title or name,
+        source=case.source,
+        description=case.description,
+        scene=scene_of(case, mechanism),
+        run=run_of(case.run),
+        reference=exact_solution_of(case.reference) if case.reference else None,
+        sweep=case.sweep,
+        text=text,
+        mechanism_text=mechanism.text if mechanism else None,
+        places=dict(tree.places()),
+        file=tree.place.file,
+        unused=unused,
+    )
 
 
 def _without_stale_reference(before: Tree, after: Tree) -> tuple[Tree, str]:
@@ -126,22 +141,3 @@ def _find(name: str) -> tuple[Path, str]:
         beside = [file.name for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")]
     guess = nearest(path.name, [*names(), *beside])
     raise InputError(f"no file and no case '{name[:200]}'.{guess} `surfacechem cases` lists those of the package.")
-
-
-def _read(tree: Tree, content: str, name: str, base: str, mechanism_text: str | None) -> Case:
-    places = dict(tree.places())
-    case, mechanism = read_document(tree, base, mechanism_text)
-    return Case(
-        name=name,
-        title=case.title or name,
-        source=case.source,
-        description=case.description,
-        scene=scene_of(case, mechanism),
-        run=run_of(case.run),
-        reference=exact_solution_of(case.reference) if case.reference else None,
-        sweep=case.sweep,
-        text=content,
-        mechanism_text=mechanism.text if mechanism else None,
-        places=places,
-        file=tree.place.file,
-    )

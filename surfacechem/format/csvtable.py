@@ -34,19 +34,16 @@ def embedded(tree: Tree, base: str) -> Tree:
     values = {key: embedded(child, base) for key, child in tree.value.items()}
     table = values.get("table")
     if table is not None and isinstance(table.value, dict) and "file" in table.value:
-        values["table"] = replace(table, value=_with_content(table.mapping(KEYS), base))
+        fields = table.mapping(KEYS)
+        if "csv" in fields:
+            raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
+        file = fields.pop("file")
+        name = file.text("the file of a table")
+        path = document.beside(Path(base), name, file.place)
+        if path is None:
+            raise file.error(f"no file {name} beside the case.")
+        values["table"] = replace(table, value={"csv": Tree(document.read(path), Place(str(path))), **fields})
     return replace(tree, value=values)
-
-
-def _with_content(fields: dict[str, Tree], base: str) -> dict[str, Tree]:
-    if "csv" in fields:
-        raise fields["csv"].error("the table has two roles: give `file` or `csv`.")
-    file = fields.pop("file")
-    name = file.text("the file of a table")
-    path = document.beside(Path(base), name, file.place)
-    if path is None:
-        raise file.error(f"no file {name} beside the case.")
-    return {"csv": Tree(document.read(path), Place(str(path))), **fields}
 
 
 def is_csv(tree: Tree) -> bool:
@@ -59,24 +56,35 @@ def table(tree: Tree, unit: str) -> Table:
     """The history of a column; times are in the column ``t``, values in the one named, or after the variable."""
     fields = tree.value["table"].mapping(KEYS[1:])
     content = fields["csv"]
-    rows = _rows(content)
-    variable = tree.place.path.rpartition(".")[2]
-    columns = [_column(cell, rows[0]) for cell in rows[0].cells]
-    times = _index("t", columns, rows[0])
-    values = _values(variable, fields.get("column"), columns, rows[0])
-    for row in rows[1:]:
+    heading, *rows = _rows(content)
+    columns = []
+    for number, cell in enumerate(heading.cells, start=1):
+        if (found := HEADING.fullmatch(cell)) is None:
+            raise heading.error(
+                f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}."
+            )
+        columns.append((found["name"], found["unit"].strip()))
+    names, variable = [name for name, _ in columns], tree.place.path.rpartition(".")[2]
+    times = _index("t", names, heading)
+    others = [name for name in names if name != "t"]
+    if "column" in fields:
+        values = _index(fields["column"].text("column"), names, heading)
+    elif variable not in others and others:  # a column of another name is never meant by itself
+        other = others[0] if len(others) == 1 else "NAME"
+        remedy = f"{suggestion(variable, names)} To take one of another name, write `column: {other}`."
+        raise heading.error(f"no column '{variable}'.{remedy}")
+    else:
+        values = _index(variable, names, heading)
+    for row in rows:
         if len(row.cells) != len(columns):
             raise row.error(f"{len(row.cells)} values for {len(columns)} columns.")
-    moments = [_number(row, times, columns, "s") for row in rows[1:]]
-    for row, (earlier, later) in zip(rows[2:], pairwise(moments), strict=False):
+    moments = [_number(row, times, columns, "s") for row in rows]
+    for row, (earlier, later) in zip(rows[1:], pairwise(moments), strict=True):
         if later < earlier:
             raise row.error("times must never decrease.")
     try:
-        return Table(
-            times=moments,
-            values=[_number(row, values, columns, unit, variable) for row in rows[1:]],
-            place=tree.place,
-        )
+        read = [_number(row, values, columns, unit, variable) for row in rows]
+        return Table(times=moments, values=read, place=tree.place)
     except InputError as error:
         raise error.at(content.place) from None
 
@@ -109,29 +117,7 @@ def _rows(content: Tree) -> list[TableLine]:
     return rows
 
 
-def _column(cell: str, heading: TableLine) -> tuple[str, str]:
-    """Name and unit of a column."""
-    found = HEADING.fullmatch(cell)
-    if found is None:
-        number = heading.cells.index(cell) + 1
-        raise heading.error(f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}.")
-    return found["name"], found["unit"].strip()
-
-
-def _values(variable: str, named: Tree | None, columns: Sequence[tuple[str, str]], heading: TableLine) -> int:
-    """The column that is named, else that of the variable; one of another name is never meant by itself."""
-    if named is not None:
-        return _index(named.text("column"), columns, heading)
-    others = [name for name, _ in columns if name != "t"]
-    if variable not in others and others:
-        guess = suggestion(variable, [name for name, _ in columns])
-        other = others[0] if len(others) == 1 else "NAME"
-        raise heading.error(f"no column '{variable}'.{guess} To take one of another name, write `column: {other}`.")
-    return _index(variable, columns, heading)
-
-
-def _index(name: str, columns: Sequence[tuple[str, str]], heading: TableLine) -> int:
-    names = [known for known, _ in columns]
+def _index(name: str, names: Sequence[str], heading: TableLine) -> int:
     if names.count(name) > 1:
         raise heading.error(f"the column {name} is there {names.count(name)} times.")
     if name not in names:
