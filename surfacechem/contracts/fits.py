@@ -94,7 +94,7 @@ def _filled(powers: ArrayLike) -> tuple[float, ...]:
 
 def _longest(function: Callable[[Array], Array], low: float, high: float) -> Piece:
     """The longest piece from low on; it ends just beyond a kink, so that the next one starts on the other side."""
-    good, bad, found = low, high, None
+    good, bad, found = low, high, None  # by bisection: a piece that ends before a kink fits, one beyond it does not
     while bad - good > SHORTEST * (high - low):
         middle = (good + bad) / 2
         piece = _polynomial(function, low, middle)
@@ -113,6 +113,7 @@ def _polynomial(function: Callable[[Array], Array], low: float, high: float) -> 
     values = function((low + high) / 2 + (high - low) / 2 * nodes)
     powers = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, DEGREE))
     piece = Piece(low, high, _filled(powers))
+    # Between the nodes, where the error of an interpolation is largest.
     T = np.linspace(low, high, CHECKS * (DEGREE + 1) + 1)
     exact = function(T)
     return piece if bool(np.all(np.abs(piece(T) - exact) <= TARGET * np.abs(exact))) else None

@@ -192,6 +192,7 @@ class SurfaceEngine:
 
         Then the enthalpy and the Gibbs energy [J] that each reaction with neighbours takes from them.
         """
+        # The residual, its outputs and the ledger ask at the same state one after another.
         if values == self._last[0]:
             return self._last[1]
         T, amount, *coverages = values
@@ -200,6 +201,7 @@ class SurfaceEngine:
             self.surface.TP = T, None
             if self.held is not None:
                 self.held.warm(T)
+            # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
             self.surface.set_unnormalized_coverages(coverages)
             rates = self.surface.net_rates_of_progress

@@ -146,7 +146,7 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
     import cantera
 
     try:
-        with warnings.catch_warnings(record=True) as caught:
+        with warnings.catch_warnings(record=True) as caught:  # what it warns of becomes remarks of the mechanism
             warnings.simplefilter("always")
             surface = cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
@@ -200,6 +200,7 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
             raise source.error(f"{title}: thermo: {error.message}", entry, "thermo") from None
         if gibbs is None:
             raise source.error(f"{title}: thermo of type {type(item.thermo).__name__} is not lowered.", entry)
+        # Cantera's standard state is at that coverage, ours at full coverage: R T ln of it lies between.
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         own = interactions(source, entry, names)
@@ -262,6 +263,7 @@ def _evaluated(reaction: Any, label: str, species: tuple[Species, ...], place: P
     whole = _change(reaction, {name: name for name in names})
     change = {s.variable: whole[s.name] for s in species if s.name in whole}
     elastic = [s.name for s in species if s.name in whole and s.spring is not None]
+    # Cantera's thermo has no place for a gap.
     if reaction.reversible and elastic:
         message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
         raise InputError(f"{message}does not know. Write two one-way reactions.", place)

@@ -161,6 +161,7 @@ def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:
     """The first species whose dependence on another belongs to no potential, and that other; None where all do."""
     by_name = {item.name: item for item in species}
     pairs = [(item, x, by_name[x.on]) for item in species for x in item.interactions if x.on != item.name]
+    # Maxwell: d g_k / d n_j = d g_j / d n_k, and n is a coverage over the sites that a species takes.
     for item, interaction, other in pairs:
         back = next((x for x in other.interactions if x.on == item.name), Interaction(item.name, item.variable))
         ours, theirs = interaction.slopes, back.slopes

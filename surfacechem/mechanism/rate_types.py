@@ -82,6 +82,7 @@ class AffinityReaction(InterfaceArrhenius):
     def __post_init__(self) -> None:
         """The equation says that it runs both ways."""
         super().__post_init__()
+        # A net rate is one function; taken one way only it would run on against the affinity.
         if not self.reversible:
             raise InputError(f"reaction {self.equation}: a rate by affinity runs both ways; write `<=>`.", self.place)
 

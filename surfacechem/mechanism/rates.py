@@ -42,7 +42,7 @@ class CoverageTerm:
     def exponent(self, theta: Expression, T: Expression) -> Expression:
         """Logarithm of the factor."""
         energy: Expression = 0
-        for coefficient in reversed(self.E):
+        for coefficient in reversed(self.E):  # Horner, from the first power on: without coverage there is no energy
             energy = theta * (energy + coefficient)
         value = self.a * math.log(10) * theta - energy / (GAS_CONSTANT * T)
         if self.m:
@@ -132,6 +132,7 @@ class InterfaceArrhenius(MechanismReaction):
             E = tuple(float(energy) / KILO for energy in energies)
             terms.append(CoverageTerm(variables[name], float(term["a"]), float(term["m"]), E))
         return {
+            # One kmol^(1 - n) for a reaction of order n, whose rate counts kmol too.
             "A": rate.pre_exponential_factor * (KILO * AVOGADRO) ** (1 - order),
             "b": rate.temperature_exponent,
             "Ea": rate.activation_energy / KILO,
@@ -222,10 +223,12 @@ class InterfaceArrhenius(MechanismReaction):
     def _reverse(self, values: Mapping[str, Expression]) -> Expression:
         if not self.reversible:
             return 0
+        # The equilibrium constant of coverages is exp(-affinity); that of amounts has these powers beside it.
         standard: Expression = 1
         for item in self.species:
             standard *= values[item.concentration] ** plain(-self.change.get(item.variable, 0))
         affinity = self.standard_affinity(values["T_c"], values.get("g_n"), values)
+        # One exponential of the sum: coefficient and constant may be beyond the doubles where their product is not.
         return self.coefficient(values, affinity) * standard * self._amounts(values, self.products, 1)
 
     def standard_affinity(
@@ -250,6 +253,7 @@ class InterfaceArrhenius(MechanismReaction):
         product: Expression = 1
         for item in self.species:
             order, theta = orders.get(item.variable, 0), values[item.variable]
+            # Below first order the slope is infinite where nothing is left, which no step can follow.
             if order < 1 and way * self.change.get(item.variable, 0) > 0:
                 product *= values[item.concentration] ** plain(order) * theta * floored(theta, GONE) ** plain(order - 1)
             elif order:

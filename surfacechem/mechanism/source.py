@@ -114,6 +114,7 @@ class Source:
         """InputError where a key does not hold the kind of value that it must."""
         for key, allowed in kinds.items():
             value = node.get(key)
+            # In Python true is a number; in a mechanism it is not.
             if key in node and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
                 wanted = " or ".join(KINDS[kind] for kind in allowed if kind in KINDS)
                 raise self.error(f"{key}: this must be {wanted}, not {_shown(value)}.", node, key)
@@ -156,6 +157,7 @@ class Source:
 
     def _entries(self, phase: Any, key: str, kinds: Mapping[str, tuple[type, ...]]) -> Iterator[Any]:
         for name in sections(phase.get(key, "all"), key):
+            # A phase that does not say where its entries are may have none.
             if name in self.data:
                 yield from self._entry_list(name, kinds)
             elif phase.get(key) is not None:
@@ -175,11 +177,12 @@ def sections(declared: Any, default: str) -> list[str]:
     """Names of the sections that a phase's `species` or `reactions` refers to."""
     if isinstance(declared, str):
         return [default]
-    names = [next(iter(item)) if isinstance(item, Mapping) else None for item in declared]
+    named = [next(iter(item)) for item in declared if isinstance(item, Mapping) and item]
     plain = [item for item in declared if not isinstance(item, Mapping)]
-    if default == "species":
-        return [*([default] if plain else []), *(name for name in names if name)]
-    return [*plain, *(name for name in names if name)]
+    # A bare word is a species of the section of that name, but a section of reactions.
+    if default == "species" and plain:
+        plain = [default]
+    return [*plain, *named]
 
 
 def chosen(declared: Any, available: Iterable[str]) -> list[str]:

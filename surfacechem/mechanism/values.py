@@ -81,6 +81,7 @@ def converted(units: Any, value: str | float, unit: str) -> float:
     if unit in ("J", "J/mol"):
         return float(units.convert_activation_energy_to(value, "J/kmol")) / (KILO * (AVOGADRO if unit == "J" else 1))
     number = float(units.convert_to(value, unit))
+    # A number in metres that was meant in nanometres is not caught by its unit.
     if unit == "m" and abs(number) > LONGEST:
         raise InputError(f"{value} is a length of {number:g} m, which no bond has; write it as `0.4 nm`.")
     return number
