@@ -113,3 +113,9 @@ MISMATCH = 1e-6
 """Part of an equation by which an exact solution may miss it: differences in time keep seven digits near events, where
 they are worst. Scenes that differ in more than their sixth digit are told apart.
 """
+
+STILL = 1e-14
+"""Part of the tractions that cancel in a balance of sliding that counts as none: SOLVED, rounded down."""
+
+MOMENT = 1e-12
+"""Part of the time so far in which what stops is not followed any more: ROUNDING, rounded up."""

@@ -34,16 +34,16 @@ LONGEST = 600
 
 OF_BALANCES = [
     ["balances"],
-    ["zoo", "mechanics_exact", "heat_paths", "jumps", "limits", "pairs", "friction_memory", "chemistry"],
+    ["zoo", "mechanics_exact", "heat_paths", "jumps", "threshold", "pairs", "friction_memory", "chemistry"],
     ["tables", "tables_bonds", "tables_mechanics"],
     ["start", "hybrid", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
-    ["folds", "breaking", "bound", "pulled", "media", "instant", "reactor", "evaluated"],
-    ["impact", "plane", "plane_springs", "creep", "load_path", "neighbours"],
+    ["fold", "breaking", "bound", "pulled", "media", "instant", "reactor", "evaluated"],
+    ["unilateral", "plane", "rate_and_state", "load_path", "neighbours"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],
-    ["chemistry", "friction_memory", "heat_paths", "limits"],
+    ["chemistry", "friction_memory", "heat_paths", "threshold"],
     ["tables_bonds", "tables_mechanics", "contact_laws", "media", "segments"],
 ]
 

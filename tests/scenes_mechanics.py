@@ -274,19 +274,6 @@ def plane_uneven_slider() -> Scene:
     return _slider(frictions=[friction], loading={"p": Ramp(start=1e5, rate=1e4)} | PULL | ACROSS, **mounts)
 
 
-def plane_quasi_static_slider() -> Scene:
-    """Springs alone; temperature and pressure set the traction, which differs from direction to direction."""
-    friction = AnisotropicCoulomb(mu_1=varying(0.2, LinearInTemperature(slope=-1e-3)), mu_2=0.5)
-    loading = {"p": Ramp(start=1e5, rate=1e4)} | PULL | ACROSS
-    return _slider(Mounting(k=1e10), [friction], loading=loading, transverse=Mounting(k=3e10))
-
-
-def plane_jumping_slider() -> Scene:
-    """Springs alone on friction that is the same in all directions, with a static limit of its own."""
-    friction = MohrCoulomb(mu=varying(0.4, LinearInTemperature(slope=-1e-3)), c=2e4, mu_s=0.6)
-    return _slider(Mounting(k=1e10), [friction], loading=PULL | ACROSS)
-
-
 def plane_bonding_slider() -> Scene:
     """A mass that breaks bonds as it slides in the plane."""
     return _slider(
@@ -421,8 +408,6 @@ ALL = [
     Moving(plane_slider, SLIDING[:2]),
     Moving(plane_damped_slider, SLIDING[:2]),
     Moving(plane_uneven_slider, SLIDING[:2]),
-    Moving(plane_quasi_static_slider, SLIDING[:2]),
-    Moving(plane_jumping_slider, SLIDING[:2]),
     Moving(plane_bonding_slider, SLIDING[:2]),
     Moving(plane_film),
     Moving(elastic_inertial_slider, SLIDING),

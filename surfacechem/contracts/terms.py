@@ -128,8 +128,6 @@ class Friction(Law):
     """What sliding at a velocity takes, as one number that may stand for the velocity; absent where that serves."""
     velocity: ClassVar[Callable[..., Expression] | None] = None
     """Its inverse [m/s]."""
-    velocity_unit: ClassVar[Callable[..., Expression]]
-    """Velocity [m/s] in which that of sliding is counted."""
     driven: ClassVar[Callable[..., Expression]]
     """Traction by that number [Pa]."""
     transverse: ClassVar[Callable[..., Expression] | None] = None

@@ -206,10 +206,6 @@ class RateAndState(UnderPressure, Friction):
         """Sliding velocity [m/s] at a traction in units of the direct effect: the inverse of :meth:`drive`."""
         return 2 * self.v_0 * sinh_exp(drive, -self._strength(ln_theta))
 
-    def velocity_unit(self) -> Expression:
-        """The velocity of reference [m/s]."""
-        return self.v_0
-
     def _strength(self, ln_theta: Expression) -> Expression:
         return (self.mu_0 + self.b * (log(self.v_0 / self.L) + ln_theta)) / self.a
 

@@ -10,7 +10,6 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.model.automaton import Sink
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
-from surfacechem.model.checks import check_touch
 from surfacechem.model.components.chemistry import reactions
 from surfacechem.model.components.conduction import conductors, profiles, slabs
 from surfacechem.model.components.force import force, rupture
@@ -23,15 +22,14 @@ from surfacechem.model.components.medium import medium
 from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
 from surfacechem.model.components.thermal import body_energies, equations, surface_rates, surface_work, temperatures
 from surfacechem.model.constraints.bound import released
-from surfacechem.model.constraints.folds import folds
-from surfacechem.model.constraints.impact import impacts, missed
-from surfacechem.model.constraints.limits import bonded_mode, limits
+from surfacechem.model.constraints.envelope import apart_from_envelope, softening_mode
+from surfacechem.model.constraints.fold import folds
 from surfacechem.model.constraints.load_steps import load_steps
-from surfacechem.model.constraints.relaxing import relaxing
-from surfacechem.model.constraints.softening import apart_from_envelope, softening_mode
+from surfacechem.model.constraints.threshold import bonded_mode, limits, relaxing
+from surfacechem.model.constraints.unilateral import impacts, missed
 from surfacechem.model.ledger import flow, regime, sinks, state, totals
 from surfacechem.model.refit import Fit
-from surfacechem.model.sliding.creep import stands_for_velocity
+from surfacechem.model.sliding.rate_and_state import stands_for_velocity
 from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
 from surfacechem.model.system import START, Capped, Caution, Outside, Pace, Pair, Profile, Range, Role, System
 from surfacechem.scene import Scene
@@ -84,7 +82,6 @@ def assemble(scene: Scene) -> System:
     stage_ends(build)
     # Outputs.
     totals(build)
-    check_touch(build)
     logarithmic_state(build)
     layers = profiles(build)
     build.varying_margins()
@@ -121,6 +118,7 @@ def _system(
         cautions=build.noted(Caution),
         profiles=layers,
         conductors=tuple(conductors(build)),
+        conductances=build.conductances,
         regime=regime(build),
         breakpoints=tuple(sorted({t for load in build.loads.values() for t in load.breakpoints()})),
         cycles=tuple(_cycles(build)),

@@ -182,7 +182,8 @@ class Rows(dict[str, Expression]):
 
     def momentum_of(self, name: str, inertia: Expression, force: Expression, moves: Expression) -> None:
         """Inertia = force, where the state is not the velocity but something that stands for it."""
-        self[name] = moves * (inertia - force) + (1 - moves) * _dot(name)
+        # No blend of both: an inertia that is next to none would be rounded away beside one that is off.
+        self[name] = where(moves > 0, inertia - force, _dot(name))
 
     def equilibrium(
         self, name: str, driving_rate: Expression, moves: Expression = 1, held: Expression | None = None

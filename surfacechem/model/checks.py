@@ -6,7 +6,7 @@ Source: Sauer, Duong & Mandadapu (2021), section on heat transfer: the sum of ga
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -14,67 +14,50 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, depends
-from surfacechem.model.build import Build
 from surfacechem.model.system import System
 from surfacechem.tolerances import CBRT_EPS, EPS
 
 OPENINGS = tuple(10.0 ** (k / 8) for k in range(-80, -16))
 """Gaps at which a conductance is looked at [m]: 0.1 nm to 10 mm."""
 
-P, G = symengine.Symbol("p"), symengine.Symbol("g_n")
+P, G = symengine.symbols("p g_n")
 
 
-def check_touch(build: Build) -> None:
-    """Warn of conductances that jump at touch, rise as the gap opens, or hold where nothing touches."""
-    for (a, b), channels in build.conductances.items():
+def conductance_warnings(system: System) -> Iterator[str]:
+    """Conductances that jump at touch, rise as the gap opens, or hold where nothing touches; numbers at the start."""
+    point: dict[Any, Any] = {system.t: 0.0} | {item.symbol: item.at(0.0) for item in system.parameters}
+    point |= {state.symbol: state.initial for state in system.states if state.symbol not in (P, G)}
+    for item in system.named:
+        if item.name not in ("p", "g_n"):
+            point[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(point)
+
+    def at(h: Expression, variable: Any, value: float) -> float | None:
+        """Value of a conductance where the variable has this value; None where it depends on more."""
+        found = symengine.sympify(h).subs(point).subs({variable: value})
+        return None if found.free_symbols else float(found)
+
+    gap = system.definitions.get(G)
+    moves = {system.t, *(state.symbol for state in system.states)}
+    held_open = gap is not None and not gap.free_symbols & moves and gap.subs(point) > 0
+    for (a, b), channels in system.conductances.items():
         across = [h for h in channels if depends(h, G)]
         if not across:
             continue
-        start = _Start(build)
         ends = f"the conductance between {a} and {b}"
-        contact = [(h, start.at(h, P, 0.0)) for h in channels if depends(h, P) and not depends(h, G)]
-        if any(value for _, value in contact if value is not None):
-            build.warnings.append(
-                f"{ends} has a part that reads p and does not vanish without pressure, nor with the gap."
-            )
+        if any(at(h, P, 0.0) for h in channels if depends(h, P) and not depends(h, G)):
+            yield f"{ends} has a part that reads p and does not vanish without pressure, nor with the gap."
         total = symengine.Add(*across)
-        at_touch = start.at(total, G, 0.0)
+        at_touch = at(total, G, 0.0)
         # A pole, as of a film of no thickness, is no jump: the law ends there, and says so itself.
-        if not start.apart and at_touch is not None and math.isfinite(at_touch):
-            build.warnings += _along(start, total, ends)
-
-
-def _along(start: _Start, h: Expression, ends: str) -> list[str]:
-    before, after = (start.at(h, G, side * EPS) or 0.0 for side in (-1, 1))
-    if abs(after - before) > CBRT_EPS * max(before, after):
-        return [f"{ends} jumps at touch, from {before:.6g} to {after:.6g} W/(m^2 K)."]
-    values = [(start.at(h, G, g) or 0.0, g) for g in OPENINGS]
-    highest, where = max(values)
-    if highest > (1 + CBRT_EPS) * before:
-        values_there = f"{before:.6g} W/(m^2 K) at touch, {highest:.6g} at a gap of {where:.2g} m"
-        return [f"{ends} is not monotone: {values_there}. Gas and radiation across the closed gap exceed the contact."]
-    return []
-
-
-class _Start:
-    """Numbers for everything but the gap and the pressure, at the start."""
-
-    def __init__(self, build: Build) -> None:
-        point: dict[Any, Any] = {build.t: 0.0}
-        point |= {parameter.symbol: parameter.at(0.0) for parameter in build.parameters.items}
-        point |= {state.symbol: state.initial for state in build.states if state.symbol not in (P, G)}
-        for item in build.named:
-            if symengine.Symbol(item.name) not in (P, G):
-                point[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(point)
-        self.point = point
-        held = build.loads.get("g_n")
-        self.apart = held is not None and held.name() == "hold" and held.value(0.0) > 0
-        """Whether the gap is held open."""
-
-    def at(self, h: Expression, variable: Any, value: float) -> float | None:
-        """Value of a conductance where the variable has this value; None where it depends on more."""
-        found = symengine.sympify(h).subs(self.point).subs({variable: value})
-        return None if found.free_symbols else float(found)
+        if held_open or at_touch is None or not math.isfinite(at_touch):
+            continue
+        before, after = (at(total, G, side * EPS) or 0.0 for side in (-1, 1))
+        highest, where = max((at(total, G, g) or 0.0, g) for g in OPENINGS)
+        if max(before, after) > (1 + CBRT_EPS) * min(before, after):
+            yield f"{ends} jumps at touch, from {before:.6g} to {after:.6g} W/(m^2 K)."
+        elif highest > (1 + CBRT_EPS) * before:
+            values = f"{before:.6g} W/(m^2 K) at touch, {highest:.6g} at a gap of {where:.2g} m"
+            yield f"{ends} is not monotone: {values}. Gas and radiation across the closed gap exceed the contact."
 
 
 def check_start(system: System, values: Mapping[str, float], initial: Mapping[str, float]) -> None:

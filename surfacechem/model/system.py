@@ -309,6 +309,8 @@ class System:
     profiles: tuple[Profile, ...] = ()
     """Temperatures across bodies; their states stand behind all others, profile after profile."""
     conductors: tuple[Conductor, ...] = ()
+    conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
+    """Conductances in parallel between two ends [W/(m^2 K)]."""
     fit: Fit | None = None
     """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts.terms import Law, Varying
 from surfacechem.model.automaton import INTERFACE
+from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 from surfacechem.results.extremes import cautioned
@@ -196,7 +197,7 @@ def warnings(system: System) -> list[str]:
         for p in system.parameters
         if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
-    return [*system.warnings, *idle]
+    return [*system.warnings, *conductance_warnings(system), *idle]
 
 
 def start_warnings(model: Model, problem: Problem, start: Start | None, end: float) -> list[str]:

@@ -8,6 +8,7 @@ import pytest
 from plane import SPRING, circling, close, events, moments, run, scene
 from scenes import varying
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from tables_mechanics import Solved, solve
 
 from surfacechem.errors import InputError
@@ -330,20 +331,50 @@ def test_isotropic_friction_opposes_a_prescribed_velocity():
     assert film["D_viscous"][-1] == pytest.approx(50 * 25.0, rel=1e-14)
 
 
+@pytest.mark.parametrize(("c", "c_2"), [(1e6, 1e6), (1e5, 1e6), (3e3, 1e3)])
+def test_dampers_beside_friction_that_knows_directions(c, c_2):
+    """What pulls is resisted by friction and damper, (L + c s) n, which leaves one speed."""
+    k, L, damping = np.array([K, 3 * K]), np.array([0.2, 0.5]) * P, np.array([c, c_2])
+    times = np.linspace(0, 1, 21)
+    mounts = Mounting(k=K, c_g=c), Mounting(k=3 * K, c_g=c_2)
+    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
+    u = circling(0.0)[0] - 0.999 * L * np.array([0.6, 0.8]) / k
+    rough = [AnisotropicCoulomb(mu_1=0.2, mu_2=0.5)]
+    solved = run(scene(rough, mounts[0], {"u_t": u[0], "u_t2": u[1]}, mounts[1], p=P, **w), times)
+
+    def rates(t, state):
+        pull = k * (circling(t)[0] - state)
+        if np.linalg.norm(pull / L) <= 1:
+            return [0.0, 0.0]
+
+        def beyond(s):
+            return np.linalg.norm(pull / (L + damping * s)) - 1
+
+        s = brentq(beyond, 0, np.linalg.norm(pull) / damping.min(), xtol=1e-300, rtol=1e-15)
+        return pull / (L + damping * s) * s
+
+    begun = solved.jumps[0].t
+    assert events(solved)[0] == "slip"
+    sliding = times > begun
+    found = solve_ivp(rates, (begun, 1), u, "Radau", t_eval=times[sliding], rtol=1e-10, atol=1e-16).y
+    close(solved["u_t"][sliding], found[0], 1e-7)
+    close(solved["u_t2"][sliding], found[1], 1e-7)
+    assert np.all(solved["D_anisotropic_coulomb"] >= 0)
+
+
+def test_rails_need_a_mass():
+    mount, pull = Mounting(k=K, c_b=1e5), {"w_t": Ramp(rate=1e-3), "w_t2": Ramp(rate=1e-3)}
+    model = Model(assemble(scene([AnisotropicCoulomb(mu_1=0.2, mu_2=0.0)], mount, p=P, **pull)))
+    with pytest.raises(InputError, match=r"dry friction acts along one of two directions.*Give the mounting a mass"):
+        solve(model, [0.0, 1.0])
+
+
+K, P = 1e8, 1e5
+SPEEDLESS = "Give the mounting a mass `m`, or a damper `c_b` along both directions"
 REFUSED = [
-    (scene([Coulomb(mu=0.3)], None, p=1, F_t=1, F_t2=1), "needs a stiffness along both"),
-    (
-        scene([Coulomb(mu=0.3)], Mounting(k=1e6, c_b=1.0), None, Mounting(k=1e6), p=1, w_t=0, w_t2=0),
-        "something resists sliding along one direction in proportion to its rate, and nothing does along the other",
-    ),
-    (
-        scene([AnisotropicCoulomb(mu_1=0.3, mu_2=0.6), Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), p=1, w_t=0, w_t2=0),
-        "with a static limit of its own friction lets the springs jump",
-    ),
-    (
-        scene([Coulomb(mu=0.1, mu_s=0.2)], Mounting(k=1e6), None, Mounting(k=2e6), p=1, w_t=0, w_t2=0),
-        "differ from direction to direction nothing says which way",
-    ),
+    (scene([Coulomb(mu=0.3)], None, p=1, F_t=1, F_t2=1), SPEEDLESS),
+    (scene([Coulomb(mu=0.3)], Mounting(k=1e6), p=1, w_t=0, w_t2=0), SPEEDLESS),
+    (scene([Coulomb(mu=0.3)], Mounting(k=1e6, c_b=1.0), None, Mounting(k=1e6), p=1, w_t=0, w_t2=0), SPEEDLESS),
     (scene([Coulomb(mu=0.3)], SPRING, p=1, w_t=0, v_2=1), "v_2 is prescribed, but a mounting moves the interface"),
     (scene([Coulomb(mu=0.3)], SPRING, transverse=Mounting(k=1.0, m=1.0), p=1), "a mass is the same in every direction"),
     (scene([Coulomb(mu=0.3)], None, transverse=Mounting(k=1.0), p=1, v=1), "stands beside one along"),

@@ -217,15 +217,6 @@ def test_a_stiff_spring_slides_steadily():
     assert heat == pytest.approx(0.7 * p * float(stiff.u_t[-1]), rel=1e-9)
 
 
-def test_in_the_plane_it_is_that_of_one_direction():
-    one = run(heat="conductance: {between: [slider, surroundings], h: 60}", until=40)
-    loading = "p: 2e6, w_t: {ramp: {rate: 0.6e-3}}, w_t2: {ramp: {rate: 0.8e-3}}"
-    two = run(heat="conductance: {between: [slider, surroundings], h: 60}", until=40, loading=loading)
-    np.testing.assert_allclose(slips(two), slips(one), rtol=1e-9)
-    np.testing.assert_allclose(two["T"], one["T"], rtol=1e-8)
-    np.testing.assert_allclose(0.8 * two.u_t, 0.6 * two.u_t2, rtol=1e-9, atol=1e-15)
-
-
 def test_sliding_that_becomes_unstable_sticks_and_slips():
     """Pressure rises until friction falls with its heat by more than the spring: 4 F^2 / (C T) = k."""
     loading = "p: {table: {times: [0, 20], values: [0.4e6, 1.2e6]}}, w_t: {ramp: {start: 2.7e-3, rate: 1e-3}}"

@@ -20,8 +20,8 @@ from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, departure, opposed, own_departure
 from surfacechem.model.constraints.bound import free_to_react
-from surfacechem.model.constraints.closing import TOUCHING
-from surfacechem.model.constraints.softening import softening, within_reach
+from surfacechem.model.constraints.envelope import softening, within_reach
+from surfacechem.model.constraints.unilateral import TOUCHING
 from surfacechem.model.parts import Bond
 from surfacechem.model.system import Account, Capped, Caution
 from surfacechem.quantities import Quantity

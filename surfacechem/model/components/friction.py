@@ -16,8 +16,7 @@ from surfacechem.expressions import Expression, derivative, exp, where
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG
-from surfacechem.model.sliding.formulations import displacement, in_parallel
-from surfacechem.model.sliding.resistance import resist, resistance, stick_limit
+from surfacechem.model.sliding.formulation import displacement, in_parallel, resist, resistance, stick_limit
 from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 

@@ -14,8 +14,8 @@ from surfacechem.model.automaton import Equilibrium
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, read_by_potentials
-from surfacechem.model.constraints.breaking import bonds_left
-from surfacechem.model.constraints.closing import TOUCHING, closing
+from surfacechem.model.constraints.threshold import bonds_left
+from surfacechem.model.constraints.unilateral import TOUCHING, closing
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 

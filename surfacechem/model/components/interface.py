@@ -17,7 +17,7 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
 from surfacechem.model.parts import Bond, Energy
-from surfacechem.model.sliding.formulations import arrangement, displacement, in_parallel, in_series
+from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import NOTHING, SLACK

@@ -14,7 +14,7 @@ from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
 from surfacechem.model.balances import HEAT, INTERFACE, MECHANICS, OUTSIDE, SURROUNDINGS, WORK, Node, Power
 from surfacechem.model.build import Build
-from surfacechem.model.constraints.folds import determinant
+from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity

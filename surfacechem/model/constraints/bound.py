@@ -43,28 +43,33 @@ BOUNDS = (
 
 def free_to_react(build: Build, rate: Expression) -> Expression:
     """One while the bonding state is free, zero while it is held at a bound; ``rate`` is what would change it."""
-    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
-    if top is None or LOGARITHM in build.scene.initial:
-        return symengine.Integer(1)
-    laws = [law for law in build.interface.reactions if law.envelope is None]
-    if all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws):
+    if not _may_leave_the_range(build):
         return symengine.Integer(1)
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
-    sides = [side for side, beyond in outward.items() if beyond != 0]
-    if not sides:
+    bounds = [bound for bound in BOUNDS if outward[bound[0]] != 0]
+    if not bounds:
         return symengine.Integer(1)
-    held = build.mode("held", 0.0, {value: text for value, text in HELD_AT.items() if value == 0 or value in sides})
-    for side, at, _, name, reason, back, why in BOUNDS:
-        if side in sides:
-            # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
-            left = where(outward[side] > 0, side * (at - PHI), 1)
-            turned = build.stretch * outward[side] / build.bonding["phi"].density
-            modes, free = {held: symengine.Integer(side)}, {held: symengine.Integer(0)}
-            build.edges += [
-                Edge(name, left, reason, modes, {PHI: at}, measure="phi", when={held: (0,)}),
-                Edge(back, turned, why, free, when={held: (side,)}),
-            ]
+    sides = {0, *(side for side, *_ in bounds)}
+    held = build.mode("held", 0.0, {side: text for side, text in HELD_AT.items() if side in sides})
+    for side, at, _, name, reason, back, why in bounds:
+        # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
+        left = where(outward[side] > 0, side * (at - PHI), 1)
+        turned = build.stretch * outward[side] / build.bonding["phi"].density
+        modes, free = {held: symengine.Integer(side)}, {held: symengine.Integer(0)}
+        build.edges += [
+            Edge(name, left, reason, modes, {PHI: at}, measure="phi", when={held: (0,)}),
+            Edge(back, turned, why, free, when={held: (side,)}),
+        ]
     return 1 - held**2
+
+
+def _may_leave_the_range(build: Build) -> bool:
+    """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
+    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+    if top is None or LOGARITHM in build.scene.initial:
+        return False
+    laws = [law for law in build.interface.reactions if law.envelope is None]
+    return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:

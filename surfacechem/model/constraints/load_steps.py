@@ -23,10 +23,7 @@ def load_steps(build: Build) -> None:
     reason = f"{' or '.join(steps)} jumps"
     times = tuple(sorted({t for load in steps.values() for t in load.jumps()}))
     never = symengine.Integer(1)
-    known = {mode.symbol for mode in build.modes} | {register.symbol for register in build.registers}
-    modes = _closing(build) | {x: value for x, value in build.motion.jolted.items() if x in known}
-    jump = {x: value for x, value in build.motion.jolted.items() if x not in known}
-    build.edges.append(Edge("load", never, reason, modes, jump, equilibrates=True, times=times))
+    build.edges.append(Edge("load", never, reason, _closing(build), equilibrates=True, times=times))
 
 
 def _histories(build: Build, name: str) -> set[Expression]:

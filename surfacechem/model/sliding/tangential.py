@@ -13,25 +13,24 @@ from surfacechem.expressions import Expression, norm, sign, where
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG
-from surfacechem.model.sliding import plane, slip
-from surfacechem.model.sliding.formulations import Kind, displacement, in_parallel, kinds
-from surfacechem.model.sliding.resistance import directions
+from surfacechem.model.sliding import line, plane
+from surfacechem.model.sliding.formulation import Formulation, directions, displacement, formulations, in_parallel
 from surfacechem.quantities import VARIABLES
 
 
 def tangential_gap(build: Build) -> None:
     """States and modes of the tangential motion."""
-    found = build.motion.slips = kinds(build)
+    found = build.motion.slips = formulations(build)
     if not found:
         _prescribed_direction(build)
     elif _in_the_plane(found):
         plane.states(build, found)
     else:
         for kind in found:
-            slip.states(build, kind)
+            line.states(build, kind)
 
 
-def _in_the_plane(found: Sequence[Kind]) -> bool:
+def _in_the_plane(found: Sequence[Formulation]) -> bool:
     return len(found) == 2 and found[0].sticks
 
 
@@ -62,9 +61,9 @@ def _along_displacement(build: Build) -> Expression:
 
 
 def tangential_motion(build: Build) -> Iterator[Power]:
-    """Balance of the tangential tractions, and the transitions between sticking and sliding."""
+    """Balance of the tangential tractions, and the edges between sticking and sliding."""
     if _in_the_plane(build.motion.slips):
         yield from plane.motion(build, build.motion.slips)
         return
     for kind in build.motion.slips:
-        yield from slip.motion(build, kind)
+        yield from line.motion(build, kind)

@@ -1,4 +1,4 @@
-"""Sliding with inertia against rate-and-state friction: it sticks, creeps, slips, swings, and changes its variable."""
+"""Sliding with inertia against rate-and-state friction: it sticks, creeps, slips and swings."""
 
 import numpy as np
 import pytest
@@ -127,7 +127,7 @@ def test_a_block_swings_through_its_turning_points(law):
     u, v, _ = plain(law, lambda t, u: -K * u, 1e6, trajectory.result.times, [0.0, 1.0, 0.0], turn=1e-10)
     np.testing.assert_allclose(state(trajectory, "u_t"), u, rtol=0, atol=1e-8 * np.max(u))
     np.testing.assert_allclose(velocity(trajectory), v, rtol=0, atol=1e-8)
-    assert set(happened(trajectory)) <= {"creep", "slide"}
+    assert happened(trajectory) == []
 
 
 @pytest.mark.parametrize("m", [1e-2, 1e2, 1e6])
@@ -135,7 +135,7 @@ def test_a_block_swings_through_its_turning_points(law):
 def test_a_light_block_slides_as_one_without_mass(law, m):
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory, without = (solved(scene(law, Mounting(k=K, m=mass), load), 40.0) for mass in (m, 0.0))
-    assert happened(trajectory) == ["slide", *["creep", "slide"] * 4]
+    assert happened(trajectory) == []
     assert trajectory.result.counters.steps < 2000
     np.testing.assert_allclose(state(trajectory, "u_t"), state(without, "u_t"), rtol=0, atol=1e-10 * (1 + m))
 
@@ -156,8 +156,7 @@ def test_pressure_that_vanishes_frees_what_creeps(law):
     fall = {"times": [0.0, 1.0, 1.001, 1.002, 3.0], "values": [P, 0.0, 0.0, P, P]}
     item = scene(law, Mounting(k=K, m=1e4), {"w_t": Hold(level=1e-3)}, WEAKENING, p=Table(**fall))
     trajectory = solved(item, 3.0)
-    assert happened(trajectory)[0] == "slide"
-    assert happened(trajectory)[-1] == "creep"
+    assert np.max(np.abs(trajectory.everywhere["v"])) > 1e-3
     assert abs(velocity(trajectory)[-1]) < 1e-20
 
 
@@ -166,7 +165,7 @@ def test_friction_that_sticks_beside_it():
     others = [Coulomb(mu=0.1)]
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M), load, others=others), 40.0)
-    assert happened(trajectory)[:4] == ["slip forward", "slide", "creep", "stop"]
+    assert happened(trajectory)[:4] == ["slip forward", "stop", "slip backward", "stop"]
     without = solved(scene(RateAndStateAging, Mounting(k=K), load, others=others), 40.0)
     np.testing.assert_allclose(state(trajectory, "u_t"), state(without, "u_t"), rtol=0, atol=1e-7)
 
@@ -201,14 +200,15 @@ def test_the_velocity_at_the_start_is_given_as_such():
     given = [1e-30, -1e-12, 0.0, 1e-9, 1e-6, -1e-2]
     data = simulation.sweep({"initial.v": given}).dataset
     np.testing.assert_allclose(data["v"].values[:, 0], given, rtol=1e-13)
-    with pytest.raises(InputError, match=r"no parameter 'initial\.pace'"):
-        simulation.run({"initial.pace": 1.0})
+    with pytest.raises(InputError, match=r"no parameter 'initial\.drive'"):
+        simulation.run({"initial.drive": 1.0})
 
 
 def test_dampers_beside_it_do_their_work():
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M, c_b=1e6, c_g=1e6), load), 40.0)
-    assert happened(trajectory) == ["slide", *["creep", "slide"] * 4]
+    assert happened(trajectory) == []
+    assert np.all(trajectory.everywhere["D_contact_damper_t"] >= 0)
 
 
 def test_an_impact_on_it_is_refused():

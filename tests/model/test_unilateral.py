@@ -398,32 +398,14 @@ def test_what_slides_without_a_mass_or_behind_a_spring_sticks_for_an_instant(fri
         assert jump.after.y[2:-1].tolist() == jump.before.y[2:-1].tolist()
 
 
-@pytest.mark.parametrize("e", [0.0, 0.5])
-def test_a_drive_pays_for_what_impacts_rub(e):
-    """The work of friction is mu times the impulse of the pressure times the velocity, on average that of the load."""
+def test_the_work_of_a_drive_in_an_impact_is_left_out():
     interface = Interface("T", frictions=[Coulomb(mu=MU)])
-    given = scene(Mounting(m=M, e=e), PRESSED | {"v": Hold(level=-2.0)}, interface=interface)
-    trajectory = solve(given, 3.0)
-    rub = made(trajectory, "rub")[0]
-    assert rub.released == pytest.approx(MU * (1 + e) * M * V_0 * 2.0, rel=1e-12)
-    accounts = {
-        a.quantity.name: x for a, x in zip(trajectory.model.system.ledger, trajectory.result.ledger, strict=True)
-    }
-    assert accounts["W_coulomb"] == pytest.approx(MU * F * 2.0 * 3.0, rel=1e-10)
+    trajectory = solve(scene(Mounting(m=M), PRESSED | {"v": Hold(level=-2.0)}, interface=interface), 3.0)
+    assert not made(trajectory, "rub")
+    assert trajectory.model.system.warnings == (
+        "impacts take no time: what coulomb would do at their pressure is left out.",
+    )
     assert audit(trajectory).energy_error < 1e-11
-
-
-@pytest.mark.parametrize("friction", [Stribeck(mu_s=0.6, mu_k=0.4, v_s=0.5), AnisotropicCoulomb(mu_1=0.2, mu_2=0.4)])
-def test_a_drive_knows_its_velocity(friction):
-    interface = Interface("T", frictions=[friction])
-    loading = PRESSED | {"v": Hold(level=0.6)}
-    loading |= {"v_2": Hold(level=0.8)} if isinstance(friction, AnisotropicCoulomb) else {}
-    trajectory = solve(scene(Mounting(m=M), loading, interface=interface), 0.5)
-    power = {
-        Stribeck: (0.4 + 0.2 * math.exp(-(1.2**2))) * 0.6,
-        AnisotropicCoulomb: 0.2 * 0.6**2 + 0.4 * 0.8**2,
-    }[type(friction)]
-    assert made(trajectory, "rub")[0].released == pytest.approx(power * M * V_0, rel=1e-12)
 
 
 # -- what is refused, and what is said ---------------------------------------------------------------------------------

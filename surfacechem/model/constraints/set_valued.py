@@ -1,0 +1,151 @@
+r"""Dry friction as a set-valued law: the traction is one of those that the velocity of sliding allows.
+
+.. math:: t \in L\,\partial|v|
+
+At rest it is any up to the limit L, while sliding it is L against the velocity, in the plane on an ellipse. The mode of
+slip is -1, 0 or 1 along a line; in the plane it is 0 or 1, beside registers of the direction in which sliding began.
+Its edges: the traction that sticking needs passes the limit, the velocity returns to zero.
+
+In an impact the same law holds for impulses. A mass m that meets a rigid contact with the velocity v and leaves it with
+:math:`-e\,v` gives the pressure the impulse :math:`J = (1+e)\,m|v|`, and what slides with a mass m_t of its own loses
+:math:`\mu J / m_t` of its velocity, and no more than that. What slides without a mass, or behind a tangential spring of
+the interface, sticks for that instant, and nothing is lost.
+
+Source: Coulomb's law as an inclusion, Moreau (1988), Unilateral contact and dry friction in finite freedom dynamics,
+doi 10.1007/978-3-7091-2624-0_1; Sauer, Duong & Mandadapu (2021), eqs. e:dry_fric and e:tt_max; impulses of friction as
+in Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import symengine
+
+from surfacechem.contracts.terms import Friction
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
+from surfacechem.model.automaton import Edge
+from surfacechem.model.build import Build
+from surfacechem.model.components.mounting import far_field, law_reads
+from surfacechem.model.constraints.threshold import broken
+
+NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+
+P = symengine.Symbol("p of an impact")
+
+HIGH, VERY_HIGH = 1e50, 1e100
+"""Pressures [Pa] between which friction has to grow in proportion, as it does at one that is infinite."""
+
+SOFTEN = "Let a potential bear the bodies, such as `penalty`."
+
+
+def slip_along_a_line(
+    build: Build,
+    slip: Expression,
+    needed: Expression,
+    limit: Expression,
+    still: Expression,
+    stops: Sequence[Expression],
+    *,
+    equilibrates: bool,
+) -> list[Edge]:
+    """Edges of one direction: ``needed`` is what sticking has to bear, ``still`` is zero where sliding stops.
+
+    ``stops`` are the states that are zero from then on, the velocity where it has inertia. Gaps that are quasi-static
+    find their equilibrium, and others follow the bonds that break and their heat.
+    """
+    # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
+    bears, breaks = where(limit > 0, limit, 0), _broken(build)
+    edges = [
+        Edge(
+            f"slip {word}",
+            bears - s * needed,
+            f"sticking gives way and the interface slides {word}",
+            {slip: symengine.Integer(s)},
+            breaks,
+            equilibrates=equilibrates or bool(breaks),
+            heat="local",
+            strict=True,
+            when={slip: (0,)},
+        )
+        for s, word in ((1, "forward"), (-1, "backward"))
+    ]
+    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else NONE
+    reset = dict.fromkeys(stops, NONE)
+    when, reason = {slip: (-1, 1)}, "sliding comes to a stop"
+    return [*edges, Edge("stop", still, reason, {slip: onward}, reset, strict=True, when=when)]
+
+
+def slip_in_the_plane(
+    build: Build,
+    slip: Expression,
+    beyond: Expression,
+    aim: Mapping[Expression, Expression],
+    turn: Expression,
+    still: Expression,
+    stops: Sequence[Expression],
+) -> list[Edge]:
+    """Edges of two directions: ``beyond`` is what sticking bears beyond the pull, ``aim`` the direction of slip."""
+    modes, reason = {slip: ONE, **aim}, "sticking gives way and the interface slides"
+    reset = {**_broken(build), turn: NONE}
+    begins = Edge("slip", beyond, reason, modes, reset, heat="local", strict=True, when={slip: (0,)})
+    # What has inertia slides on where sticking does not bear what pulls.
+    onward = {slip: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
+    modes, reset = onward if stops else {slip: NONE}, {turn: NONE, **dict.fromkeys(stops, NONE)}
+    reason, when = "sliding comes to a stop", {slip: (1,)}
+    return [begins, Edge("stop", still, reason, modes, reset, heat="local", strict=True, when=when)]
+
+
+def _broken(build: Build) -> dict[Expression, Expression]:
+    """New values of the bonding variables where a law breaks the bonds as sliding begins."""
+    law = next((law for law in build.interface.frictions if law.breaks_bonds), None)
+    return {} if law is None else broken(build, law)
+
+
+def friction_impulse(build: Build, impulse: Expression) -> tuple[dict[Expression, Expression], list[Edge]]:
+    """What the ``impulse`` of the pressure [Pa s] takes from sliding that has a mass: modes it sets, and the edge."""
+    laws = [law for law in build.interface.frictions if law_reads(law, "p")]
+    sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
+    if not (laws and sliding):
+        return {}, []
+    v = symengine.Symbol("speed" if len(sliding) == 2 else "v")
+    exerted = build.register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
+    slip = build.find_mode("slip")
+    ratio = build.energy.rubs * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
+    loss = ratio * exerted / far_field(build, sliding[0].mount).m
+    stops = {} if slip is None else {slip: where(loss < absolute(v), slip, NONE)}
+    left = {v: where(loss < absolute(v), v - loss * sign(v), NONE)}
+    due, reason = where(exerted > 0, -1, 1), "friction answers the impact"
+    rub = Edge("rub", due, reason, {exerted: NONE, **stops}, left, heat="local")
+    return {exerted: where(absolute(v) > 0, impulse, NONE)}, [rub]
+
+
+def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
+    """Impulse of friction over that of the pressure, where sliding slows down under it."""
+    unknown = f"{law.name()}: what an impact takes from sliding is not known where"
+    if law.transverse is not None:
+        raise InputError(
+            f"{unknown} friction differs from direction to direction, since it turns within the impact. {SOFTEN}",
+            law.place,
+        )
+    bound = build.bound(law)
+    traction = build.variables.call(bound, bound.statement, {"p": P, "v": v, "direction": ONE})
+    expression = symengine.sympify(traction).subs({symengine.Symbol("p"): P, symengine.Symbol("t_n"): -P})
+    slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in (HIGH, VERY_HIGH)]
+    finite, infinite = (build.at_start(slope) for slope in slopes)
+    if finite != infinite:
+        raise InputError(
+            f"{law.name()}: the impulse of friction in an impact is not known where the coefficient of friction varies "
+            f"with the pressure, which is not finite then. {SOFTEN}",
+            law.place,
+        )
+    ratio = slopes[-1]
+    if depends(ratio, v) or depends(build.expanded(ratio), v):
+        raise InputError(
+            f"{unknown} the coefficient of friction varies with the sliding velocity, which changes within the impact. "
+            f"{SOFTEN}",
+            law.place,
+        )
+    return ratio

@@ -1,0 +1,189 @@
+r"""Limits of the normal traction: the interface is bonded until a threshold is reached, once.
+
+.. math:: t_n \le t_n^{max}
+
+The mode ``bonded`` ends where the traction passes the strength: the bonding state, or the bonds of a mechanism by the
+reactions in which they break, are lost at once, and a rigid interface opens. Where the strength is that of the bonds it
+comes back with them as the gap closes. Gaps without inertia or damper then find their equilibrium, at once with the
+bodies paying for the bonds, or in a jump of its own where the interface alone pays.
+
+Source: Sauer, Duong & Mandadapu (2021), eq. e:debond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import symengine
+
+from surfacechem.contracts.terms import Law, Limit
+from surfacechem.errors import InputError, suggestion
+from surfacechem.expressions import Expression, depends, derivative, where
+from surfacechem.model.automaton import Edge
+from surfacechem.model.build import Build
+from surfacechem.model.components.mounting import law_reads
+
+Stoichiometry = Mapping[str, int | float]
+
+NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+
+
+def bonded_mode(build: Build) -> None:
+    """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
+
+    def bonded() -> Expression:
+        start = next((mode.start for mode in build.modes if mode.name == "closed"), None)
+        if start is None and build.variables.has("g_n"):
+            # An open gap without bonds is not bonded.
+            start = where(build.variables.get("g_n", "the bonds", "interface") > 0, 0, 1)
+            bonds = bonds_left(build)
+            start = start if bonds is None else where(bonds > 0, 1, start)
+        return build.mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"}, start)
+
+    given = ("mode", "interface.limits") if build.interface.limits else ("internal", "no limit of the traction")
+    build.variables.define("bonded", bonded, *given)
+
+
+def bonds_left(build: Build) -> Expression | None:
+    """The bonding state, before it is defined for the laws; None where nothing bonds."""
+    if "phi" in build.bonding:
+        return build.bonding["phi"].symbol
+    bonds = [build.bonding[name].symbol for name in build.interface.bonds]
+    return symengine.Add(*bonds) if bonds else None
+
+
+def limits(build: Build) -> None:
+    """Where a limit is reached bonds break; a rigid interface opens, and closes where the gap has closed."""
+    closed = build.find_mode("closed")
+    heals = [_limit(build, law, closed) for law in build.interface.limits]
+    again = {build.variables.get("bonded", "the limit"): ONE} if heals and all(heals) else {}
+    moves = "g_n" in build.motion.gap_rates
+    if closed is None:
+        # An elastic interface whose strength is that of its bonds can bond again where the gap has closed.
+        if again and moves:
+            gap = build.variables.get("g_n", "the limit", "interface")
+            reason = "the gap closes, so that bonds can hold again"
+            build.edges.append(Edge("rejoin", gap, reason, again, when=dict.fromkeys(again, (0,))))
+        return
+    if not build.interface.limits:
+        _opening(build, build.variables.get("t_n", "the rigid interface", "interface"), closed, {closed: (1,)})
+    build.motion.heals = {closed: ONE, **again}
+    gap = build.variables.get("g_n", "the rigid interface", "interface")
+    if not moves:
+        build.edges.append(Edge("touch", gap, "the gap closes", build.motion.heals, when={closed: (0,)}))
+
+
+def _opening(build: Build, t_n: Expression, closed: Expression, when: Mapping[Expression, tuple[int]]) -> None:
+    """A rigid interface without bonds opens under tension; one that only touches zero does not part a mass."""
+    strict = any(state.name == "v_n" for state in build.states)
+    reason = "the interface opens"
+    build.edges.append(Edge("open", -t_n, reason, {closed: NONE}, equilibrates=True, strict=strict, when=when))
+
+
+def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
+    """State a limit; whether its strength is that of the bonds, so that it can come back with them."""
+    if not build.variables.has("t_n"):
+        message = "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
+        raise InputError(message, law.place)
+    bound = build.variables.bind(law, f"interface.limits.{law.name()}")
+    strength = build.variables.call(bound, bound.statement)
+    t_n, bonded = build.variables.get("t_n", law), build.variables.get("bonded", law)
+    if closed is None:
+        modes, when = [bonded], {bonded: (1,)}
+    else:
+        # Closed again, a rigid interface that has debonded bears pressure only.
+        strength = bonded * strength
+        modes, when = [bonded, closed], {closed: (1,)}
+        if law.release == "local":
+            modes, when = [bonded], {bonded: (1,), closed: (1,)}
+            _opening(build, t_n, closed, {bonded: (0,), closed: (1,)})
+    breaks = broken(build, law, law.breaks)
+    _refuse_idle(build, law, {*modes, *breaks})
+    build.edges.append(
+        Edge(
+            "debond",
+            strength - t_n,
+            "the interface debonds as its tensile strength is reached",
+            dict.fromkeys(modes, NONE),
+            breaks,
+            equilibrates=True,
+            heat=law.release,
+            violation=law.violation,
+            when=when,
+        )
+    )
+    expanded = build.expanded(strength)
+    return any(depends(expanded, symengine.Symbol(name)) for name in ("phi", *build.interface.bonds))
+
+
+def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
+    """A limit of a tension that bonds do not carry would change nothing."""
+    g = symengine.Symbol("g_n")
+    if not depends(build.psi, g) or build.expanded(derivative(build.psi, g)).free_symbols & changed:
+        return
+    names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
+    raise InputError(
+        f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds. Let it: use "
+        "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
+        law.place,
+    )
+
+
+def relaxing(build: Build) -> None:
+    """Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do."""
+    local = [j for j, item in enumerate(build.edges) if item.name == "debond" and item.heat == "local"]
+    if not (local and build.equilibria):
+        return
+    loose = build.register("loose", "whether the gaps have yet to follow a local jump")
+    for j in local:
+        item = build.edges[j]
+        build.edges[j] = replace(item, modes={**item.modes, loose: ONE}, equilibrates=False)
+    reason, when = "the gap follows what gave way", {loose: (1,)}
+    build.edges.insert(0, Edge("relax", -ONE, reason, {loose: NONE}, equilibrates=True, when=when))
+
+
+def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expression]:
+    """New values of the bonding variables where bonds break at once: of all of them, or of the one ``named``."""
+    bonds, bonding = build.interface.bonds, build.bonding
+    if not bonds:
+        if named:
+            message = f"{law.name()} breaks '{named}', but the bonds are not species of a mechanism."
+            raise InputError(message, law.place)
+        return {bonding["phi"].symbol: NONE} if "phi" in bonding else {}
+    lost = [_bond(build, law, named)] if named else list(bonds)
+    changes: dict[str, Expression] = {}
+    for name in lost:
+        nu = _rupture(build, law, name)
+        extent = bonding[name].symbol * bonding[name].density / -nu[name]
+        for other, n in nu.items():
+            changes[other] = changes.get(other, 0) + n * extent / bonding[other].density
+    return {bonding[x].symbol: NONE if x in lost else bonding[x].symbol + change for x, change in changes.items()}
+
+
+def _bond(build: Build, law: Law, name: str) -> str:
+    """The variable of a bond that is called by its species, or by the variable itself."""
+    variables = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
+    species = {variables[bond]: bond for bond in build.interface.bonds}
+    if name in species.values():
+        return name
+    if name not in species:
+        raise InputError(f"{law.name()}: no bond is called '{name}'.{suggestion(name, list(species))}", law.place)
+    return species[name]
+
+
+def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:
+    """The reaction by which a bond breaks, per bond: the first that turns it into what is no bond."""
+    bonds = build.interface.bonds
+    found = [reaction.stoichiometry() for reaction in build.interface.reactions]
+    per_bond = [{x: -n / nu[name] for x, n in nu.items() if n} for nu in found if nu.get(name)]
+    ways = [nu for nu in per_bond if not any(n > 0 and x in bonds for x, n in nu.items())]
+    if not ways:
+        message = f"{law.name()} breaks bonds at once, but no reaction says what {name} breaks into."
+        raise InputError(message, law.place)
+    if any(nu != ways[0] for nu in ways[1:]):
+        products = " + ".join(x for x, n in ways[0].items() if n > 0)
+        build.warnings.append(
+            f"{law.name()} breaks {name} into {products}, by the first of the reactions that break it."
+        )
+    return ways[0]

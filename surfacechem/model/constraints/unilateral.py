@@ -1,0 +1,159 @@
+r"""Unilateral contact: the gap is not negative, the contact pushes only, and it pushes only where the gap is closed.
+
+.. math:: 0 \le g_n \perp p \ge 0
+
+The mode ``closed`` of a rigid gap begins as the gap closes and ends under tension. A mass m that reaches contact with
+:math:`v < 0` leaves it with :math:`-e\,v`, by the impulse :math:`(1+e)\,m|v|`, which friction answers by one of its
+own. Finite tractions, those of springs, dampers, cohesion and adhesion, have no part in it. Under a pressing traction
+rebounds follow each other ever faster, infinitely many in a time :math:`2 e|v| m / (1-e)|F|` (Zeno). The bodies rest
+where what is left of this is nothing, beside the time that has passed or the fastest impact.
+
+Where a potential stands for the contact it has to bear the bodies; where none does, a run ends as the gap closes.
+
+Source: Signorini's condition and Newton's law of impact as in Moreau (1988), doi 10.1007/978-3-7091-2624-0_1, and
+Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import symengine
+
+from surfacechem.contracts.terms import Spec
+from surfacechem.expressions import Expression, absolute, derivative, where
+from surfacechem.model.automaton import RESTS, Edge
+from surfacechem.model.build import Build
+from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
+from surfacechem.model.constraints.set_valued import friction_impulse
+from surfacechem.model.system import TOLERANCE, Margin
+from surfacechem.tolerances import PICOMETRE, SOLVED
+
+NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+G, V = symengine.symbols("g_n v_n")
+
+NOTHING, SLOWEST = 0.1, 10 * PICOMETRE
+"""Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
+speed [m/s] that the fastest impact has at least there."""
+
+BRIEF = 8 * SOLVED
+"""Part of the time so far that one rebound must take to be told from none: a few hundred ticks of the clock, so that
+its event is found to a per cent of it."""
+
+HIGH, VERY_HIGH, HALF = 1e50, 1e100, 0.5
+"""Two pressures [Pa], and the part to which what is conducted per pressure falls, at least, from the one to the other,
+where it is less than in proportion."""
+
+OVERLAP, OPENING, LEAST = -1.0, PICOMETRE / 1e3, 1.0
+"""Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former: a law that
+bears contact has many orders more there, bonds that have all but gone leave less.
+"""
+
+TOUCHING = PICOMETRE
+"""Overlap [m] that still is touch: far below the size of an atom, far above the rounding of a gap."""
+
+REMEDY = "Give a potential that does, such as `penalty`."
+
+
+def impacts(build: Build) -> None:
+    """How a gap that moves closes: where it has a mass by an impact, after which the bodies rebound or rest."""
+    closed = build.find_mode("closed")
+    if closed is None or "g_n" not in build.motion.gap_rates:
+        return
+    mount = held(build, "n")
+    assert mount is not None
+    shut, apart = {G: NONE}, {closed: (0,)}
+    if not mount.inertial:
+        closes = Edge("touch", G, "the gap closes", build.motion.heals, shut, equilibrates=True, when=apart)
+        build.edges.append(closes)
+        return
+    far = far_field(build, mount)
+    speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
+    landed = build.register("landed", "whether the bodies have met and do not rebound")
+    rests, remembered = _rests(build, far, speed, pressing)
+    begins, rubs = friction_impulse(build, (1 + far.e) * far.m * speed)
+    # What follows at the same moment comes before what would slide as long as the contact is open.
+    build.edges[:0] = [
+        Edge(
+            "impact",
+            G,
+            "the bodies hit each other",
+            {landed: rests, **remembered, **begins},
+            {**shut, V: where(rests > 0, NONE, far.e * speed)},
+            returns=where(pressing > 0, 2 * V / pressing, NONE),
+            when=apart,
+        ),
+        *rubs,
+        Edge(
+            "rest",
+            -ONE,
+            "the bodies rest on each other",
+            {landed: NONE, **build.motion.heals},
+            equilibrates=True,
+            when={landed: (1,)},
+        ),
+    ]
+
+
+def _rests(
+    build: Build, far: FarField, speed: Expression, pressing: Expression
+) -> tuple[Expression, dict[Expression, Expression]]:
+    """One where the bodies do not rebound, else zero; and the registers that this needs."""
+    if far.e == 0:
+        return ONE, {}
+    tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
+    fastest = build.register("fastest", "speed of the fastest impact [m/s]")
+    swift = where(speed > fastest, speed, fastest)
+    rebound = far.e * speed
+    nothing = NOTHING * tolerance
+    # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
+    brief = pressing * build.t * ((1 - far.e) * nothing + BRIEF)
+    slow = where(rebound < nothing * (swift + SLOWEST), 1, where(2 * rebound < brief, 1, 0))
+    at_once = build.constant("rests_at", RESTS, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
+    return where(build.t > at_once, slow, 1), {fastest: swift}
+
+
+def missed(build: Build) -> None:
+    """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
+    if not any(register.name == "landed" for register in build.registers):
+        return
+    found = [law.name() for law in build.interface.reactions if law_reads(law, "p") or law_reads(law, "t_n")]
+    if not build.motion.slips:  # the velocity of sliding is prescribed, and its drive does the work of friction
+        found += [law.name() for law in build.interface.frictions if law_reads(law, "p")]
+    for (a, b), channels in build.conductances.items():
+        if any(_keeps_up(build, h) for h in channels):
+            found.append(f"the conductance between {a} and {b}")
+    if found:
+        names = " and ".join(dict.fromkeys(found))
+        build.warnings.append(f"impacts take no time: what {names} would do at their pressure is left out.")
+
+
+def _keeps_up(build: Build, h: Expression) -> bool:
+    """Whether a conductance grows at least in proportion to the pressure; what grows less does nothing in no time."""
+    at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in (HIGH, VERY_HIGH)]
+    return at[1] > HALF * at[0]
+
+
+def closing(build: Build, g: Any) -> None:
+    """End a run as the gap closes, unless a potential bears the bodies there, or a law ends there by itself."""
+    if any(margin.name == "g_n > 0" for margin in build.margins):
+        return
+    borne = _borne(build, g)
+    without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
+    # A law may have no number there.
+    if not build.at_start(without_bonds) <= LEAST:
+        return
+    if build.at_start(borne) <= LEAST:
+        build.warnings.append(f"no potential bears the bodies in contact: the run ends if the gap closes. {REMEDY}")
+    gap = g + TOUCHING
+    margin, reason = gap, "the gap closed, and no potential bears the bodies in contact"
+    if borne.free_symbols:
+        margin = where(borne > LEAST, 1, gap)
+    build.margins.append(Margin("g_n >= 0", margin, reason, remedy=REMEDY, domain=True))
+
+
+def _borne(build: Build, g: Any) -> Expression:
+    """Pressure that the potentials bear deep in contact [Pa]; none where it is the same as at touch."""
+    t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
+    deep = t_n.subs({g: OVERLAP, side: -1})
+    return symengine.Integer(0) if deep == t_n.subs({g: OPENING, side: 1}) else -deep

@@ -1,0 +1,268 @@
+"""What determines the tangential motion of a scene, in each direction, and what friction resists it with.
+
+A direction moves by a balance of its own: inertial, overdamped or quasi-static, and sticking exactly or elastically. In
+the plane a law that is the same in all directions resists along the unit vector of sliding, by its traction at the
+speed of sliding. What sticking bears is half an axis for each direction: of a line, or of an ellipse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import symengine
+
+from surfacechem.contracts.terms import Friction, Potential, TangentialPotential, Varying, reads
+from surfacechem.errors import InputError, Place
+from surfacechem.expressions import Expression, depends, derivative, sqrt, where
+from surfacechem.model.build import Build
+from surfacechem.model.components.mounting import (
+    ACROSS,
+    ALONG,
+    LENGTH,
+    Direction,
+    FarField,
+    Held,
+    driven,
+    held,
+    held_across,
+    law_reads,
+)
+from surfacechem.model.system import Caution, State
+from surfacechem.quantities import VARIABLES, Quantity
+
+NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
+
+CREEP = 1e-25
+"""Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
+
+UNSTABLE = (
+    "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "
+    "resists; a mass or a viscous resistance would give one"
+)
+
+PLACE = Place(path="mechanics.tangential")
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """What determines the tangential motion of a scene."""
+
+    d: Direction
+    mount: Held | None
+    """None where the displacement is prescribed."""
+    elastic: bool
+    """Whether sticking is elastic: the free energy depends on the elastic gap."""
+    sticks: bool
+    """Whether some friction has a limit below which nothing slides."""
+    rate_dependent: bool
+    """Whether what resists sliding depends on its velocity."""
+    slides: bool
+    """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
+
+    @property
+    def inertial(self) -> bool:
+        return self.mount is not None and self.mount.inertial
+
+    @property
+    def slides_inertially(self) -> bool:
+        """Whether the velocity of sliding itself has inertia."""
+        return self.inertial and not self.elastic
+
+    @property
+    def own_velocity(self) -> str:
+        """The velocity of the displacement, which is that of sliding unless the interface is elastic."""
+        return "v_t" if self.elastic else self.d.velocity
+
+
+def formulations(build: Build) -> tuple[Formulation, ...]:
+    """What determines the motion in each direction in which the scene moves by a balance."""
+    mount = held(build, "t")
+    elastic = bool(in_series(build)) and not driven(build, "g_t")
+    across = held_across(build, mount) if mount is not None else None
+    if across is not None:
+        _refuse_half(build, elastic)
+        return _formulation(build, ALONG, mount, elastic), _formulation(build, ACROSS, across, elastic)
+    if build.scene.transverse is not None:
+        message = "a mounting across stands beside one along: give `tangential`, too."
+        raise InputError(message, build.scene.transverse.place)
+    if mount is None and not (elastic and "u_t" in build.scene.loading):
+        return ()
+    return (_formulation(build, ALONG, mount, elastic),)
+
+
+def in_parallel(build: Build) -> tuple[Potential, ...]:
+    """The potentials whose tangential gap is the whole displacement, which friction acts along too.
+
+    What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
+    gap and a velocity that are prescribed each by itself are no one displacement.
+    """
+    mount, frictions = held(build, "t"), bool(build.interface.frictions)
+    if mount is not None:
+        beside = not driven(build, "g_t") and (frictions or held_across(build, mount) is not None)
+    else:
+        beside = frictions and not driven(build, "v") and (driven(build, "g_t") or driven(build, "u_t"))
+    return tuple(law for law in _sheared(build) if beside and arrangement(law) == "parallel")
+
+
+def arrangement(law: Potential) -> str:
+    """How a potential acts with friction."""
+    return law.shear if isinstance(law, TangentialPotential) else "series"
+
+
+def in_series(build: Build) -> tuple[Potential, ...]:
+    """The potentials of an elastic gap, which gives way where friction does."""
+    parallel = in_parallel(build)
+    return tuple(law for law in _sheared(build) if law not in parallel)
+
+
+def _sheared(build: Build) -> list[Potential]:
+    return [law for law in build.interface.potentials if law_reads(law, "g_t") and arrangement(law) != "none"]
+
+
+def displacement(build: Build) -> Expression:
+    """The tangential gap of what stands beside friction: the displacement, in two directions its length.
+
+    Laws read its square, so that it needs no guard where it is zero.
+    """
+    if len(build.motion.slips) == 2:
+        return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
+    name = "g_t" if driven(build, "g_t") else "u_t"
+    return build.variables.get(name, "the adhesion beside friction")
+
+
+def _refuse_half(build: Build, elastic: bool) -> None:
+    """Motion in two directions where something holds in one only."""
+    if elastic:
+        raise InputError(
+            "the interface moves in two directions, but the elastic gap g_t of its potential has one. Leave out what "
+            "moves it across (`transverse`, w_t2, F_t2, v_2 or a law with two directions), or the potential of g_t.",
+            PLACE,
+        )
+    for name in ("v", "v_2"):
+        if name in build.scene.loading:
+            raise InputError(
+                f"{name} is prescribed, but a mounting moves the interface along it. Prescribe `v` and `v_2` under "
+                "`loading`, or let the mounting give both.",
+                PLACE,
+            )
+
+
+def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) -> Formulation:
+    laws = build.interface.frictions
+    formulas = [law.transverse if d is ACROSS and law.transverse is not None else law.statement for law in laws]
+    rate_dependent = any({"v", "v_2"} & {*reads(formula)} for formula in formulas)
+    if not elastic and mount is not None:
+        rate_dependent = rate_dependent or mount.damped
+    sticks = any(law.has_limit for law in laws)
+    return Formulation(d, mount, elastic, sticks, rate_dependent, bool(laws) or not elastic)
+
+
+def evolve(build: Build, name: str, *, algebraic: bool = False, scale: float = LENGTH) -> Expression:
+    """A new state of the motion."""
+    symbol, dot = symengine.symbols(f"{name} d{name}_dt")
+    start = build.scene.initial.get(name, 0.0)
+    finest = CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
+    build.states.append(State(VARIABLES[name], symbol, dot, start, scale, algebraic, finest=finest))
+    return symbol
+
+
+def beside(far: FarField, t_a: Expression) -> FarField:
+    """The far field less the traction of what stands beside friction, as friction feels it."""
+    return replace(far, F=far.F - t_a)
+
+
+def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:
+    """The traction carried while sliding, else what holds the interface."""
+    traction = slides * carried + (1 - slides) * needed
+    build.areal(Quantity(d.total, "Pa", f"{d.text} on body 1", d.total), traction)
+
+
+def directions(build: Build) -> tuple[Direction, ...]:
+    """The directions in which the interface moves, or in which its velocity is prescribed."""
+    if build.motion.slips:
+        return tuple(slip.d for slip in build.motion.slips)
+    both = build.variables.has("v_2") or any(law.transverse is not None for law in build.interface.frictions)
+    return (ALONG, ACROSS) if both else (ALONG,)
+
+
+def resistance(
+    build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]
+) -> dict[Direction, Expression]:
+    """Tractions of a law [Pa] along the directions of sliding."""
+    if len(directions(build)) == 1:
+        formula = bound.driven if law is build.motion.creeping else bound.statement
+        return {ALONG: build.variables.call(bound, formula, own)}
+    _refuse_one_component(law)
+    if law.transverse is not None:
+        formulas = {ALONG: bound.traction, ACROSS: bound.transverse}
+        return {d: build.variables.call(bound, formula, own) for d, formula in formulas.items()}
+    if build.variables.has("speed"):
+        swift = {"v": build.variables.get("speed", law), "direction": ONE}
+        size = build.variables.call(bound, bound.statement, {**own, **swift})
+        return {d: size * build.variables.get(d.cosine, law) for d in (ALONG, ACROSS)}
+    return _in_proportion(build, law, bound, own)
+
+
+def _refuse_one_component(law: Friction) -> None:
+    """A law of one component of the velocity would know the axes."""
+    if law.internal:
+        raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
+    for name, _ in law.specs():
+        value = getattr(law, name)
+        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
+            raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
+
+
+def _in_proportion(
+    build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]
+) -> dict[Direction, Expression]:
+    """Tractions of a law that is linear in the velocity, which needs no direction at rest."""
+    speed = symengine.Symbol("speed")
+    size = build.variables.call(bound, bound.statement, {**own, "v": speed})
+    slope = derivative(size, speed)
+    if depends(slope, speed) or symengine.sympify(size).subs({speed: 0}) != 0:
+        raise InputError(
+            f"in two directions {law.name()} has no direction at rest: it does not grow in proportion to the velocity, "
+            "nor does anything stick. Prescribe `v` and `v_2`, mount the bodies in one direction, or add `coulomb`.",
+            law.place,
+        )
+    return {d: slope * build.variables.get(d.velocity, law) for d in (ALONG, ACROSS)}
+
+
+def resist(build: Build, d: Direction, traction: Expression) -> None:
+    """Add to what resists sliding along a direction, where the interface moves by a balance."""
+    if build.motion.slips:
+        tractions = build.motion.sliding_tractions
+        tractions[d.axis] = tractions.get(d.axis, 0) + traction
+
+
+def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]) -> None:
+    """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
+    sticking = [slip.d for slip in build.motion.slips if slip.sticks]
+    if sticking and bound.has_limit:
+        _caution(build, law, bound)
+    for d in sticking:
+        limits, at_rest, two = build.motion.stick_limits, {**own, **REST}, d is ACROSS and bound.transverse is not None
+        borne = build.variables.call(bound, bound.transverse if two else bound.statement, at_rest)
+        if bound.has_limit:
+            static = build.variables.call(bound, bound.transverse_limit if two else bound.limit, at_rest)
+            borne = static if static == borne else where(static > borne, static, borne)
+        limits[d.axis] = limits.get(d.axis, 0) + build.stretch * borne
+
+
+def _caution(build: Build, law: Friction, bound: Friction) -> None:
+    """Tell where a law bears less at rest than it resists sliding with, which happens to no contact."""
+    given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
+    kinetic = build.variables.call(bound, bound.statement, given)
+    if {"mu_s", "mu_k"} <= vars(bound).keys():  # that of fast sliding, to which that at rest falls
+        static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
+    else:
+        static = build.variables.call(bound, bound.limit, given)
+    if static != kinetic:
+        text = (
+            f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on is "
+            "what sticking bears"
+        )
+        build.notes.append(Caution(static - kinetic, text))

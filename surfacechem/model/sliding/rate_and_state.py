@@ -1,0 +1,104 @@
+r"""Sliding against rate-and-state friction: its traction is the variable, the velocity follows from it.
+
+At rest such friction creeps, by hundreds of decades slower than it slides, and a reversal passes through all of them
+twice. What is smooth there is the traction, here in units of the direct effect: the drive. So it is the state that
+stands for the velocity at all speeds, algebraic without a mass. With one it obeys Newton's law by the chain rule,
+:math:`m\,\dot v(\text{drive}, \theta)` being what is left of the tractions.
+
+Source: Dieterich (1979), doi 10.1029/JB084iB05p02161; Ruina (1983), doi 10.1029/JB088iB12p10359; with the direct effect
+as an asinh by Rice, Lapusta & Ranjith (2001), doi 10.1016/S0022-5096(01)00042-4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import symengine
+
+from surfacechem.contracts.terms import Friction, Varying, reads
+from surfacechem.expressions import Expression
+from surfacechem.model.build import Build
+from surfacechem.model.system import Given, State
+from surfacechem.quantities import VARIABLES
+from surfacechem.tolerances import PICOMETRE
+
+DRIVE = "drive"
+
+EFFECT = 1e6
+"""Scale of the drive of a mass: what its traction is resolved to is a part of the direct effect, not of itself."""
+
+STILL = PICOMETRE / 1e8
+"""Velocity [m/s] below which a mass only delays creep, a picometre in three years; creep then is as swift whatever its
+velocity, and the row stays regular.
+"""
+
+
+def law_of_traction(build: Build, *, inertial: bool) -> Friction | None:
+    """The law whose traction stands for the velocity, if there is one.
+
+    Without inertia the balance may need the velocity itself, where parameters vary with it.
+    """
+    laws = [law for law in build.interface.frictions if law.velocity is not None]
+    return next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
+
+
+def _varying(law: Friction) -> dict[str, Varying]:
+    values = {name: getattr(law, name) for name, _ in law.specs()}
+    return {name: value for name, value in values.items() if isinstance(value, Varying)}
+
+
+def _varies_with_velocity(law: Friction) -> bool:
+    factors = [factor for value in _varying(law).values() for factor in value.factors]
+    return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
+
+
+def evolve_drive(build: Build, law: Friction, *, inertial: bool) -> Expression:
+    """The state that stands for the velocity; what reads the velocity itself gets it from there.
+
+    A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
+    """
+    symbol, dot = symengine.symbols(f"{DRIVE} d{DRIVE}_dt")
+    bound = build.bound(law)
+    if inertial and (varying := _varying(law)):
+        symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
+        bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
+    if not (inertial and varying):
+        build.motion.creeping = law
+    # The law's own variables are read before its memory has made them states.
+    own = {name: symengine.Symbol(name) for name in law.internal}
+
+    def velocity() -> Expression:
+        return build.name(VARIABLES["v"], build.variables.call(law, bound.velocity, {**own, DRIVE: symbol}))
+
+    def at_start(values: Mapping[str, float]) -> float:
+        """The drive at the velocity given, where the search for a balance begins."""
+        drive = build.variables.call(law, bound.drive, {**own, "v": values["initial.v"]})
+        numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
+        numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
+        try:
+            return float(build.expanded(drive).subs({**numbers, build.t: 0.0}))
+        except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
+            return 0.0
+
+    role, by = ("evolved", "mechanics.tangential") if inertial else ("algebraic", "balance of the tangential tractions")
+    build.variables.define(DRIVE, partial(_same, symbol), role, by)
+    build.variables.define("v", velocity, "derived", f"{law.path}, from its traction")
+    given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), at_start)
+    scale = EFFECT if inertial else 1.0
+    build.states.append(State(VARIABLES[DRIVE], symbol, dot, 0.0, scale, algebraic=not inertial, given=given))
+    return symbol
+
+
+def _same(expression: Expression) -> Expression:
+    return expression
+
+
+def stands_for_velocity(build: Build) -> bool:
+    """Whether the drive is the state that stands for the velocity of sliding."""
+    return any(state.name == DRIVE for state in build.states)
+
+
+def inertia(build: Build, m: Expression) -> Expression:
+    """Mass times the rate of the velocity [Pa], which counts what is next to none as a little."""
+    return m * build.total_derivative(symengine.Symbol("v") + STILL * symengine.Symbol(DRIVE))
