@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import symengine
@@ -179,12 +178,13 @@ class FluidFit:
         self.T = build.variables.get("T_c", "the medium", "interface.medium")
         assert build.interface.medium is not None
         self.held = (*_held(build), *build.interface.medium.temperatures)
-        starts = [build.scene.initial.get(node.name) for node in build.thermal.nodes.values() if not node.prescribed]
-        self.states = tuple(node.name for node in build.thermal.nodes.values() if not node.prescribed)
+        self.states = tuple(node.name for node in build.thermal.free)
+        starts = [build.scene.initial.get(state) for state in self.states]
         known = [*self.held, *(T for T in starts if T is not None)] or [build.scene.T_0 or 300.0]
         self.coefficients = Coefficients(fluid)
         self.low, self.high, self.start = first_range(fluid, known)
-        self.ends = [self._number(f"T_m_{end}", end, KELVIN, getattr(self, end)) for end in ("low", "high")]
+        limits = {f"{FLUID_PATH}.low": self.low, f"{FLUID_PATH}.high": self.high}
+        self.ends = [self._number(f"T_m_{end}", end, limits, KELVIN) for end in ("low", "high")]
         for end, sign in zip(self.ends, (1, -1), strict=True):
             reason = f"{fluid.name} has no properties beyond its range"
             build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
@@ -196,65 +196,52 @@ class FluidFit:
 
     def property(self, name: str) -> Expression:
         """A property as a named quantity, constant beyond its range."""
-        values = self._values(name)
-        pieces = self._pieces(name, values)
-        inside = [self._polynomial(f"{name}_{i}", x, cs) for i, (x, cs) in enumerate(pieces)]
+        (low, *bounds), pieces, _ = self._fitted(name)
+        text, unit, inside = "piece of the fit of a property", VARIABLES[name].unit, []
+        for i, (scaled, coefficients) in enumerate(pieces):
+            of_x = Quantity(f"{name}_{i}_x", "1", "scaled temperature of the piece below")
+            x = self.build.name(of_x, scaled, output=False)
+            powers = sum(c * x**k for k, c in enumerate(coefficients))
+            inside.append(self.build.name(Quantity(f"{name}_{i}", unit, text), powers, output=False))
+        # At the ends of the range the scaled temperature is -1 and 1.
         first = sum(c * (-1) ** k for k, c in enumerate(pieces[0][1]))
         last = sum(pieces[-1][1])
-        low, *bounds = (self.ends[0], *self._ends(name, values))
         branches = [(first, low > self.T), *zip(inside, (bound > self.T for bound in bounds), strict=True)]
         return self.build.name(VARIABLES[name], symengine.Piecewise(*branches, (last, True)))
 
-    def _polynomial(self, name: str, x: Expression, coefficients: Sequence[Expression]) -> Expression:
-        """A piece of a property, and its scaled temperature, by names."""
-        x = self.build.name(Quantity(f"{name}_x", "1", "scaled temperature of the piece below"), x, output=False)
-        powers = sum(c * x**k for k, c in enumerate(coefficients))
-        unit = VARIABLES[name.rpartition("_")[0]].unit
-        return self.build.name(Quantity(name, unit, "piece of the fit of a property"), powers, output=False)
-
     def energy(self) -> Expression:
         """Thermal free energy per volume [J/m^3]."""
-        values = self._values(ENERGY)
-        pieces = self._pieces(ENERGY, values)
-        ends = self._ends(ENERGY, values)
-        lows = (self.ends[0], *ends)
+        ends, pieces, values = self._fitted(ENERGY)
         branches = []
         for i, (x, coefficients) in enumerate(pieces):
-            half = (ends[i] - lows[i]) / 2
+            half = (ends[i + 1] - ends[i]) / 2
             integral = sum(c * x ** (k + 2) / symengine.Integer((k + 1) * (k + 2)) for k, c in enumerate(coefficients))
-            constant, slope = (self._part(ENERGY, part, i, values) for part in ("constant", "slope"))
-            condition = ends[i] > self.T if i < PIECES - 1 else True
+            constant, slope = (
+                self._number(f"{ENERGY}_{part}_{i}", f"{ENERGY}.{part}[{i}]", values) for part in ("constant", "slope")
+            )
+            condition = ends[i + 1] > self.T if i < len(pieces) - 1 else True
             branches.append((constant + slope * self.T - half**2 * integral, condition))
         return symengine.Piecewise(*branches)
 
-    def _values(self, quantity: str) -> Mapping[str, float]:
+    def _fitted(
+        self, quantity: str
+    ) -> tuple[list[Expression], list[tuple[Expression, list[Expression]]], Mapping[str, float]]:
+        """Ends of the pieces, scaled temperature and coefficients of each, and the numbers that these stand for."""
         fluid, counts = self.coefficients.fluid, self.coefficients.counts
         counts[quantity] = max(PIECES, len(fluid.fit(quantity, self.low, self.high)) + SPARE)
-        return Coefficients(fluid, {quantity: counts[quantity]})(self.low, self.high, self.start)
+        values = Coefficients(fluid, {quantity: counts[quantity]})(self.low, self.high, self.start)
+        ends = [self.ends[0]]
+        ends += [self._number(f"{quantity}_ends_{i}", f"{quantity}.ends[{i}]", values) for i in range(counts[quantity])]
+        pieces = []
+        for i, (low, high) in enumerate(pairwise(ends)):
+            keys = [(f"{quantity}_{i}_{k}", f"{quantity}[{i}][{k}]") for k in range(DEGREE + 1)]
+            coefficients = [self._number(symbol, key, values) for symbol, key in keys]
+            pieces.append(((2 * self.T - low - high) / (high - low), coefficients))
+        return ends, pieces, values
 
-    def _pieces(self, quantity: str, values: Mapping[str, float]) -> list[tuple[Expression, list[Expression]]]:
-        """Scaled temperature and coefficients of each piece."""
-        ends = (self.ends[0], *self._ends(quantity, values))
-        xs = [(2 * self.T - low - high) / (high - low) for low, high in pairwise(ends)]
-        keys = [[f"[{i}][{k}]" for k in range(DEGREE + 1)] for i in range(len(xs))]
-        return [(x, [self._coefficient(quantity, key, values) for key in row]) for x, row in zip(xs, keys, strict=True)]
-
-    def _coefficient(self, quantity: str, key: str, values: Mapping[str, float]) -> Expression:
-        symbol = quantity + key.replace("][", "_").replace("[", "_").replace("]", "")
-        return self._number(symbol, f"{quantity}{key}", NUMBER, values[f"{FLUID_PATH}.{quantity}{key}"])
-
-    def _ends(self, quantity: str, values: Mapping[str, float]) -> list[Expression]:
-        return [self._part(quantity, "ends", i, values) for i in range(self.coefficients.counts[quantity])]
-
-    def _part(self, quantity: str, part: str, i: int, values: Mapping[str, float]) -> Expression:
-        key = f"{quantity}.{part}[{i}]"
-        return self._number(f"{quantity}_{part}_{i}", key, NUMBER, values[f"{FLUID_PATH}.{key}"])
-
-    def _number(self, symbol: str, key: str, spec: Spec, value: float) -> Any:
+    def _number(self, symbol: str, key: str, values: Mapping[str, float], spec: Spec = NUMBER) -> Expression:
         path = f"{FLUID_PATH}.{key}"
-        if any(parameter.path == path for parameter in self.build.parameters.items):
-            return symengine.Symbol(symbol)
-        return self.build.constant(symbol, path, spec, value, internal=True)
+        return self.build.constant(symbol, path, spec, values[path], internal=True)
 
 
 def _held(build: Build) -> list[float]:
