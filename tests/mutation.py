@@ -34,7 +34,7 @@ LONGEST = 600
 
 OF_BALANCES = [
     ["balances"],
-    ["zoo", "mechanics_exact", "heat_paths", "jumps", "threshold", "pairs", "friction_memory", "chemistry"],
+    ["zoo", "constraints", "heat_paths", "jumps", "threshold", "pairs", "friction_memory", "chemistry"],
     ["tables", "tables_bonds", "tables_mechanics"],
     ["start", "hybrid", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],

@@ -52,9 +52,3 @@ def test_energy_closes_and_no_law_destroys_entropy(name):
 def test_entropy_closes(name):
     """At the extremes a temperature may rise by ten decades within a step, which its reciprocal does not forgive."""
     assert audit(at_default_tolerance(name)).entropy_error < 1e-9
-
-
-@smooth_tables
-def test_tight_tolerance_gives_ten_digits(name):
-    table, model = made(name), at_default_tolerance(name).model
-    assert max(errors(table, solved(table, model, rtol=1e-12)).values()) < 1e-10
