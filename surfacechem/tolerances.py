@@ -51,6 +51,16 @@ NEGLIGIBLE = 1e-3
 TINY = float_info.min / EPS
 """Least size of a divisor, 1e-292: what is smaller by a factor EPS is still a normal number."""
 
+SHALLOW = 1e-10
+"""Part of a run, or of the largest value of a guard, that is too brief or too shallow to tell at loose tolerances: ten
+times the tolerance of a run that asks for none.
+"""
+
+LONGEST_STEP = 3e-5
+"""Relative tolerance above which the compiled stepper takes this: a step that a looser one allows can be longer than a
+layer that none of its three stages lies in.
+"""
+
 MOMENT = 1e-12
 """Part of the time that has passed that no run resolves: ROUNDING of what is summed along it, to the next power of ten.
 """

@@ -344,3 +344,14 @@ def test_rupture_of_a_cluster_under_a_growing_force(rtol):
     assert result.t == pytest.approx(2.318145972772154, rel=rtol)
     heat = result.y[1] + result.y[2] - 600.0 + RUPTURE[3] * (result.y[3] - 300.0)
     assert heat == pytest.approx(20.0 * (BROKEN - 0.9), rel=1e-12 + rtol)
+
+
+def test_an_event_at_a_singular_state_leaves_finite_numbers():
+    """A gap that closes at a steady rate under a traction that grows as its inverse root: the work is finite."""
+    program = compile_program(T, [X], [DX], [], [DX + 1], ledger=[X**-0.5], margins=[X], groups=(0,))
+    result = radau.solve(problem(program, [1.0], [0.0, 2.0], 1e-8, margins=STOP, times=[0.5, 1.0]))
+    assert result.status == Status.EVENT
+    assert result.t == pytest.approx(1.0, rel=1e-12)
+    assert np.isfinite(result.ledger).all()
+    assert np.isfinite(result.ledger_outputs).all()
+    assert result.ledger[0] == pytest.approx(2.0, rel=3e-5)  # the inverse root of what is too brief

@@ -94,9 +94,10 @@ def first_crossing(
         zeros = dips(points[-3:]) if len(points) > 2 else {}
         zeros |= {i: _zero(one(i), before, t) for i in np.flatnonzero(guards.crossed(now) & active).tolist()}
         if zeros:
-            # Another guard may have crossed and come back before that, with its lowest point in the same interval.
-            beyond = max(t + SQRT_EPS * (step.end - step.start), float(np.nextafter(t, np.inf)))
-            zeros = dips([*points[-2:], (beyond, at(beyond))]) | zeros
+            # Another guard may have crossed and come back in the same interval: it is still rising at its end.
+            near = t - SQRT_EPS * (step.end - step.start)
+            if before < near < t:
+                zeros = dips([points[-2], (near, at(near)), points[-1]]) | zeros
             first = min(zeros.values())
             return first, [i for i, zero in sorted(zeros.items()) if zero <= first + resolution]
         guards.follow(now)

@@ -26,12 +26,16 @@ from surfacechem.solve.radau.work import (
     finite,
     set_inputs,
 )
+from surfacechem.tolerances import DIGITS, NEGLIGIBLE, SQRT_EPS, TINY
 
 CONSISTENT, NO_STATE, SINGULAR_STATE, NOT_FINITE_STATE = range(4)
 LIMIT = 100
+CONVERGING = NEGLIGIBLE * SQRT_EPS
+"""Correction after which the next one, in proportion to its square, is below EPS even with a factor of a million."""
 ROUNDED = 8
 """Corrections after which one that rounding explains is believed to be nothing else."""
-SMALLEST_PIVOT = 1e-15
+SMALLEST_PIVOT = DIGITS
+"""Scaled pivot that is what rounding leaves of zero."""
 
 
 @compiled
@@ -88,7 +92,7 @@ def _correction(w: Any, delta: Any) -> float:
     solve_real(w, delta)
     for j in range(delta.shape[0]):
         if w.algebraic[j]:
-            norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290))
+            norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + TINY))
     return norm
 
 
@@ -118,7 +122,7 @@ def _damped(w: Any, delta: Any) -> bool:
     """
     following, unit = w.g[1], w.vector[ERROR]
     for j in range(delta.shape[0]):
-        unit[j] = abs(w.vector[TRIAL, j]) + abs(delta[j]) + 1e-290
+        unit[j] = abs(w.vector[TRIAL, j]) + abs(delta[j]) + TINY
     before = _size(w, delta, unit)
     fraction = 1.0
     _shift(w, delta, 1.0)
@@ -160,13 +164,13 @@ def find_consistent(w: Any) -> int:
         if not finite(delta):
             return SINGULAR_STATE
         # The system is linear in the derivatives: without algebraic variables one correction is exact.
-        if not nonlinear or norm <= 1e-15 or norm_last <= 1e-11:
+        if not nonlinear or norm <= DIGITS or norm_last <= CONVERGING:
             _shift(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
         if iteration >= ROUNDED and _rounds(w, delta):
             return CONSISTENT
         if not _damped(w, delta):
             # At rounding level the corrections cannot fall any more.
-            return CONSISTENT if norm <= 1e-9 else NO_STATE
+            return CONSISTENT if norm <= SQRT_EPS else NO_STATE
         norm_last = norm
     return NO_STATE

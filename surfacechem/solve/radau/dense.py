@@ -12,6 +12,7 @@ from surfacechem.solve.radau.tables import (
     DEFECT,
     GAMMA,
     NEWTON_NODES,
+    NODES,
     PROBE_SHAPE,
     SCAN_RATES,
     SCAN_VALUES,
@@ -146,3 +147,14 @@ def integrate_ledger(w: Any, h: float) -> None:
                 total += COLLOCATION[k, i, j] * w.rates[j, m]
             w.q_stage[i, m] = h * total
         w.ledger[Q_CORRECTION, m] = h * defect
+
+
+@compiled
+def hold_rates(w: Any, h: float) -> None:
+    """Quadratures over the step with the rates at its start, where those at its end are singular."""
+    k = w.count[MEMBER]
+    for m in range(w.ledger.shape[1]):
+        for i in range(stage_count(k)):
+            w.rates[i, m] = w.rates[7, m]
+            w.q_stage[i, m] = NODES[k, i] * h * w.rates[7, m]
+        w.ledger[Q_CORRECTION, m] = 0.0

@@ -5,22 +5,26 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.contract import Status
-from surfacechem.solve.radau.advance import (
+from surfacechem.solve.radau.consistency import find_consistent
+from surfacechem.solve.radau.dense import hold_rates
+from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
+from surfacechem.solve.radau.newton import stage_count
+from surfacechem.solve.radau.outputs import write_outputs
+from surfacechem.solve.radau.quadrature import ledger_factor, ledger_norm
+from surfacechem.solve.radau.step import (
     BRIEF,
     GOOD,
     accept,
     advance,
     finish_step,
+    first_size,
+    growing_size,
     keep_matrices,
+    loosening,
     restart,
     store_polynomial,
     unseen,
 )
-from surfacechem.solve.radau.consistency import find_consistent
-from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
-from surfacechem.solve.radau.outputs import write_outputs
-from surfacechem.solve.radau.quadrature import ledger_factor, ledger_norm
-from surfacechem.solve.radau.step import first_size, growing_size, loosening
 from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS, STOP, Batch
 from surfacechem.solve.radau.work import (
     ATOL,
@@ -29,6 +33,7 @@ from surfacechem.solve.radau.work import (
     LOOSE,
     M_LARGEST,
     M_NOW,
+    MEMBER,
     Q_LARGEST,
     REFUSED,
     REJECTED,
@@ -44,10 +49,11 @@ from surfacechem.solve.radau.work import (
     clear,
     compiled,
     copy,
+    finite,
     lay_out,
     reference,
 )
-from surfacechem.tolerances import ROUNDING
+from surfacechem.tolerances import ROUNDING, SHALLOW, SQRT_EPS
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
@@ -61,10 +67,6 @@ FEWEST = 4
 """Points of a segment at which its steps are held against the equations, however short it is: a choice. Each costs an
 evaluation in every segment; what lasts less than a fourth of a segment may be missed.
 """
-SHORTEST = 1e-10
-"""Part of the time so far below which the ledger shortens no step: what ends the run there is told by the states."""
-NEARLY = 1e-9
-"""Part of what is left that is not worth a step of its own."""
 LEAST_NORM = 1e-2
 """Error norm of the last step below which the controller learns nothing more from it (Hairer & Wanner II, IV.8)."""
 
@@ -124,7 +126,7 @@ def _record(w: Any, steps: Any, counts: Any) -> None:
 @compiled
 def _next_try(h: float, remaining: float) -> float:
     """Fit the step to the end of the segment without a tiny last one."""
-    if h >= remaining * (1.0 - NEARLY):
+    if h >= remaining * (1.0 - SQRT_EPS):
         return remaining
     return 0.5 * remaining if 2.0 * h > remaining else h
 
@@ -149,10 +151,24 @@ def _start(w: Any, batch: Any, i: int) -> int:
 
 
 @compiled
+def _ledger_error(w: Any, h: float, remaining: float) -> float:
+    """Error of the ledger over the step in units of what is allowed; infinite where one of its rates is."""
+    if w.ledger.shape[1] == 0:
+        return 0.0
+    singular = not finite(w.q_stage[stage_count(w.count[MEMBER]) - 1])
+    return np.inf if singular else ledger_norm(w, h, remaining)
+
+
+@compiled
+def _is_brief(w: Any, h: float) -> bool:
+    """Whether a step is too brief for the ledger to shorten it: what ends the run there is told by the states."""
+    return bool(h < SHALLOW * (w.clock[BASE] + w.clock[TAU]))
+
+
+@compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     """Longest next step that serves the ledger; shorter than this one where this one does not."""
-    brief = h < SHORTEST * (w.clock[BASE] + w.clock[TAU])
-    norm = 0.0 if brief or w.ledger.shape[1] == 0 else ledger_norm(w, h, remaining)
+    norm = 0.0 if _is_brief(w, h) else _ledger_error(w, h, remaining)
     if norm == 0.0:
         return np.inf
     limit = h * ledger_factor(w, norm)
@@ -181,6 +197,15 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
         return ENDED, h
     if size == 0.0:
         return AGAIN, 0.25 * h
+    if size != h:
+        # The step onto an event may end where a rate is singular, which the longer one did not. The ledger comes near
+        # to it in ever shorter steps, and counts over the last one with the rates at its start.
+        limit = _ledger_limit(w, size, left)
+        if limit < size:
+            restore_sides(w)
+            return AGAIN, limit
+        if _is_brief(w, size) and _ledger_error(w, size, left) > 1.0:
+            hold_rates(w, size)
     if size > BRIEF * spacing:
         seen = unseen(w, size, spacing, left, w.clock[TAU] == 0.0, size == left or any_true(w.fired))
         if seen < 1.0:

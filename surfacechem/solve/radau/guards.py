@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.advance import finish_step, store_polynomial, too_small
 from surfacechem.solve.radau.dense import interpolate_rate, keep_polynomial, put_scanned, scan_step
 from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
-from surfacechem.solve.radau.step import estimate_error
+from surfacechem.solve.radau.step import estimate_error, finish_step, store_polynomial, too_small
 from surfacechem.solve.radau.tables import EDGE, SCANNED
 from surfacechem.solve.radau.work import (
     BASE,
@@ -44,24 +43,23 @@ from surfacechem.solve.radau.work import (
     evaluate,
     set_inputs,
 )
+from surfacechem.tolerances import CBRT_EPS, EPS, NOISE, ROUNDING, SHALLOW, SOLVED, SQRT_EPS, TINY
 
 LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
 """Sides of zero besides 1 and -1: of a margin that has just fired, of a limit that starts at zero, and beyond it; of
 one that leaves zero in this step; and of one that is not in play in the modes of the run, on which side it stays.
 """
 
-SHALLOW = 1e-10
-"""Relative depth below zero that a margin must reach to pass where it turns round there. Less than the tolerance may be
-the error of the states; at loose tolerances this much counts all the same, since what is brief is shallow, too.
-"""
+ALIKE = 1e3
+"""Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
 
-NOISE = 4e-15
-"""Relative to the largest value seen, a margin this small is zero."""
+AT_START, SHORTER = -1.0, -2.0
+"""Instead of where margins reach zero: a limit is passed at the start; a shorter step has to tell whether one is."""
 
 
 @compiled
 def noise(w: Any, m: int) -> float:
-    """Size of a margin that is zero for all that can be told."""
+    """Size of a margin that is zero for all that can be told: its rounding, in proportion to the largest seen."""
     return float(NOISE * w.margin[M_LARGEST, m])
 
 
@@ -110,8 +108,22 @@ def restore_sides(w: Any) -> None:
 
 
 @compiled
+def update_sides(w: Any) -> None:
+    """Move on to the margins of now: their sides, the largest seen, and what was before."""
+    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+    copy(w.margin[M_SIDE], w.margin[M_LAST_SIDE])
+    for m in range(w.margin.shape[1]):
+        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
+        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
+        least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
+        if abs(side) < AT_ZERO and abs(value) > least:
+            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
+        w.margin[M_BEFORE, m] = value
+
+
+@compiled
 def crosses(w: Any, m: int) -> bool:
-    """Whether a margin lies across zero from its side, in a direction that counts; one to pass, by more than noise."""
+    """Whether a margin lies across zero from its side, in a direction that counts; a strict one by more than noise."""
     side, value, direction = w.margin[M_SIDE, m], w.margin[M_NOW, m], w.kinds[m, 1]
     if w.kinds[m, 3] == 1:
         return bool(side == 1.0 and value < -noise(w, m))
@@ -134,33 +146,6 @@ def mark_at_end(w: Any) -> None:
 
 
 @compiled
-def passed_by(w: Any, m: int) -> float:
-    """How far below zero the lowest point between two crossings has to lie to count."""
-    return float(max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m)) if w.kinds[m, 3] == 1 else 0.0)
-
-
-@compiled
-def begin_ranges(w: Any) -> bool:
-    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
-    found = False
-    for m in range(w.margin.shape[1]):
-        if w.margin[M_SIDE, m] == RISING:
-            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
-        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
-        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
-    return found
-
-
-@compiled
-def see_range(w: Any) -> None:
-    """Count the margins of now in how far each falls and rises."""
-    for m in range(w.margin.shape[1]):
-        change = w.margin[M_NOW, m] - (w.margin[M_BEFORE, m] if w.margin[M_SIDE, m] == BEYOND else 0.0)
-        w.margin[M_LOW, m] = max(w.margin[M_LOW, m], -change)
-        w.margin[M_HIGH, m] = max(w.margin[M_HIGH, m], change)
-
-
-@compiled
 def _leave(w: Any, m: int, rises: bool, held: float) -> None:
     """A limit that starts at zero or beyond goes this way; one that rises from zero has this side."""
     beyond = w.margin[M_SIDE, m] == BEYOND
@@ -168,10 +153,13 @@ def _leave(w: Any, m: int, rises: bool, held: float) -> None:
 
 
 @compiled
-def follow_rates(w: Any) -> None:
-    """Sides of limits that start at zero or beyond and leave at the rate at which they start: the change by that alone,
-    in the probe, is what the polynomial says.
-    """
+def _follow_rates(w: Any, h: float) -> None:
+    """Sides of limits that start at zero or beyond and leave it as they would at the rate at which the step starts."""
+    for j in range(w.algebraic.shape[0]):
+        w.vector[TRIAL, j] = w.vector[Y, j] + EDGE * h * w.vector[YDOT, j]
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + EDGE * h)
+    set_inputs(w, w.vector[TRIAL], w.vector[YDOT])
+    evaluate(w, MARGINS, w.margin[M_PROBE].ctypes.data)
     for m in range(w.margin.shape[1]):
         by_rate, change = w.margin[M_PROBE, m] - w.margin[M_BEFORE, m], w.margin[M_NOW, m] - w.margin[M_BEFORE, m]
         if abs(w.margin[M_SIDE, m]) == AT_ZERO and abs(by_rate) > noise(w, m) and 0.5 < change / by_rate < 2.0:
@@ -179,15 +167,32 @@ def follow_rates(w: Any) -> None:
 
 
 @compiled
-def follow_ranges(w: Any, shortest: bool) -> bool:
-    """Sides of limits that start at zero or beyond without a rate, each from how far it falls and rises in this step;
-    whether all are known.
+def _sides_are_known(w: Any, h: float) -> bool:
+    """Whether the step tells to which sides limits go that start at zero.
 
     What a load sets in motion from rest begins as a power of time, far below what the tolerance lets the polynomial be
     wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
     goes farther.
     """
-    known = True
+    found = False
+    for m in range(w.margin.shape[1]):
+        if w.margin[M_SIDE, m] == RISING:
+            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
+        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
+        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
+    if not found:
+        return True
+    # How far each falls and rises in the step, into the rows that will hold brackets.
+    for i in range(4 * w.count[MEMBER] + 9):
+        put_scanned(w, h, i)
+        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+        if i == 0:
+            _follow_rates(w, h)
+        for m in range(w.margin.shape[1]):
+            change = w.margin[M_NOW, m] - (w.margin[M_BEFORE, m] if w.margin[M_SIDE, m] == BEYOND else 0.0)
+            w.margin[M_LOW, m] = max(w.margin[M_LOW, m], -change)
+            w.margin[M_HIGH, m] = max(w.margin[M_HIGH, m], change)
+    known, shortest = True, too_small(w, 0.25 * h)
     for m in range(w.margin.shape[1]):
         fall, rise = w.margin[M_LOW, m], w.margin[M_HIGH, m]
         small = max(noise(w, m), w.clock[RTOL] * max(fall, rise))
@@ -195,43 +200,6 @@ def follow_ranges(w: Any, shortest: bool) -> bool:
             known = known and (shortest or min(fall, rise) <= small)
             _leave(w, m, rise > fall, RISING)
     return known
-
-
-@compiled
-def falls_from_start(w: Any, m: int) -> bool:
-    """Whether a limit that goes the wrong way from zero, or from beyond it, has left it by now."""
-    return bool(w.margin[M_SIDE, m] == FALLING and w.margin[M_NOW, m] < -noise(w, m))
-
-
-@compiled
-def update_sides(w: Any) -> None:
-    """Move on to the margins of now: their sides, the largest seen, and what was before."""
-    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
-    copy(w.margin[M_SIDE], w.margin[M_LAST_SIDE])
-    for m in range(w.margin.shape[1]):
-        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
-        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
-        least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
-        if abs(side) < AT_ZERO and abs(value) > least:
-            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
-        w.margin[M_BEFORE, m] = value
-
-
-@compiled
-def kink_at(w: Any, first: int) -> int:
-    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
-    found = -1
-    for m in range(w.kinds.shape[0]):
-        if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
-            found = m
-    return found
-
-
-ALIKE = 1e3
-"""Values of a margin that differ by less, in units of its noise, do not tell which is closer to zero."""
-
-AT_START, SHORTER = -1.0, -2.0
-"""Instead of where margins reach zero: a limit is passed at the start; a shorter step has to tell whether one is."""
 
 
 @compiled
@@ -257,26 +225,28 @@ def _may_reach(a: float, b: float, c: float, at_a: float, at_b: float, at_c: flo
 
 
 @compiled
-def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> float:
-    """Lowest point of the parabola, or a point in the larger part where that is no progress."""
-    left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
-    x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
-    if a < x < c and abs(x - b) > 1e-2 * (c - a):
-        return x
-    return b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
+    """Where a margin is across zero, or touches it, around a lowest point near b; -1 where it is not.
 
-
-@compiled
-def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bool, least: float) -> float:
-    """Where a margin is across zero by so much, or touches it, around a lowest point near b; -1 where it is not."""
+    By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
+    tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
+    """
     side = w.margin[M_SIDE, m]
+    touches = is_limit(w, m) and w.kinds[m, 3] == 0
+    # A strict one has to pass zero by more than the error of the states, which may be less than the tolerance: at loose
+    # tolerances a fixed part counts all the same, since what is brief is shallow, too.
+    shallow = max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m))
+    least = shallow if w.kinds[m, 3] == 1 else 0.0
     at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
     for _iteration in range(80):
         if at_b <= -least:
             return b
-        if c - a <= 1e-8 * c or not _may_reach(a, b, c, at_a, at_b, at_c):
+        if c - a <= SQRT_EPS * c or not _may_reach(a, b, c, at_a, at_b, at_c):
             break
-        x = _vertex(a, b, c, at_a, at_b, at_c)
+        left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+        x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        if not (a < x < c and abs(x - b) > 1e-2 * (c - a)):
+            x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
         at_x = side * _probe(w, h, m, x)
         if at_x < at_b and x > b:
             a, at_a, b, at_b = b, at_b, x, at_x
@@ -293,13 +263,13 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float, touches: bo
 def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
     """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
     side = w.margin[M_SIDE, m]
-    if not ((side == 1.0 and w.kinds[m, 1] <= 0) or (side == -1.0 and w.kinds[m, 1] >= 0)):
+    if abs(side) != 1.0 or side * w.kinds[m, 1] > 0.0:
         return False
     values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
     if not _may_reach(a, b, c, values[0], values[1], values[2]):
         return False
     keep_polynomial(w)
-    x = _reaches(w, h, m, a, b, c, is_limit(w, m) and w.kinds[m, 3] == 0, passed_by(w, m))
+    x = _reaches(w, h, m, a, b, c)
     w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
     return x > 0.0
 
@@ -312,7 +282,8 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
     found = 0.0
     for m in range(w.kinds.shape[0]):
         w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
-        falls = falls_from_start(w, m)
+        # A limit that goes the wrong way from zero, or from beyond it, has left it by now.
+        falls = w.margin[M_SIDE, m] == FALLING and w.margin[M_NOW, m] < -noise(w, m)
         if falls and before <= EDGE:
             found = AT_START
         elif falls:
@@ -325,49 +296,13 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
 
 
 @compiled
-def _mark_dips(w: Any, h: float, before: float, x: float) -> None:
-    """Mark the margins whose lowest point lies in an interval at whose end others are across zero."""
-    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
-    copy(w.margin[M_NOW], w.margin[M_BEFORE])
-    _margin_inside(w, h, x + EDGE, M_NOW)
-    for m in range(w.kinds.shape[0]):
-        if w.fired[m] == 0:
-            w.fired[m] = _dips(w, h, m, before, x, x + EDGE)
-
-
-@compiled
-def _margins_by_rate(w: Any, h: float, x: float) -> None:
-    """Margins at the fraction x of the step if the state changed at the rate at which it starts."""
-    for j in range(w.algebraic.shape[0]):
-        w.vector[TRIAL, j] = w.vector[Y, j] + x * h * w.vector[YDOT, j]
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
-    set_inputs(w, w.vector[TRIAL], w.vector[YDOT])
-    evaluate(w, MARGINS, w.margin[M_PROBE].ctypes.data)
-
-
-@compiled
-def _sides_are_known(w: Any, h: float) -> bool:
-    """Whether the step tells to which sides limits go that start at zero."""
-    if not begin_ranges(w):
-        return True
-    for i in range(4 * w.count[MEMBER] + 9):
-        put_scanned(w, h, i)
-        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-        if i == 0:
-            _margins_by_rate(w, h, EDGE)
-            follow_rates(w)
-        see_range(w)
-    return bool(follow_ranges(w, too_small(w, 0.25 * h)))
-
-
-@compiled
-def _scan(w: Any, h: float) -> float:
-    """End of the first interval in which margins reach zero; 0 if there is none, AT_START where a limit is passed
-    there, SHORTER where one may be.
+def _scan(w: Any, h: float) -> tuple[float, float]:
+    """The first interval in which margins reach zero: its start, and its end; in place of that 0 if there is none,
+    AT_START where a limit is passed there, SHORTER where one may be.
     """
     scan_step(w)
     if not _sides_are_known(w, h):
-        return SHORTER
+        return 0.0, SHORTER
     earlier, before = 0.0, 0.0
     for i in range(4 * w.count[MEMBER] + 9):
         x = SCANNED[w.count[MEMBER], i]
@@ -375,18 +310,27 @@ def _scan(w: Any, h: float) -> float:
         evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
         found = _mark(w, h, earlier, before, x)
         if found > 0.0:
+            # Others may have their lowest point in this interval, which shows from a point just behind it.
             keep_polynomial(w)
-            _mark_dips(w, h, before, x)
+            copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
+            copy(w.margin[M_NOW], w.margin[M_BEFORE])
+            _margin_inside(w, h, x + EDGE, M_NOW)
+            for m in range(w.kinds.shape[0]):
+                if w.fired[m] == 0:
+                    w.fired[m] = _dips(w, h, m, before, x, x + EDGE)
         if found != 0.0:
-            return found
+            return before, found
         update_sides(w)
         earlier, before = before, x
-    return 0.0
+    return 1.0, 0.0
 
 
 @compiled
 def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
-    """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method)."""
+    """Zero of one margin on the polynomial: the crossed end of a small bracket (Illinois method).
+
+    Source: Dowell & Jarratt (1971), A modified regula falsi method, BIT 11.
+    """
     side = w.margin[M_SIDE, m]
     value_high, value_low = _probe(w, h, m, high), _probe(w, h, m, low)
     if value_high * side > 0.0:
@@ -394,7 +338,7 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
         return high
     kept = 0
     for iteration in range(100):
-        if high - low <= 1e-13 * high or value_high == 0.0:
+        if high - low <= SOLVED * high or value_high == 0.0:
             break
         x = low + (high - low) * (value_low / (value_low - value_high))
         if not low < x < high or iteration % 8 == 7:
@@ -412,15 +356,27 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
 
 
 @compiled
-def _slope(w: Any, h: float, m: int, x: float) -> float:
-    """Change of a margin per step, from the polynomial around x."""
-    width = 1e-4 * x
-    return float((_probe(w, h, m, x + width) - _probe(w, h, m, x - width)) / (2.0 * width))
+def _first(w: Any, h: float) -> tuple[int, float]:
+    """The marked margin that reaches zero first, and where; the slopes of all that cross, per step."""
+    first, earliest = -1, 2.0
+    for m in range(w.kinds.shape[0]):
+        w.margin[M_SLOPE, m] = 0.0
+        if w.fired[m] != 0:
+            x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
+            if _probe(w, h, m, x) * w.margin[M_SIDE, m] <= 0.0:
+                width = CBRT_EPS * max(x, ROUNDING)
+                rise = _probe(w, h, m, x + width) - _probe(w, h, m, x - width)
+                w.margin[M_SLOPE, m] = rise / (2.0 * width)
+            if x < earliest:
+                first, earliest = m, x
+    return first, earliest
 
 
 @compiled
 def _step_onto(w: Any, size: float) -> float:
-    """Repeat the step with another size, with the full order of the method; returns the norm of its error."""
+    """Repeat the step with another size, with the full order of the method, and the margins at its end; returns the
+    norm of its error.
+    """
     w.clock[H_FACTORED] = 0.0
     if not factor_newton(w, size):
         return np.inf
@@ -430,31 +386,26 @@ def _step_onto(w: Any, size: float) -> float:
     store_polynomial(w, size, 0.0)
     norm = estimate_error(w, size)
     finish_step(w, size)
+    set_stage(w, stage_count(w.count[MEMBER]) - 1, size)
+    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
     return norm
 
 
 @compiled
-def _margins_at_end(w: Any, size: float) -> None:
-    set_stage(w, stage_count(w.count[MEMBER]) - 1, size)
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-
-
-@compiled
-def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> float:
+def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
     step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
     that all but touches it none to be trusted.
     """
-    side = w.margin[M_SIDE, m]
+    side, slope = w.margin[M_SIDE, m], w.margin[M_SLOPE, m]
     size = best = x * h
     closest = np.inf
     store_polynomial(w, h, 0.0)
-    resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    resolution = 0.5 * EPS * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     nudge = 0.0
     for attempt in range(12):
         if not _step_onto(w, size) < worst:
             return 0.0
-        _margins_at_end(w, size)
         value = w.margin[M_NOW, m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
@@ -472,7 +423,7 @@ def _refine(w: Any, h: float, m: int, x: float, slope: float, worst: float) -> f
         nudge = max(2.0 * nudge, resolution) if not crossed and abs(change) <= resolution else 0.0
         change = nudge if nudge > 0.0 else change
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
-    return size
+    return size if _step_onto(w, size) < worst else 0.0
 
 
 @compiled
@@ -482,12 +433,11 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
     """
     side = w.margin[M_SIDE, m]
     slope = max(abs(w.margin[M_SLOPE, m]) / h, abs(w.margin[M_BEFORE, m]) / size)
-    resolution = 2e-16 * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    resolution = 0.5 * EPS * (abs(w.clock[BASE] + w.clock[TAU]) + size)
     for attempt in range(40):
         shorter = size - resolution * 2.0**attempt
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
             break
-        _margins_at_end(w, shorter)
         nearest = 2.0 * slope * (size - shorter)
         if 0.0 < w.margin[M_NOW, m] * side <= max(nearest, noise(w, m)):
             return shorter
@@ -498,41 +448,17 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
 @compiled
 def _resolved(w: Any, size: float) -> float:
     """Difference of two times that are one for all that can be told."""
-    return float(1e-12 * (abs(w.clock[BASE] + w.clock[TAU]) * 1e-2 + size))
+    return float(SOLVED * abs(w.clock[BASE] + w.clock[TAU]) + ROUNDING * size)
 
 
 @compiled
 def _mark_coincident(w: Any, h: float, size: float) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
-    _margins_at_end(w, size)
     near = _resolved(w, size)
     for m in range(w.kinds.shape[0]):
         value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
-        across = crosses(w, m)
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
-        w.fired[m] = across or (w.fired[m] != 0 and close)
-
-
-@compiled
-def _has_reached(w: Any, h: float, size: float, m: int) -> bool:
-    """Whether the margin that a step went for is zero at its end; else the polynomial has seen what is not there."""
-    left = w.margin[M_NOW, m] * w.margin[M_SIDE, m]
-    return bool(left <= ALIKE * noise(w, m) + abs(w.margin[M_SLOPE, m]) * _resolved(w, size) / h)
-
-
-@compiled
-def _first(w: Any, h: float) -> tuple[int, float]:
-    """The marked margin that reaches zero first, and where; the slopes of all."""
-    first, earliest = -1, 2.0
-    for m in range(w.kinds.shape[0]):
-        w.margin[M_SLOPE, m] = 0.0
-        if w.fired[m] != 0:
-            x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
-            touches = _probe(w, h, m, x) * w.margin[M_SIDE, m] > 0.0
-            w.margin[M_SLOPE, m] = 0.0 if touches else _slope(w, h, m, max(x, 1e-12))
-            if x < earliest:
-                first, earliest = m, x
-    return first, earliest
+        w.fired[m] = crosses(w, m) or (w.fired[m] != 0 and close)
 
 
 @compiled
@@ -540,31 +466,34 @@ def find_event(w: Any, h: float) -> float:
     """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
     """
-    end = _scan(w, h)
+    before, end = _scan(w, h)
     if end == SHORTER:
         restore_sides(w)
         return 0.0
     if end <= 0.0:
         return h if end == 0.0 else AT_START
     first, earliest = _first(w, h)
-    before = 0.0
-    for x in SCANNED[w.count[MEMBER]]:
-        before = x if x < end else before
     if earliest < before:
         # A lowest point shows one point later: the sides that hold there are those of the point before it.
         copy(w.margin[M_LAST_SIDE], w.margin[M_SIDE])
-    worst = 1.0 if w.kinds[first, 2] == 1 else np.inf
-    size = _refine(w, h, first, max(earliest, 1e-300), w.margin[M_SLOPE, first], worst)
+    size = _refine(w, h, first, max(earliest, TINY), 1.0 if w.kinds[first, 2] == 1 else np.inf)
     if size == 0.0:
         restore_sides(w)
         return 0.0
     _mark_coincident(w, h, size)
-    kink = kink_at(w, first)
-    if kink >= 0:
-        size = _short_of(w, h, kink, size)
+    # The kink at which the step ends: the margin that it went for, or another that fires there.
+    short = -1
+    for m in range(w.kinds.shape[0]):
+        if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (short < 0 and w.fired[m] != 0)):
+            short = m
+    if short >= 0:
+        size = _short_of(w, h, short, size)
         _mark_coincident(w, h, size)
-        w.fired[kink] = 1
-    w.fired[first] = w.kinds[first, 3] == 0 or _has_reached(w, h, size, first)
+        w.fired[short] = 1
+    # Where a strict margin is not zero at the end, the polynomial has seen what is not there.
+    left = w.margin[M_NOW, first] * w.margin[M_SIDE, first]
+    reached = left <= ALIKE * noise(w, first) + abs(w.margin[M_SLOPE, first]) * _resolved(w, size) / h
+    w.fired[first] = w.kinds[first, 3] == 0 or reached
     if w.fired[first] == 0 and not any_true(w.fired):
         update_sides(w)
     return size

@@ -12,6 +12,7 @@ import numpy as np
 from surfacechem.solve.radau.linear import factor, fold_shifted, solve_complex, solve_real
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
+    COARSE,
     FROM_PARTS,
     GAMMA,
     INVERSE,
@@ -39,7 +40,7 @@ from surfacechem.solve.radau.work import (
     RESIDUAL,
     RESIDUALS,
     RHS,
-    ROUNDING,
+    ROUNDOFF,
     RTOL,
     SCALE,
     TAU,
@@ -56,17 +57,15 @@ from surfacechem.solve.radau.work import (
     finite,
     set_inputs,
 )
+from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
 CONVERGED, DIVERGED, NOT_FINITE = range(3)
 
-TIGHT = 0.001
+TIGHT = NEGLIGIBLE
 """Newton error allowed, in units of the tolerance. The order of the method makes steps better than the tolerance, so
 that a looser limit would set the error; and a Jacobian taken where the equations are far stiffer than at the solution
 makes the corrections small before the residual is.
 """
-
-COARSE = 3e-6
-"""Tolerance above which one correction is not believed: a layer thinner than that may hide behind its Jacobian."""
 
 FORESEEN = 1.5
 """The longest step, in units of the one before, whose middle is foreseen well enough to differentiate there."""
@@ -137,15 +136,6 @@ def _row_sizes(w: Any, sizes: Any) -> None:
 
 
 @compiled
-def _stiffer(w: Any, known: Any, sizes: Any) -> bool:
-    """Whether the derivatives are far larger than known, or not finite."""
-    found = False
-    for i in range(w.jacobian.shape[1]):
-        found = found or not sizes[i] <= STIFFER * known[i]
-    return found
-
-
-@compiled
 def _differentiate_midway(w: Any, h: float) -> None:
     """Evaluate G_y and G_ydot at the middle of the step as it is foreseen; at its start where the equations would be
     far stiffer: a step through states that are foreseen wrongly must not pass for one that has converged.
@@ -155,7 +145,11 @@ def _differentiate_midway(w: Any, h: float) -> None:
     set_stage(w, w.count[MEMBER] + 1, h)
     _differentiate(w)
     _row_sizes(w, sizes)
-    if _stiffer(w, known, sizes):
+    stiffer = False
+    for i in range(w.jacobian.shape[1]):
+        # Not >: what is not finite is stiffer, too.
+        stiffer = stiffer or not sizes[i] <= STIFFER * known[i]
+    if stiffer:
         _differentiate_at_start(w)
 
 
@@ -301,8 +295,8 @@ def solve_stages(w: Any, h: float) -> int:
     clock.
     """
     limit = 7 + 2 * w.count[MEMBER]
-    contraction = max(w.clock[CONTRACTION], 1e-16) ** 0.8
-    rounding = w.clock[ROUNDING]
+    contraction = max(w.clock[CONTRACTION], EPS) ** 0.8
+    rounding = w.clock[ROUNDOFF]
     norm_last, rate_last = 0.0, 0.0
     w.clock[THETA] = 0.0
     for iteration in range(limit):
@@ -326,6 +320,6 @@ def solve_stages(w: Any, h: float) -> int:
         if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * rounding:
             w.clock[CONTRACTION] = contraction
             return CONVERGED
-        norm_last = max(norm, 1e-300)
+        norm_last = max(norm, TINY)
     w.clock[GUESSED] = 0.0
     return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED

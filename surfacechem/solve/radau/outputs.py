@@ -7,11 +7,10 @@ computed by a step of its own, from the start of the main step, which has the fu
 
 from typing import Any
 
-from surfacechem.solve.radau.advance import store_polynomial
 from surfacechem.solve.radau.dense import add_probe, integrate_ledger, interpolate, interpolate_rate, keep_polynomial
 from surfacechem.solve.radau.newton import CONVERGED, end_of_step, factor_newton, predict, solve_stages, stage_count
 from surfacechem.solve.radau.roundoff import find_noise
-from surfacechem.solve.radau.step import MAGNIFIED, filter_residual
+from surfacechem.solve.radau.step import MAGNIFIED, filter_residual, store_polynomial
 from surfacechem.solve.radau.tables import GAMMA, PROBE, PROBE_RATE
 from surfacechem.solve.radau.work import (
     BASE,

@@ -21,15 +21,14 @@ from surfacechem.solve.radau.work import (
     compiled,
     evaluate,
 )
+from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, TINY
 
 GROUPS = 3
 """Accounts that are measured together: energies, entropies, bonds."""
-LOOSER, LEAST = 30.0, 1e-13
+LOOSER, LEAST = 30.0, ROUNDING
 """Error of a quadrature in units of the tolerance of the states, and the least there is."""
-FORESEEN = 1e-6
+FORESEEN = NEGLIGIBLE**2
 """Part of the time to go for which a rate is taken to last, where little was exchanged so far."""
-NEGLIGIBLE = 1e-3
-"""Error in units of what is allowed that limits no step."""
 
 
 @compiled
@@ -58,7 +57,7 @@ def _group_norm(w: Any) -> float:
     """Largest error in units of what is allowed in its group."""
     norm, allowed = 0.0, max(LOOSER * w.clock[RTOL], LEAST)
     for group in range(GROUPS):
-        miss, scale = 0.0, 1e-290
+        miss, scale = 0.0, TINY
         for m in range(w.groups.shape[0]):
             if w.groups[m] == group:
                 miss = max(miss, w.ledger[Q_MISS, m])

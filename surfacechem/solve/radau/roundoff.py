@@ -30,17 +30,15 @@ from surfacechem.solve.radau.work import (
     evaluate,
     set_inputs,
 )
-
-ULPS = 4.4e-16
-"""Rounding of a term: its own, and that of the sum it enters."""
+from surfacechem.tolerances import NEGLIGIBLE, ULPS
 
 DIFFERENCE = np.array([1.0, -5.0, 10.0, -10.0, 5.0, -1.0]) / np.sqrt(252.0)
 """A fifth difference of values with independent errors has their size."""
 
-WINDOWS, NEAR = 3, 1e-3
+WINDOWS, NEAR = 3, NEGLIGIBLE
 """Differences that are taken, and how far apart their times are as parts of a step."""
 
-LARGEST = 1e-6
+LARGEST = NEGLIGIBLE**2
 """Noise above this part of a variable, and of what it typically is, would mean a singular matrix, not rounding."""
 
 

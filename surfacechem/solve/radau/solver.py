@@ -14,14 +14,13 @@ from surfacechem.compile.program import Program
 from surfacechem.solve.contract import Array, Counters, Events, Margin, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.solve.radau.stepper import COLUMNS, END, EVENTS, OUTPUTS, RECORDS, STOP, Batch
+from surfacechem.tolerances import LONGEST_STEP
 
 EVENT_ROWS = 64
 STEP_ROWS = 512
 CHUNK = 256
 """Runs a thread takes at a time."""
 _STATUSES = tuple(Status)
-LOOSEST = 3e-5
-"""Tolerances above this are taken as this: a step that they allow can be longer than a layer it never sees."""
 
 
 @lru_cache(maxsize=256)
@@ -58,7 +57,7 @@ def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: 
         program.algebraic_mask,
         program.chain_table,
         program.ledger_groups,
-        min(problem.rtol, LOOSEST),
+        min(problem.rtol, LONGEST_STEP),
         _contiguous(problem.atol),
         problem.max_steps,
         _kinds(problem.margins, problem.in_play),

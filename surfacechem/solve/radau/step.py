@@ -1,34 +1,74 @@
-"""Error estimate and choice of step size and order of the Radau IIA family.
+"""One accepted step of the Radau IIA family: its error estimate, the choice of its size and order, the trials until one
+passes, the look between its stages, and the bookkeeping of accepting it.
 
 The estimate compares the derivative of the collocation polynomial at the start of the step with the true one,
 filtered through the real Newton matrix (Hairer & Wanner II, IV.8). It has order s while the method has order 2s - 1,
 hence the loosened tolerance.
+
+A step knows the equations at its stages alone, and so does the estimate of its error: what is over between two of them
+is seen by neither. A step that is longer than the spacing asked for is held against the equations and the ledger at
+further points, so far apart at most. What is narrow lies beside a place where a formula changes, hence at the end of a
+segment: the first and the last step of one are looked at the more closely, the nearer it is. Where the equations have
+nothing in common with its polynomial, a step is too long.
 """
 
 from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.consistency import CONSISTENT, find_consistent
+from surfacechem.solve.contract import Status
+from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
+from surfacechem.solve.radau.dense import (
+    change_and_slope,
+    integrate_ledger,
+    interpolate_rate,
+    keep_correction,
+    keep_polynomial,
+)
 from surfacechem.solve.radau.linear import solve_real
-from surfacechem.solve.radau.newton import stage_count
+from surfacechem.solve.radau.newton import (
+    CONVERGED,
+    NOT_FINITE,
+    differentiate_system,
+    divide,
+    end_of_step,
+    factor_newton,
+    predict,
+    solve_stages,
+    stage_count,
+)
+from surfacechem.solve.radau.quadrature import defect_norm, excused_norm
 from surfacechem.solve.radau.roundoff import find_noise
-from surfacechem.solve.radau.tables import START_SLOPE
+from surfacechem.solve.radau.stepper import STOP
+from surfacechem.solve.radau.tables import FINEST, GAMMA, START_SLOPE
 from surfacechem.solve.radau.work import (
     ATOL,
     BASE,
     CALM,
+    CONTRACTION,
     DELTA,
     ERROR,
+    FRESH,
     GUESSED,
+    H_FACTORED,
+    H_JACOBIAN,
+    H_LAST,
+    LAST_MEMBER,
+    LEDGER,
     LOOSE,
     MEMBER,
     NOISE,
+    OFFSET,
+    PIVOT,
+    Q_PROBE,
+    REFUSED,
+    REJECTED,
     RESIDUAL,
     RESIDUALS,
-    ROUNDING,
+    ROUNDOFF,
     RTOL,
     SCALE,
+    STEPS,
     TAU,
     THETA,
     TRIAL,
@@ -36,17 +76,19 @@ from surfacechem.solve.radau.work import (
     TRIES,
     WEIGHT,
     YDOT,
+    Q,
     Y,
     compiled,
+    copy,
     evaluate,
     finite,
     set_inputs,
 )
+from surfacechem.tolerances import EPS, NEGLIGIBLE, ROUNDING, SOLVED, SQRT_EPS, TINY, ULPS
 
 SAFETY = 0.9
 GROWTH = 8.0
 SHRINK = 0.1
-TINIEST = 1e-290
 MAGNIFIED = 10.0
 """Noise of the estimate, which extrapolates the noise of every stage, in units of that of one residual."""
 CONTRACTING = 0.05
@@ -62,25 +104,23 @@ def set_weights(w: Any) -> None:
     rounding = 0.0
     for j in range(w.algebraic.shape[0]):
         size = abs(w.vector[Y, j])
-        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINIEST)
+        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINY)
         w.vector[WEIGHT, j] = weight
         w.vector[SCALE, j] = max(size, weight)
-        rounding = max(rounding, 2.3e-16 * size / weight)
-    w.clock[ROUNDING] = rounding
+        rounding = max(rounding, EPS * size / weight)
+    w.clock[ROUNDOFF] = rounding
 
 
 @compiled
 def preferred_member(rtol: float) -> int:
     """Low order for loose tolerances, high order for tight ones."""
-    if rtol > 2e-5:
-        return 0
-    return 1 if rtol > 3e-12 else 2
+    return 0 if rtol > FINEST[0] else 1 if rtol > FINEST[1] else 2
 
 
 @compiled
 def loosening(rtol: float) -> float:
     """How much larger the low-order estimate may be than the tolerance."""
-    return float(min(max(rtol, 1e-14), 0.1) ** -0.25)
+    return float(min(max(rtol, SOLVED), 0.1) ** -0.25)
 
 
 @compiled
@@ -102,7 +142,7 @@ def error_norm(w: Any, floor: float) -> float:
     last = stage_count(w.count[MEMBER]) - 1
     for j in range(w.algebraic.shape[0]):
         size = max(abs(w.vector[Y, j]), abs(w.vector[Y, j] + w.z[last, j]))
-        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINIEST)
+        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINY)
         norm = max(norm, (abs(w.vector[ERROR, j]) - floor * w.vector[NOISE, j]) / weight)
     return norm / w.clock[LOOSE]
 
@@ -145,9 +185,9 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     limit = 7 + 2 * k
     safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.count[TRIES]))
     exponent = 1.0 / (stage_count(k) + 1.0)
-    factor = safety * max(norm, 1e-12) ** -exponent
+    factor = safety * max(norm, ROUNDING) ** -exponent
     if h_last > 0.0 and norm < 1.0:
-        factor = min(factor, factor * h / h_last * (norm_last / max(norm, 1e-12)) ** exponent)
+        factor = min(factor, factor * h / h_last * (norm_last / max(norm, ROUNDING)) ** exponent)
     return h * min(GROWTH, max(SHRINK, factor))
 
 
@@ -212,11 +252,11 @@ def first_size(w: Any, span: float) -> float:
     n = w.algebraic.shape[0]
     speed = _rate_norm(w, w.vector[YDOT])
     if not 0.0 < speed < np.inf:
-        return 1e-3 * span
+        return NEGLIGIBLE * span
     size = 0.0
     for j in range(n):
         size = max(size, abs(w.vector[Y, j]) / w.vector[WEIGHT, j])
-    trial = min(max(1e-6 * size / w.clock[LOOSE], 1e-2) / speed, 1e-3 * span)
+    trial = min(max(NEGLIGIBLE**2 * size / w.clock[LOOSE], 1e-2) / speed, NEGLIGIBLE * span)
     for j in range(n):
         w.vector[TRIAL, j] = w.vector[Y, j] + (0.0 if w.algebraic[j] else trial * w.vector[YDOT, j])
         w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
@@ -226,9 +266,251 @@ def first_size(w: Any, span: float) -> float:
     for j in range(n):
         w.vector[TRIAL_DOT, j] -= w.vector[YDOT, j]
     change = _rate_norm(w, w.vector[TRIAL_DOT]) / speed
-    if not change * span > 1e-9 * trial:
+    if not change * span > SQRT_EPS * trial:
         return 0.05 * span
     # Ratios first: a rate of 1e200 over 1e-200 s would overflow.
     time_scale = trial / change
     exponent = 1.0 / (stage_count(w.count[MEMBER]) + 1.0)
     return min(time_scale * min(1.0, (speed * time_scale) ** -exponent), 0.05 * span)
+
+
+INVALID, OLD, CURRENT = range(3)
+"""Whether the Jacobian in the workspace was taken nowhere, at an earlier state, or at the current one."""
+
+SLOW, SLOW_REJECTED = 0.8, 0.3
+"""Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
+
+LASTS = 10.0
+"""Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
+corrections are small whatever is left to correct.
+"""
+
+GOOD = -1
+STEP_UNDERFLOW = int(Status.STEP_UNDERFLOW)
+MAX_STEPS = int(Status.MAX_STEPS)
+NONFINITE = int(Status.NOT_FINITE)
+NO_CONSISTENT = int(Status.NO_CONSISTENT_STATE)
+SINGULAR = int(Status.SINGULAR)
+STOPPED = int(Status.STOPPED)
+
+
+@compiled
+def restart(w: Any) -> int:
+    """Make the state consistent and forget the past; time starts from zero."""
+    n = w.algebraic.shape[0]
+    w.clock[BASE] += w.clock[TAU]
+    w.clock[TAU] = w.clock[H_LAST] = w.clock[H_FACTORED] = 0.0
+    w.clock[CONTRACTION] = 1.0
+    w.count[CALM] = 0
+    w.count[REFUSED] = min(w.count[REFUSED], w.count[STEPS] // 2)
+    w.count[FRESH] = INVALID
+    w.count[MEMBER] = preferred_member(w.clock[RTOL])
+    for j in range(n):
+        w.vector[TRIAL, j] = w.vector[Y, j]
+        w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
+    w.inputs[0] = w.clock[BASE]
+    outcome = find_consistent(w)
+    if outcome != CONSISTENT:
+        return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
+    for j in range(n):
+        w.vector[Y, j] = w.vector[TRIAL, j]
+        w.vector[YDOT, j] = w.vector[TRIAL_DOT, j]
+    if w.ledger.shape[1] > 0:
+        set_inputs(w, w.vector[Y], w.vector[YDOT])
+        evaluate(w, LEDGER, w.rates[7].ctypes.data)
+    set_weights(w)
+    return GOOD
+
+
+@compiled
+def _prepare(w: Any, h: float, foresee: bool) -> int:
+    """Newton matrices for this step size, kept where they still serve."""
+    if w.clock[H_FACTORED] == h:
+        return GOOD
+    outgrown = w.clock[THETA] >= NEGLIGIBLE or h > LASTS * w.clock[H_JACOBIAN]
+    if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and outgrown):
+        if not differentiate_system(w, h, foresee):
+            return NONFINITE
+        w.count[FRESH] = CURRENT
+        w.clock[H_JACOBIAN] = h
+    w.clock[H_FACTORED] = 0.0
+    copy(w.vector[SCALE], w.vector[PIVOT])
+    if not factor_newton(w, h):
+        return SINGULAR
+    w.clock[H_FACTORED] = h
+    return GOOD
+
+
+@compiled
+def too_small(w: Any, h: float) -> bool:
+    """Whether the step no longer moves time."""
+    return not (h > TINY and h > ULPS * w.clock[TAU])
+
+
+@compiled
+def advance(
+    w: Any, h: float, max_steps: int, counts: Any, size_last: float, norm_last: float
+) -> tuple[int, float, float, float]:
+    """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
+    repeated = w.clock[H_LAST] == 0.0
+    singular, failed = 0, False
+    while True:
+        if too_small(w, h):
+            return STEP_UNDERFLOW, h, 0.0, h
+        if w.count[STEPS] + w.count[REJECTED] >= max_steps:
+            return MAX_STEPS, h, 0.0, h
+        if counts[STOP] != 0:
+            return STOPPED, h, 0.0, h
+        predict(w, h)
+        outcome = _prepare(w, h, not failed)
+        if outcome == NONFINITE:
+            return outcome, h, 0.0, h
+        if outcome == SINGULAR:
+            singular += 1
+            if singular > 12:
+                return SINGULAR, h, 0.0, h
+            w.count[FRESH] = INVALID
+            failed = True
+            h *= 0.37
+            continue
+        outcome = solve_stages(w, h)
+        if outcome == CONVERGED:
+            norm = estimate_error(w, h)
+            if norm >= 1.0 and repeated:
+                norm = min(norm, estimate_again(w))
+            if norm < 1.0:
+                proposed = next_size(w, h, norm, size_last, norm_last)
+                return GOOD, h, norm, min(h, proposed) if failed else proposed
+            smaller = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
+        else:
+            smaller = h * (0.1 if outcome == NOT_FINITE else 0.4)
+            failed = True
+        w.count[REJECTED] += 1
+        if outcome != CONVERGED and w.count[FRESH] == OLD:
+            w.count[FRESH] = INVALID
+            w.clock[H_FACTORED] = 0.0
+            continue
+        if outcome != CONVERGED:
+            w.count[FRESH] = INVALID
+        choose_member(w, SLOW_REJECTED)
+        w.clock[H_FACTORED] = 0.0
+        repeated = True
+        h = smaller
+
+
+@compiled
+def finish_step(w: Any, h: float) -> None:
+    """What interpolation inside the step needs beyond the stages."""
+    keep_correction(w)
+    if w.ledger.shape[1] > 0:
+        integrate_ledger(w, h)
+
+
+@compiled
+def store_polynomial(w: Any, h: float, offset: float) -> None:
+    """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
+    k = w.count[MEMBER]
+    for i in range(stage_count(k)):
+        copy(w.z[i], w.z_last[i])
+    for m in range(w.algebraic.shape[0]):
+        divide(k, w.z, m, w.z_polynomial[m])
+    w.clock[H_LAST] = h
+    w.clock[OFFSET] = offset
+    w.count[LAST_MEMBER] = w.count[MEMBER]
+
+
+@compiled
+def accept(w: Any, h: float) -> None:
+    """Move to the end of the step."""
+    last = stage_count(w.count[MEMBER]) - 1
+    end_of_step(w, h, Y, YDOT, Q)
+    copy(w.rates[last], w.rates[7])
+    w.clock[TAU] += h
+    w.count[STEPS] += 1
+    w.count[FRESH] = min(w.count[FRESH], OLD)
+    set_weights(w)
+
+
+@compiled
+def keep_matrices(w: Any, h: float, proposed: float) -> float:
+    """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
+    proposed = min(proposed, convergent_size(w, h))
+    if choose_member(w, SLOW):
+        w.clock[H_FACTORED] = 0.0
+    elif w.clock[THETA] < NEGLIGIBLE and h <= proposed <= 1.2 * h:
+        return h
+    if w.clock[THETA] >= NEGLIGIBLE:
+        w.clock[H_FACTORED] = 0.0
+    return proposed
+
+
+FAR = 3.0
+"""Errors in units of what a step may have at its start, beyond which it has not seen what is there: between the stages
+the polynomial is somewhat worse than at the ends. A choice: less refuses steps that are right, more passes over what
+changes the state by so many tolerances.
+"""
+
+DECADES = 10
+"""Points at which what lies beside the end of a segment is looked at, each ten times nearer than the one before."""
+
+BRIEF = 1e-2
+"""Part of the spacing below which a step is taken to see what is there: a choice that saves the clock. Its stages lie
+closer together than that; what is narrower still is passed over, as it is by a look at each spacing.
+"""
+
+
+@compiled
+def _state_differs(w: Any, h: float, x: float) -> bool:
+    """Whether the equations at a point are far from the polynomial; leaves the error of the state there in ERROR."""
+    interpolate_rate(w, h, x)
+    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
+    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
+    if not filter_residual(w):
+        return True
+    if error_norm(w, 0.0) <= FAR:
+        return False
+    find_noise(w)
+    return bool(not error_norm(w, MAGNIFIED) <= FAR)
+
+
+@compiled
+def _ledger_differs(w: Any, h: float, x: float, remaining: float) -> bool:
+    """Whether the rates of the ledger at a point are far from its polynomial, with the state corrected there."""
+    k = w.count[MEMBER]
+    for j in range(w.algebraic.shape[0]):
+        w.inputs[1 + j] += w.vector[ERROR, j]
+        w.inputs[1 + w.algebraic.shape[0] + j] += GAMMA[k] / h * w.vector[ERROR, j]
+    evaluate(w, LEDGER, w.ledger[Q_PROBE].ctypes.data)
+    for m in range(w.ledger.shape[1]):
+        _, slope = change_and_slope(k, x, w.q_polynomial[m])
+        w.ledger[Q_PROBE, m] = h * w.ledger[Q_PROBE, m] - slope
+    return bool(not defect_norm(w, Q_PROBE, h, remaining) <= FAR and not excused_norm(w, h) <= FAR)
+
+
+@compiled
+def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
+    return _state_differs(w, h, x) or (w.ledger.shape[1] > 0 and _ledger_differs(w, h, x, remaining))
+
+
+@compiled
+def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, ends: bool) -> float:
+    """The part of a step at which it has missed something; one where it has not, as far as the points tell.
+
+    It ``begins`` or ``ends`` where something may be narrow.
+    """
+    points = int(h / spacing)
+    if points > 0 or begins or ends:
+        keep_polynomial(w)
+    if begins:
+        for k in range(DECADES, 0, -1):
+            if _differs(w, h, 10.0**-k, remaining):
+                return 10.0**-k
+    for i in range(points):
+        x = (i + 0.5) / points
+        if _differs(w, h, x, remaining):
+            return x
+    if ends:
+        for k in range(1, DECADES + 1):
+            if _differs(w, h, 1.0 - 10.0**-k, remaining):
+                return 1.0 - 10.0**-k
+    return 1.0

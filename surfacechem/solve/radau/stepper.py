@@ -62,7 +62,6 @@ _SOURCES = (
     "tables",
     "newton",
     "step",
-    "advance",
     "consistency",
     "dense",
     "quadrature",
@@ -75,7 +74,7 @@ _LOCK = threading.Lock()
 
 def _folder() -> Path:
     here = Path(__file__).parent
-    return kernel_folder([here / f"{name}.py" for name in _SOURCES])
+    return kernel_folder([here / "coefficients.json", *(here / f"{name}.py" for name in _SOURCES)])
 
 
 def is_compiled() -> bool:

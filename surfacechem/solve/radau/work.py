@@ -61,7 +61,7 @@ Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.ara
 largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero; value and side at the
 start of the step; side at the point before."""
 (
-    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDING, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
+    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDOFF, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
 ) = np.arange(12)  # fmt: skip
 """Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
 t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; GUESSED is by how much the first
