@@ -48,8 +48,9 @@ def written(overrides: Sequence[str] | Mapping[str, object]) -> list[str]:
     """
     if not isinstance(overrides, Mapping):
         return list(overrides)
-    # Texts are read as YAML, of which JSON is a part.
-    return [f"{p}={value if isinstance(value, str) else json.dumps(value)}" for p, value in overrides.items()]
+    # Texts are read as YAML, of which JSON is a part; from_plain turns numbers of NumPy into plain ones.
+    plain = {p: v if isinstance(v, str) else json.dumps(from_plain(v, Place()).plain()) for p, v in overrides.items()}
+    return [f"{path}={text}" for path, text in plain.items()]
 
 
 def parameter_path(path: str, known: Container[str]) -> str:

@@ -341,7 +341,7 @@ def test_the_command_holds_whatever_was_given_from_python(tmp_path, monkeypatch)
     """A case by its path, a tolerance of many digits, nothing instead of a reference, a nested value."""
     path = tmp_path / "a case.yaml"
     path.write_text(surfacechem.load("exothermic").case.text)
-    changes = {"reference": None, "loading": {"p": "3 Pa"}, "run.until": 1.0, "run.rtol": "1e-7"}
+    changes = {"reference": None, "loading": {"p": "3 Pa"}, "run.until": np.int64(1), "run.rtol": "1e-7"}
     study = surfacechem.precision(path, ["radau"], [1.23456789e-7], repeat=1, overrides=changes)
     found = again(study, tmp_path, monkeypatch)
     for name in ("tolerance", "error_max", "reference"):
