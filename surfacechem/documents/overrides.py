@@ -86,25 +86,36 @@ def _split(text: str) -> tuple[str, str]:
 
 def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     if not keys:
-        varies = isinstance(tree.value, dict) and {"value", "times"} >= set(tree.value) >= {"value"}
-        plain = not isinstance(new.value, dict | list)
-        return replace(tree, value={**tree.value, "value": new}) if varies and plain else new
+        return _replaced(tree, new)
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    last, removes = len(keys) == 1, _removes(new)
-    if last and keys[0] in WRITTEN_OUT and not isinstance(tree.value, dict) and not removes:
+    removes = len(keys) == 1 and _removes(new)
+    if len(keys) == 1 and keys[0] in WRITTEN_OUT and not (isinstance(tree.value, dict) or removes):
         return new  # a bare value is, for example, the level of a constant history
-    if isinstance(tree.value, str) and tree.place.path in WHOLE:
-        tree = replace(tree, value={WHOLE[tree.place.path]: tree})
-    if tree.value is not None and not isinstance(tree.value, dict):
-        raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
-    known = tree.value or {}
-    if not (last and removes):
+    known = _entries(tree, place)
+    if not removes:
         child = known.get(keys[0], Tree(None, place))
         return replace(tree, value={**known, keys[0]: _set(child, keys[1:], new, place)})
     if keys[0] not in known:
         raise InputError(f"there is no '{keys[0]}' to remove.{suggestion(keys[0], known)}", place)
     return replace(tree, value={name: child for name, child in known.items() if name != keys[0]})
+
+
+def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
+    """The keys of a mapping, also of one that its only value stands for, or of none."""
+    if isinstance(tree.value, str) and tree.place.path in WHOLE:
+        return {WHOLE[tree.place.path]: tree}
+    if tree.value is not None and not isinstance(tree.value, dict):
+        raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
+    return tree.value or {}
+
+
+def _replaced(old: Tree, new: Tree) -> Tree:
+    """A number in place of one that varies keeps its factors."""
+    varies = isinstance(old.value, dict) and {"value", "times"} >= set(old.value) >= {"value"}
+    if varies and not isinstance(new.value, dict | list):
+        return replace(old, value={**old.value, "value": new})
+    return new
 
 
 def _removes(new: Tree) -> bool:

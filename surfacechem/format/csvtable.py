@@ -57,24 +57,10 @@ def table(tree: Tree, unit: str) -> Table:
     fields = tree.value["table"].mapping(KEYS[1:])
     content = fields["csv"]
     heading, *rows = _rows(content)
-    columns = []
-    for number, cell in enumerate(heading.cells, start=1):
-        if (found := HEADING.fullmatch(cell)) is None:
-            raise heading.error(
-                f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}."
-            )
-        columns.append((found["name"], found["unit"].strip()))
+    columns = _columns(heading)
     names, variable = [name for name, _ in columns], tree.place.path.rpartition(".")[2]
     times = _index("t", names, heading)
-    others = [name for name in names if name != "t"]
-    if "column" in fields:
-        values = _index(fields["column"].text("column"), names, heading)
-    elif variable not in others and others:  # a column of another name is never meant by itself
-        other = others[0] if len(others) == 1 else "NAME"
-        remedy = f"{suggestion(variable, names)} To take one of another name, write `column: {other}`."
-        raise heading.error(f"no column '{variable}'.{remedy}")
-    else:
-        values = _index(variable, names, heading)
+    values = _index(fields["column"].text("column") if "column" in fields else variable, names, heading)
     for row in rows:
         if len(row.cells) != len(columns):
             raise row.error(f"{len(row.cells)} values for {len(columns)} columns.")
@@ -117,11 +103,27 @@ def _rows(content: Tree) -> list[TableLine]:
     return rows
 
 
+def _columns(heading: TableLine) -> list[tuple[str, str]]:
+    """Name and unit of each column."""
+    columns = []
+    for number, cell in enumerate(heading.cells, start=1):
+        if (found := HEADING.fullmatch(cell)) is None:
+            raise heading.error(
+                f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}."
+            )
+        columns.append((found["name"], found["unit"].strip()))
+    return columns
+
+
 def _index(name: str, names: Sequence[str], heading: TableLine) -> int:
     if names.count(name) > 1:
         raise heading.error(f"the column {name} is there {names.count(name)} times.")
     if name not in names:
-        raise heading.error(f"no column '{name}'.{suggestion(name, names)}")
+        others = [other for other in names if other != "t"]
+        other = others[0] if len(others) == 1 else "NAME"
+        # A column of another name is never meant by itself.
+        remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
+        raise heading.error(f"no column '{name}'.{suggestion(name, names)}{remedy}")
     return names.index(name)
 
 

@@ -32,6 +32,7 @@ from surfacechem.format.sections import (
     MediumSection,
     ReferenceSection,
     RunSection,
+    StageSection,
     Threshold,
 )
 from surfacechem.quantities import VARIABLES
@@ -85,13 +86,8 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     for name, body in bodies.items():
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
-    # Temperatures of body 1, body 2 and the interface; some names may only stand for that of their owner.
-    owners = [body.mapping().get("temperature") for body in bodies.values()] + [interface.get("temperature")]
-    names = [str(owner.value) if owner is not None and is_name(owner) else "" for owner in owners]
-    for name, owner in zip(names, owners, strict=True):
-        if owner is not None and (name in RESERVED or (name in OWNERS and names[OWNERS[name]] != name)):
-            raise owner.error(f"'{name}' is {VARIABLES[name].long_name}, which has its own; use another name.")
-    temperatures = tuple(dict.fromkeys(filter(None, names)))
+    owners = [body.mapping().get("temperature") for body in bodies.values()]
+    temperatures = _temperature_names([*owners, interface.get("temperature")])
     context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies))
     mechanism = None
     if "mechanism" in interface:
@@ -102,6 +98,15 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
         coverages = (variable.name for variable in mechanism.variables)
         context = replace(context, units={**context.units, **dict.fromkeys(coverages, "1")})
     return read(Document, tree, context), mechanism
+
+
+def _temperature_names(owners: Sequence[Tree | None]) -> tuple[str, ...]:
+    """Names of the temperatures of body 1, body 2 and the interface; some may only name that of their owner."""
+    names = [str(owner.value) if owner is not None and is_name(owner) else "" for owner in owners]
+    for name, owner in zip(names, owners, strict=True):
+        if owner is not None and (name in RESERVED or (name in OWNERS and names[OWNERS[name]] != name)):
+            raise owner.error(f"'{name}' is {VARIABLES[name].long_name}, which has its own; use another name.")
+    return tuple(dict.fromkeys(filter(None, names)))
 
 
 # -- scene ------------------------------------------------------------------------------------------------------------
@@ -262,27 +267,27 @@ def _stiffness(body: BodySection) -> float | None:
 
 
 def _stages(case: Document) -> tuple[Stage, ...]:
-    stages = []
-    for name, section in ((name, section) for entry in case.programme for name, section in entry.items()):
-        stage = Stage(name, section.more, place=section.tree.place)
-        if section.has("for") and section.has("until"):
-            raise section.error("the stage has two ends: give `for` or `until`.", "until")
-        if not isinstance(section.until, Mapping):
-            stages.append(replace(stage, duration=section.duration, event=section.until or ""))
-            continue
-        ((variable, value),) = section.until.items()
-        if not isinstance(value, Threshold):
-            stages.append(replace(stage, variable=variable, value=value))
-            continue
-        ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
-        if len(ends) != 1:
-            raise value.error("give `rises-to` or `falls-to`.")
-        stages.append(replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None))
+    stages = tuple(_stage(name, section) for entry in case.programme for name, section in entry.items())
     for stage in stages[:-1]:
         if stage.duration is None and not stage.variable and not stage.event:
             message = f"only the last stage may be without end: give {stage.name} `for` or `until`."
             raise case.error(message, "programme")
-    return tuple(stages)
+    return stages
+
+
+def _stage(name: str, section: StageSection) -> Stage:
+    stage = Stage(name, section.more, place=section.tree.place)
+    if section.has("for") and section.has("until"):
+        raise section.error("the stage has two ends: give `for` or `until`.", "until")
+    if not isinstance(section.until, Mapping):
+        return replace(stage, duration=section.duration, event=section.until or "")
+    ((variable, value),) = section.until.items()
+    if not isinstance(value, Threshold):
+        return replace(stage, variable=variable, value=value)
+    ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
+    if len(ends) != 1:
+        raise value.error("give `rises-to` or `falls-to`.")
+    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:

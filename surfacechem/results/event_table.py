@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,10 @@ class EventRow:
     before: Array
     after: Array
     jump: Jump | None = None
+    released: float = 0.0
+    """Energy turned into heat, entropy produced and what the second law says to it: nothing where nothing jumps."""
+    entropy: float = 0.0
+    verdict: str = ""
 
 
 def events_of(trajectory: Trajectory) -> list[EventRow]:
@@ -50,7 +55,9 @@ def events_of(trajectory: Trajectory) -> list[EventRow]:
         for t, i, y in zip(events.t, events.index, events.y, strict=True)
         if i < len(margins) and not margins[i].peak
     ]
-    found += [EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j) for j in trajectory.jumps]
+    for j in trajectory.jumps:
+        row = EventRow(j.t, j.since, j.edge.name, j.edge.reason, j.before.y, j.after.y, j)
+        found.append(replace(row, released=j.released, entropy=j.entropy, verdict=j.verdict))
     last, told = 0.0, []
     for event in sorted(found, key=lambda event: event.t):
         told.append(event if event.jump else replace(event, since=event.t - last))
@@ -77,29 +84,28 @@ def event_columns(runs: Sequence[Trajectory], axes: Mapping[str, int] | None = N
     if not most:
         return []
     columns = [
-        column("event_time", "s", "time of the event", lambda event: event.t),
-        column("event_name", "1", "name of the event", lambda event: event.name, ""),
-        column("event_reason", "1", "what happened", lambda event: event.reason, ""),
+        column("event_time", "s", "time of the event", attrgetter("t")),
+        column("event_name", "1", "name of the event", attrgetter("name"), ""),
+        column("event_reason", "1", "what happened", attrgetter("reason"), ""),
     ]
     if not any(run.jumps for run in runs):
         return columns
     verdict = "whether the second law allows it; empty where nothing jumps"
-    # Where nothing jumps the state goes on, and nothing is released.
     columns += [
-        column("event_since", "s", "time since the transition before or the start", lambda event: event.since),
-        column("event_released", "J/m^2", "energy turned into heat", lambda e: e.jump.released if e.jump else 0.0),
-        column("event_entropy", "J/(m^2 K)", "entropy produced", lambda e: e.jump.entropy if e.jump else 0.0),
-        column("event_verdict", "1", verdict, lambda e: e.jump.verdict if e.jump else "", ""),
+        column("event_since", "s", "time since the transition before or the start", attrgetter("since")),
+        column("event_released", "J/m^2", "energy turned into heat", attrgetter("released")),
+        column("event_entropy", "J/(m^2 K)", "entropy produced", attrgetter("entropy")),
+        column("event_verdict", "1", verdict, attrgetter("verdict"), ""),
     ]
-    kept = [(k, state.quantity) for k, state in enumerate(system.states) if state.name not in system.inside]
-    return columns + [
-        column(f"{q.name}_{side}", q.unit, f"{q.long_name} {side}", partial(_state, side=side, k=k))
-        for k, q in kept
-        for side in ("before", "after")
-    ]
+    for k, state in enumerate(system.states):
+        if state.name not in system.inside:
+            q = state.quantity
+            columns.append(column(f"{q.name}_before", q.unit, f"{q.long_name} before", partial(_state, "before", k)))
+            columns.append(column(f"{q.name}_after", q.unit, f"{q.long_name} after", partial(_state, "after", k)))
+    return columns
 
 
-def _state(event: EventRow, side: str, k: int) -> float:
+def _state(side: str, k: int, event: EventRow) -> float:
     return float(getattr(event, side)[k])
 
 

@@ -96,8 +96,7 @@ class Simulation:
         estimate: Accuracy | None = None
         if settings.solver == AUTO:
             trajectory, estimate = verified(trajectory)
-        case = chosen.case
-        unused = case.reference.fixed if case.reference and self._departs(values) else case.unused
+        case, unused = chosen.case, self._unused(values)
         exact = (case.reference.name, case.reference.options) if case.reference and not unused else None
 
         def cells() -> CellErrors:
@@ -121,10 +120,13 @@ class Simulation:
             notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),
         )
 
-    def _departs(self, values: Mapping[str, float]) -> bool:
-        """Whether values are other than those of the case."""
+    def _unused(self, values: Mapping[str, float]) -> str:
+        """Why the exact solution of the case does not count with these values; empty where it does."""
+        if self.case.reference is None or not values:
+            return self.case.unused
         own = self.model.values()
-        return any(own[path] != value for path, value in values.items())
+        departs = any(own[path] != value for path, value in values.items())
+        return self.case.reference.fixed if departs else self.case.unused
 
     def _with(self, scene: Scene) -> Simulation:
         """The same with the cells of another scene, assembled and compiled once for each choice of them."""

@@ -13,6 +13,7 @@ from surfacechem.results.event_table import entropy_destroyed, event_counts, eve
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
+    from surfacechem.model.automaton import Mode
     from surfacechem.model.system import System
     from surfacechem.results.accuracy import Accuracy
     from surfacechem.results.audit import Audit
@@ -174,37 +175,46 @@ def check_summary(
     """A scene said back in words, with its numbers and what is odd about it."""
     from surfacechem.runs.check import laws_of
 
-    plan = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
-    if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
-        plan.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")
-    if kinks := [margin.reason for margin in system.margins if not margin.terminal]:
-        plan.append(f"kinks: {', '.join(kinks)}")
-    starts, several = {state.name: state.initial for state in system.states}, []
-    for s in system.states:
-        if s.name not in system.inside:
-            kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
-            several.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
-    for p in system.profiles:
-        start = f"from {starts[p.states[0]]:g}" if p.states else ""
-        text = f"temperatures across {p.body}, in {len(p.points) - 1} cells"
-        several.append((p.name, "[K]", "evolved", start, text))
-    values = [f"{g.value:.4g}" if g.unit == "1" else f"{g.value:.4g} {g.unit}" for g in groups]
     sections: dict[str, Sequence[Sequence[str]]] = {
         "Choices": choices,
-        "States": several,
+        "States": _state_rows(system),
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
-        "Modes": [
-            (mode.name, ", ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
-            for mode in system.modes
-            if len(mode.words) > 1
-        ],
+        "Modes": [(mode.name, _words(mode)) for mode in system.modes if len(mode.words) > 1],
         "Transitions": [(item.name, item.reason) for item in system.edges],
         "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
-        "Numbers": [(g.name, value, g.text) for g, value in zip(groups, values, strict=True)],
+        "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],
     }
     lines = [title or "untitled", labelled("regime", f"{system.regime}: {REGIMES.get(system.regime, '')}")]
-    lines.append(labelled("run", "; ".join(plan)))
+    lines.append(labelled("run", _plan(system, run)))
     for heading, rows in sections.items():
         lines += [heading, *(f"  {line}" for line in columns(rows))] if rows else []
     return "\n".join(lines)
+
+
+def _words(mode: Mode) -> str:
+    return ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
+
+
+def _plan(system: System, run: Run) -> str:
+    """How a scene is run, and where its steps end."""
+    parts = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
+    if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
+        parts.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")
+    if kinks := [margin.reason for margin in system.margins if not margin.terminal]:
+        parts.append(f"kinks: {', '.join(kinks)}")
+    return "; ".join(parts)
+
+
+def _state_rows(system: System) -> list[tuple[str, ...]]:
+    """States with unit, kind, start and meaning; those inside a body are one row."""
+    starts = {state.name: state.initial for state in system.states}
+    rows: list[tuple[str, ...]] = []
+    for s in system.states:
+        if s.name not in system.inside:
+            kind, start = ("algebraic", "guess") if s.algebraic else ("evolved", "from")
+            rows.append((s.name, f"[{s.quantity.unit}]", kind, f"{start} {s.initial:g}", s.quantity.long_name))
+    for p in system.profiles:
+        start = f"from {starts[p.states[0]]:g}" if p.states else ""
+        rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {len(p.points) - 1} cells"))
+    return rows
