@@ -354,16 +354,7 @@ initial: {{T: {T_a!r}}}"""
     )
 
 
-FAMILIES = (
-    linear_affinity,
-    bell_ramp,
-    sliding_with_loss,
-    stick_slip,
-    aging_contacts,
-    pressed_contact,
-    overdamped_pull_off,
-    inertial_pull_off,
-    quasi_static_opening,
-    cure,
-    thinning_film,
-)
+FAMILIES = [
+    *(linear_affinity, bell_ramp, sliding_with_loss, stick_slip, aging_contacts, pressed_contact),
+    *(overdamped_pull_off, inertial_pull_off, quasi_static_opening, cure, thinning_film),
+]

@@ -154,16 +154,8 @@ def first_failure(mutant: Mutant) -> str:
 
     signal.alarm(LONGEST)
     first = First()
-    options = [
-        "-q",
-        "-x",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:xdist",
-        "-W",
-        "ignore::pytest.PytestAssertRewriteWarning",
-    ]
+    quiet = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    options = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *quiet]
     for group in groups(mutant.path):
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             code = pytest.main([*options, *group], plugins=[first])

@@ -414,23 +414,10 @@ def swinging_mass(rng: np.random.Generator) -> NarrowScene:
     return _swinging(plates("swinging mass", law, loading, exponent, end, scale, rest), motion)
 
 
-FAMILIES = (
-    gap_table,
-    pressure_table,
-    elastic_pressure_table,
-    tapping,
-    gas_gap,
-    stribeck,
-    film,
-    rubbing_pulse,
-    attachment,
-    bell,
-    zone,
-    lennard_jones,
-    activated,
-    turning_mass,
-    swinging_mass,
-)
+FAMILIES = [
+    *(gap_table, pressure_table, elastic_pressure_table, tapping, gas_gap, stribeck, film, rubbing_pulse),
+    *(attachment, bell, zone, lennard_jones, activated, turning_mass, swinging_mass),
+]
 
 
 def scene(seed: int) -> NarrowScene:

@@ -12,7 +12,6 @@ T_0 = 300.0
 FORCE = 1e-11
 """Force on a bond [N] that matters."""
 
-FACTORS_OF = {"K": ("T_c",), "1": ("phi",)}
 LEFT_OUT = 0.5
 """How often a parameter keeps its default."""
 

@@ -256,20 +256,6 @@ def adhesive() -> Scene:
 
 
 ALL = [
-    adhesive,
-    coupled,
-    no_medium,
-    algebraic,
-    mean_influx,
-    one_sided,
-    reservoirs,
-    prescribed_medium,
-    stretched,
-    prescribed_bonding,
-    cure,
-    loaded_bonds,
-    shared_load,
-    sliding,
-    reacting_film,
-    sliding_both_ways,
+    *(adhesive, coupled, no_medium, algebraic, mean_influx, one_sided, reservoirs, prescribed_medium),
+    *(stretched, prescribed_bonding, cure, loaded_bonds, shared_load, sliding, reacting_film, sliding_both_ways),
 ]

@@ -130,29 +130,8 @@ def test_every_unit_of_the_code_is_a_unit_in_si(unit):
 
 PREFIXES = ["", "G", "M", "k", "c", "m", "u", "n", "p", "f"]
 NAMES = [
-    "m",
-    "g",
-    "s",
-    "min",
-    "hr",
-    "angstrom",
-    "K",
-    "A",
-    "C",
-    "N",
-    "J",
-    "cal",
-    "eV",
-    "W",
-    "Pa",
-    "bar",
-    "atm",
-    "mol",
-    "V",
-    "ohm",
-    "Hz",
-    "L",
-    "day",
+    *("m", "g", "s", "min", "hr", "angstrom", "K", "A", "C", "N", "J", "cal"),
+    *("eV", "W", "Pa", "bar", "atm", "mol", "V", "ohm", "Hz", "L", "day"),
 ]
 COMPOUND = ["J/mol", "kcal/mol", "kJ/m^2/K", "1/cm^2", "mol/cm^2", "m^3/kmol/s", "Pa*s", "J/s/m^2/K", "1/um^2", "m^-2"]
 

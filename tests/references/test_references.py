@@ -81,10 +81,6 @@ IGNITED = {"T": "T", "phi": "phi", "ln_1_minus_phi": "ln_unbonded"}
 CURED = {"alpha": "phi", "T": "T", "alpha_dot": "phi_dot"}
 
 
-def from_reference_temperature(p: Mapping[str, float]) -> dict[str, float]:
-    return {"T_i": p["T0"]}
-
-
 def dry(p: Mapping[str, float]) -> dict[str, float]:
     return {"D": p["mu"] * p["p"] * p["v"], "T_i": p["T0"]}
 

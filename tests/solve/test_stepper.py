@@ -116,18 +116,7 @@ def test_initial_layer_far_below_rounding() -> None:
     """y' = -(y - cos t) / 1e-200: the first step is of the layer's own size."""
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy + 1e200 * (y - se.cos(t))])
-    result = radau.solve(
-        Problem(
-            program,
-            np.array([2.0]),
-            np.zeros(0),
-            np.array([0.0, 1.0]),
-            np.zeros((1, 0)),
-            1e-8,
-            np.array([1e-10]),
-            record_steps=True,
-        )
-    )
+    result = radau.solve(problem(program, [2.0], [0.0, 1.0], 1e-8, record_steps=True))
     assert result.status == Status.FINISHED
     assert result.steps is not None
     assert result.steps.t[1] < 1e-199
@@ -139,9 +128,7 @@ def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y) - 1e-3])
     end = 7.6e-29
-    times = np.array([end, 1.0])
-    problem = Problem(program, np.zeros(1), times, np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, np.array([1e-14]))
-    result = radau.solve(problem)
+    result = radau.solve(problem(program, [0.0], [0.0, 1.0], 1e-8, atol=1e-14, times=[end, 1.0]))
     assert result.status == Status.FINISHED
     grown = np.exp(1e30 * end - np.log(1e33))
     # Close to the absolute tolerance it is known to a few per cent, which last as it grows.
@@ -152,10 +139,7 @@ def test_what_is_nothing_and_is_driven_by_nothing_does_not_grow() -> None:
     """y' = 1e30 y (1 - y) from y = 0 rests there, in no more steps than anything at rest."""
     t, y, dy = se.symbols("t y dy")
     program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y)])
-    problem = Problem(
-        program, np.zeros(1), np.array([1.0]), np.array([0.0, 1.0]), np.zeros((1, 0)), 1e-8, 1e-14 * np.ones(1)
-    )
-    result = radau.solve(problem)
+    result = radau.solve(problem(program, [0.0], [0.0, 1.0], 1e-8, atol=1e-14, times=[1.0]))
     assert result.status == Status.FINISHED
     assert result.outputs[0, 0] == 0.0
     assert result.counters.steps < 20
