@@ -128,7 +128,7 @@ def _system(
         equilibria=tuple(build.equilibria),
         sinks=taking,
         follows={str(x): value for x, value in build.motion.follows.items()},
-        given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0} | build.motion.given,
+        given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
         pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
         fit=fit,
         warnings=(

@@ -32,16 +32,15 @@ BOTH = "interface", "each body"
 
 STARTS = {"g_n": "Give `g_n` under `initial`: a gap that finds its equilibrium begins its search there, else at zero."}
 """What to do where a variable that finds its own value has none at the start."""
+
 NAMED = ("M", *(f"{x}_{k}" for x in "SUq" for k in ("1", "2", "c", "m", "t")))
 """Names of quantities that a parameter might have too: a law's M, or the second of two that are called q."""
 
 
 @dataclass
 class Motion:
-    """What the stages that let the gap and the interface move leave for each other."""
+    """What lets the gap and the interface move, of the normal and of the tangential motion."""
 
-    given: dict[str, Expression] = field(default_factory=dict)
-    """Work of an impact against a drive [J/m^2], by its account."""
     far_fields: dict[str, Any] = field(default_factory=dict)
     """Mountings with their symbols, by direction."""
     drives: dict[str, Expression] = field(default_factory=dict)
@@ -56,14 +55,10 @@ class Motion:
     """Traction that resists sliding along each direction, by axis."""
     stick_limits: dict[str, Expression] = field(default_factory=dict)
     """Tangential traction that sticking can bear along each direction, by axis."""
-    jolted: dict[Any, Expression] = field(default_factory=dict)
-    """New values of modes and states where loads jump, before what is in equilibrium with them follows."""
     follows: dict[Any, Expression] = field(default_factory=dict)
     """New values of states that follow the normal gap where it jumps."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
-    works: dict[Friction, str] = field(default_factory=dict)
-    """Accounts of the work against friction where the velocity of sliding is prescribed."""
     heals: dict[Expression, Expression] = field(default_factory=dict)
     """New values of modes that a rigid contact has as it closes again."""
 

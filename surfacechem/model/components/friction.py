@@ -41,9 +41,8 @@ def friction(build: Build) -> Iterator[Power]:
             resist(build, d, nominal)
         yield Power(DISSIPATION, MECHANICS, INTERFACE, power, label)
         if not build.motion.slips:
-            build.motion.works[law] = f"W_{label}"
             text = f"work done against {law.title}"
-            yield Power(WORK, OUTSIDE, MECHANICS, power, build.motion.works[law], text)
+            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{label}", text)
             for v in (d.velocity for d in resisted):
                 if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
                     reason = "sliding reverses" if len(resisted) == 1 else f"{v} changes its sign"
