@@ -460,8 +460,8 @@ class Check:
     def _kelvin(self, node: Any, key: str, title: str) -> None:
         """A temperature is in kelvin: Cantera reads degrees Celsius as such without a word."""
         value = node.get(key)
-        unit = value.split()[-1] if isinstance(value, str) else "K"
-        if value is not None and (unit != "K" or not leading(value) > 0):
+        other = isinstance(value, str) and value.split()[-1:] != ["K"]
+        if value is not None and (other or not leading(value) > 0):
             message = f"{title}: {key}: '{value}' is no temperature above zero in kelvin; write `{key}: 298.15 K`."
             raise self.source.error(message, node, key)
 

@@ -119,6 +119,7 @@ REFUSED = {
     "an undeclared species": ("A(s) + B(s) <=> AB(s)", "A(s) + D(s) <=> AB(s)", "no species 'D(s)'"),
     "lost sites": ("  sites: 2\n", "", "Cantera: "),
     "an enthalpy that overflows": ("h0: -172.3808 kJ", "h0: -1.8e305 kJ", "species AB(s): thermo: h0 must be finite"),
+    "a temperature that is empty": ("T0: 298.15 K", "T0: ''", "'' is no temperature above zero in kelvin"),
     "a temperature that is no number": ("T0: 298.15 K", "T0: .inf K", "no temperature above zero in kelvin"),
     "a site density that underflows": ("site-density: 1.0e-4", "site-density: 1e-323", "Site density must be positive"),
 }
