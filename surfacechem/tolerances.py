@@ -129,3 +129,11 @@ STILL = 1e-14
 
 MOMENT = 1e-12
 """Part of the time so far in which what stops is not followed any more: ROUNDING, rounded up."""
+
+INSIDE = 1e-15
+"""Distance from a bound, in parts of the range, at which a law that has no rate at the bound itself is asked: about
+DIGITS, the nearest that a fraction is told from one. An equilibrium that lies nearer is one at the bound.
+"""
+
+CREEP = 1e-25
+"""Velocity [m/s] that counts where friction remembers: at rest it creeps, by tens of decades slower than it slides."""

@@ -23,12 +23,7 @@ from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import LOGARITHM
 from surfacechem.quantities import Quantity
-
-INSIDE = 1e-15
-"""Distance from a bound, in parts of the range, at which a law that has no rate at the bound itself is asked there.
-
-An equilibrium that lies nearer, as that of bonds with mixing entropy under a large load does, is one at the bound.
-"""
+from surfacechem.tolerances import INSIDE
 
 SINGULAR = type(symengine.zoo), type(symengine.nan), type(symengine.oo)
 

@@ -1,4 +1,15 @@
-"""Gradual debonding: the mode in which bonds break along an envelope, entered as it is reached, left on unloading."""
+r"""Gradual debonding along an envelope, a unilateral constraint on the bonding state.
+
+.. math:: \phi \le \phi_{env}(g_n), \quad \dot\phi \le 0, \quad (\phi_{env} - \phi)\,\dot\phi = 0
+
+unless other laws form bonds. The mode ``debonding`` is 0 while the bonds lie below the envelope, 1 while they break
+along it, and -1 where the gap is open beyond their reach. It is entered as the envelope is reached (``soften``), left
+on unloading (``unload``) and where the last bonds break (``part``); where the traction falls faster with the gap than
+the bodies unload the interface tears open at once (``tear``), which is a fold of the quasi-static gap.
+
+Source: Sauer, Duong & Mandadapu (2021), section 5.2; damage as a unilateral constraint as in Raous, Cangemi & Cocu
+(1999), doi 10.1016/S0045-7825(98)00389-2.
+"""
 
 from __future__ import annotations
 
@@ -16,26 +27,10 @@ from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import NOTHING
 
-MATCH = 1e-6
-"""Relative difference of two statements of a strength that rounded input explains."""
-
-RESOLVED, FINEST = 1 - 1e-9, 1e-9
-"""Largest and least part of the opening at which the last bonds break, at which the first ones may."""
+MATCH = 1e3 * NOTHING
+"""Relative difference of two statements of a strength that rounded input explains: both have six digits."""
 
 SAME = "Give `bond-stiffness` and this law the same E_b."
-
-
-def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:
-    """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
-    mount = held(build, "n")
-    if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
-        return []
-    g, k = symengine.Symbol("g_n"), far_field(build, mount).k
-    slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
-    margin, falls = (k + slope) / (k + absolute(slope)), {mode: (1,)}
-    lost, none = -symengine.Integer(1), symengine.Integer(0)
-    reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
-    return [Edge("tear", margin, reason, {mode: lost}, {phi: none}, equilibrates=True, heat="snap", when=falls)]
 
 
 def softening_mode(build: Build) -> None:
@@ -56,33 +51,32 @@ def within_reach(build: Build) -> Expression:
 def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> None:
     """The envelope falls after it rose, from the traction that complete bonding bears there."""
     t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
+    start, end, strength = build.at_start(peak), build.at_start(g_f), build.at_start(t_max)
+    what = f"{law.name()}: t_max / E_b = {start:g} m, where complete bonding begins to break,"
+    # Both ends of the fall have to be told apart, and from none.
+    if not start < (1 - NOTHING) * end:
+        message = f"is not below g_f = {end:g} m: the traction would have to snap back. Raise g_f, or use a limit."
+        raise InputError(f"{what} {message}", law.place)
+    if start < NOTHING * end:
+        raise InputError(f"{what} is less than {NOTHING:g} g_f, too little to be resolved. Lower E_b.", law.place)
     t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
     bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
-    _refuse_steep(law, build.at_start(peak), build.at_start(g_f))
     if bonds.has(symengine.zoo):
         return  # the potential does not exist without bonds, which then bear nothing of their own
-    borne, strength = build.at_start(bonds), build.at_start(t_max)
+    borne = build.at_start(bonds)
     if abs(borne - strength) > MATCH * strength:
         raise InputError(
-            f"{law.name()}: at t_max / E_b = {build.at_start(peak):g} m the bonds of the potential bear {borne:g} Pa, "
+            f"{law.name()}: at t_max / E_b = {start:g} m the bonds of the potential bear {borne:g} Pa, "
             f"not the t_max of {strength:g} Pa. {SAME}",
             law.place,
         )
     # What varies, and what a sweep gives, is watched.
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
+    near = 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1)
     build.margins += [
         Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
-        Margin("t_max", 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1), reason, remedy=SAME, path=law.path),
+        Margin("t_max", near, reason, remedy=SAME, path=law.path),
     ]
-
-
-def _refuse_steep(law: RateLaw, peak: float, g_f: float) -> None:
-    what = f"{law.name()}: t_max / E_b = {peak:g} m, where complete bonding begins to break,"
-    if not peak < RESOLVED * g_f:
-        message = f"is not below g_f = {g_f:g} m: the traction would have to snap back. Raise g_f, or use a limit."
-        raise InputError(f"{what} {message}", law.place)
-    if peak < FINEST * g_f:
-        raise InputError(f"{what} is less than {FINEST:g} g_f, too little to be resolved. Lower E_b.", law.place)
 
 
 def softening(build: Build, law: RateLaw, forming: Expression, free: Expression) -> Expression:
@@ -92,11 +86,14 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
     _check(build, law, phi, g_n, peak)
-    quantity = VARIABLES["overshoot"]
-    overshoot = build.name(quantity, forming * free / n_c - _rate(build, left), output=False)
+    # The envelope moves with the gap, by its velocity where that has a variable of its own.
+    rate = build.total_derivative(left)
+    if build.variables.has("v_n"):
+        rate = rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})
+    overshoot = build.name(VARIABLES["overshoot"], forming * free / n_c - rate, output=False)
     none, one = symengine.Integer(0), symengine.Integer(1)
-    lost, held = {mode: -one}, build.find_mode("held")
-    breaks = {mode: one} if held is None else {mode: one, held: none}
+    lost, bound = {mode: -one}, build.find_mode("held")
+    breaks = {mode: one} if bound is None else {mode: one, bound: none}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
     beyond = where(phi > 0, left - phi + NOTHING, 1)
@@ -116,8 +113,26 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
         build.edges.append(Edge("rejoin", margin, reason, {mode: none}, strict=True, when=parted))
-    _start(build, phi, left)
+    # A run begins with no more bonds than the gap leaves.
+    j = next(j for j, item in enumerate(build.modes) if item.name == "debonding")
+    build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
+    given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + build.variables.get("slack", "the bonds"))
+    reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
+    build.margins.append(Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi"))
     return build.variables.call(law, law.statement, {"overshoot": overshoot})
+
+
+def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:
+    """A quasi-static gap whose mounting is softer than the fall of the traction tears open at once."""
+    mount = held(build, "n")
+    if mount is None or not mount.quasi_static or "g_n" not in build.motion.gap_rates:
+        return []
+    g, k = symengine.Symbol("g_n"), far_field(build, mount).k
+    slope = derivative(derivative(build.psi, g).subs({phi: left}), g)
+    guard, lost = (k + slope) / (k + absolute(slope)), {mode: symengine.Integer(-1)}
+    reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
+    gone, when = {phi: symengine.Integer(0)}, {mode: (1,)}
+    return [Edge("tear", guard, reason, lost, gone, equilibrates=True, heat="snap", when=when)]
 
 
 def apart_from_envelope(build: Build) -> None:
@@ -127,21 +142,3 @@ def apart_from_envelope(build: Build) -> None:
         if mode is not None and item.equilibrates and mode not in item.modes:
             modes = {**item.modes, mode: where(mode > 0, 0, mode)}
             build.edges[j] = replace(item, modes=modes)
-
-
-def _start(build: Build, phi: Expression, left: Expression) -> None:
-    """The mode in which a run begins, with no more bonds than the gap leaves."""
-    j = next(j for j, mode in enumerate(build.modes) if mode.name == "debonding")
-    build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
-    slack = build.variables.get("slack", "the bonds")
-    given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + slack)
-    reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
-    build.margins.append(Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi"))
-
-
-def _rate(build: Build, left: Expression) -> Expression:
-    """How fast the envelope rises [1/s], a moving gap by its velocity where that has a variable of its own."""
-    rate = build.total_derivative(left)
-    if not build.variables.has("v_n"):
-        return rate
-    return rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})

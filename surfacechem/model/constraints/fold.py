@@ -30,39 +30,44 @@ Matrix = Sequence[Sequence[Expression]]
 
 
 def folds(build: Build) -> None:
-    """The transition where the gaps in equilibrium lose it, and what tells which way they run."""
-    gaps = {symengine.Symbol(e.state) for e in build.equilibria}
-    if not gaps:
+    """The edge where the gaps in equilibrium lose it, and what tells which way they run."""
+    if not build.equilibria:
         return
     residuals = [build.expanded(e.residual) for e in build.equilibria]
     rises = [_rises(build, e, residuals) for e in build.equilibria]
     pairs = list(zip(build.equilibria, rises, strict=True))
-    A = [[_stiffness(i, r, j, rise) for j, rise in pairs] for i, r in zip(build.equilibria, residuals, strict=True)]
-    sizes = [e.active * _size(build, e, A[i][i]) + 1 - e.active for i, e in enumerate(build.equilibria)]
-    relative = tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
+    A = _tangent(build.equilibria, residuals, rises)
+    relative = _relative(build, A)
     tangent = determinant(relative)
-    moved = {symengine.Symbol(name) for e in build.equilibria for name in e.along} | gaps
-    moved |= {T for rise in rises for T in rise}
-    if symengine.Symbol("g_n") not in gaps and not tangent.free_symbols & moved:
-        return
+    names = {name for e in build.equilibria for name in (e.state, *e.along)}
+    moved = set(map(symengine.Symbol, names)).union(*rises)
+    if all(e.state != "g_n" for e in build.equilibria) and not tangent.free_symbols & moved:
+        return  # a stiffness that does not change stays what it is
     whole = determinant(A)
-    falls = tuple(-_along(whole, e, rise) for e, rise in pairs)
+    falling = tuple(-_along(whole, e, rise) for e, rise in pairs)
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
+    # The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later.
+    left = tangent - FOLD
     build.edges.append(
         Edge(
             "snap",
-            _bounded(tangent - FOLD),
+            left / (1 + absolute(left)),
             "the quasi-static equilibrium of the gap was lost (mechanical fold)",
             equilibrates=True,
             heat="snap",
-            fold=Fold(tangent, falls, relative, warming),
+            fold=Fold(tangent, falling, relative, warming),
         )
     )
 
 
-def _bounded(x: Expression) -> Expression:
-    """The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later."""
-    return x / (1 + absolute(x))
+def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises: Sequence[Rise]) -> Matrix:
+    """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
+    A = []
+    for i, residual in zip(gaps, residuals, strict=True):
+        falls = [-_along(residual, j, rise) for j, rise in zip(gaps, rises, strict=True)]
+        held = [symengine.Integer(int(i is j)) for j in gaps]
+        A.append([x if i.active == 1 else i.active * x + (1 - i.active) * y for x, y in zip(falls, held, strict=True)])
+    return A
 
 
 def _along(expression: Expression, e: Equilibrium, rise: Rise) -> Expression:
@@ -72,11 +77,10 @@ def _along(expression: Expression, e: Equilibrium, rise: Rise) -> Expression:
     return slope + sum((warmer * derivative(expression, T) for T, warmer in rise.items()), 0)
 
 
-def _stiffness(i: Equilibrium, residual: Expression, j: Equilibrium, rise: Rise) -> Expression:
-    """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
-    same = symengine.Integer(1 if i is j else 0)
-    fall = -_along(residual, j, rise)
-    return fall if i.active == 1 else i.active * fall + (1 - i.active) * same
+def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
+    """The stiffness of each gap in parts of what it is compared with, where it is not held."""
+    sizes = [e.active * _size(build, e, A[i][i]) + 1 - e.active for i, e in enumerate(build.equilibria)]
+    return tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
 
 
 def _rises(build: Build, e: Equilibrium, residuals: Sequence[Expression]) -> Rise:

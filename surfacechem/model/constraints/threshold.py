@@ -174,10 +174,12 @@ def _bond(build: Build, law: Law, name: str) -> str:
 
 def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:
     """The reaction by which a bond breaks, per bond: the first that turns it into what is no bond."""
-    bonds = build.interface.bonds
-    found = [reaction.stoichiometry() for reaction in build.interface.reactions]
-    per_bond = [{x: -n / nu[name] for x, n in nu.items() if n} for nu in found if nu.get(name)]
-    ways = [nu for nu in per_bond if not any(n > 0 and x in bonds for x, n in nu.items())]
+    bonds, ways = build.interface.bonds, []
+    for nu in (reaction.stoichiometry() for reaction in build.interface.reactions):
+        if nu.get(name):
+            per_bond = {x: -n / nu[name] for x, n in nu.items() if n}
+            if not any(per_bond.get(bond, 0) > 0 for bond in bonds):
+                ways.append(per_bond)
     if not ways:
         message = f"{law.name()} breaks bonds at once, but no reaction says what {name} breaks into."
         raise InputError(message, law.place)

@@ -30,12 +30,10 @@ from surfacechem.model.components.mounting import (
 )
 from surfacechem.model.system import Caution, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.tolerances import CREEP
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 REST = {"v": NONE, "v_2": NONE, "direction": ONE, "direction_2": ONE}
-
-CREEP = 1e-25
-"""Size [m/s] of a velocity that counts where friction remembers: at rest it creeps, by tens of decades slower."""
 
 UNSTABLE = (
     "no steady sliding velocity: nothing resists it, or friction falls faster with velocity than anything else "

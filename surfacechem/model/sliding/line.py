@@ -51,14 +51,7 @@ def states(build: Build, kind: Formulation) -> None:
     if kind.mount is not None:
         _displacement(build, kind)
     if kind.elastic:
-        g = evolve(build, "g_t")
-        names = " and ".join(law.name() for law in in_series(build))
-        arrangement = f"{names} in series with friction" if build.interface.frictions else names
-        build.variables.define("g_t", lambda: g, "evolved", arrangement)
-        rates["g_t"] = symengine.Symbol("dg_t_dt")
-        if kind.mount is None:
-            moved = build.variables.get("u_t", "the elastic gap") is not None
-            rates["u_t"] = build.rate_of("u_t") if moved else NONE
+        _elastic_gap(build, kind)
     if kind.rate_dependent and not kind.slides_inertially:
         law = rate_and_state.law_of_traction(build, inertial=False) if len(build.motion.slips) == 1 else None
         if law is not None:
@@ -70,6 +63,18 @@ def states(build: Build, kind: Formulation) -> None:
             rates[kind.d.displacement] = symengine.Symbol(v)
     elif not kind.slides_inertially:
         build.variables.define(v, partial(_sliding_velocity, build, kind), "derived", "what does not stick")
+
+
+def _elastic_gap(build: Build, kind: Formulation) -> None:
+    """The gap that gives way while the interface sticks; the displacement is prescribed where no mounting holds it."""
+    g, rates = evolve(build, "g_t"), build.motion.gap_rates
+    names = " and ".join(law.name() for law in in_series(build))
+    arrangement = f"{names} in series with friction" if build.interface.frictions else names
+    build.variables.define("g_t", lambda: g, "evolved", arrangement)
+    rates["g_t"] = symengine.Symbol("dg_t_dt")
+    if kind.mount is None:
+        moved = build.variables.get("u_t", "the elastic gap") is not None
+        rates["u_t"] = build.rate_of("u_t") if moved else NONE
 
 
 def _displacement(build: Build, kind: Formulation) -> None:
@@ -140,10 +145,15 @@ def motion(build: Build, kind: Formulation) -> Iterator[Power]:
     name_traction(build, d, slides, t_a + carried, t_a + held)
     if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
         limit = build.motion.stick_limits["t"] * (1 if kind.elastic else rubs)
-        still, equilibrates = _still(build, kind, needed, t_f, v), not (kind.slides_inertially or kind.rate_dependent)
-        stops = (symengine.Symbol(_velocity_state(build, kind)),) if kind.slides_inertially else ()
-        slip = build.variables.get("direction", "sliding")
-        build.edges += slip_along_a_line(build, slip, needed, limit, still, stops, equilibrates=equilibrates)
+        _slip(build, kind, needed, limit, _still(build, kind, needed, t_f, v))
+
+
+def _slip(build: Build, kind: Formulation, needed: Expression, limit: Expression, still: Expression) -> None:
+    """The edges between sticking and sliding."""
+    stops = [symengine.Symbol(_velocity_state(build, kind))] if kind.slides_inertially else []
+    equilibrates = not (kind.slides_inertially or kind.rate_dependent)
+    slip = build.variables.get("direction", "sliding")
+    build.edges += slip_along_a_line(build, slip, needed, limit, still, stops, equilibrates=equilibrates)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
