@@ -92,6 +92,8 @@ def assemble(scene: Scene) -> System:
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
     assert not shared, f"parameters and quantities share the names {shared}"
+    unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
+    build.warnings += [f"loading: {name} is prescribed but nothing reads it." for name in unread]
     return _system(build, layers, taking, fit())
 
 
@@ -99,8 +101,7 @@ def _system(
     build: Build, layers: tuple[Profile, ...], taking: Mapping[str, tuple[Sink, ...]], fit: Fit | None
 ) -> System:
     """All that was stated, as one frozen graph."""
-    scene, far_fields = build.scene, build.motion.far_fields
-    unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
+    far_fields = build.motion.far_fields
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -131,13 +132,9 @@ def _system(
         given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
         pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
         fit=fit,
-        warnings=(
-            *build.interface.remarks,
-            *build.warnings,
-            *(f"loading: {name} is prescribed but nothing reads it." for name in unread),
-        ),
+        warnings=(*build.interface.remarks, *build.warnings),
         outside=_outside(build),
-        origin=partial(assemble, scene),
+        origin=partial(assemble, build.scene),
     )
 
 

@@ -33,6 +33,10 @@ class Passage:
     rate: Expression
     channels: Mapping[str, Expression] = field(default_factory=dict)
 
+    def into(self, place: str) -> Expression:
+        """What it brings to a place, negative where it leaves it."""
+        return self.rate * ((self.target == place) - (self.source == place))
+
 
 def passages(build: Build) -> Iterator[Passage]:
     """Where the powers of a scene arrive."""
@@ -118,6 +122,11 @@ def totals(build: Build) -> None:
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
     _enthalpy(build)
+    _name_modes(build)
+
+
+def _name_modes(build: Build) -> None:
+    """Modes, and the bonding state where coverages of a mechanism stand for it, as outputs."""
     for mode in build.modes:
         words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
         build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
@@ -198,10 +207,8 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
         if sharing != [INTERFACE]:
             return None, None
         moved = balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
-        for flow in flows:
-            if flow.source != flow.target and INTERFACE in (flow.source, flow.target):
-                flux += flow.rate if flow.target == INTERFACE else -flow.rate
-        flux -= moved
+        into_interface = (flow.into(INTERFACE) for flow in flows)
+        flux = flux + symengine.Add(*into_interface) - moved
     elif body.name in node.energies:
         rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
         recovered = rate - symengine.Add(*others)

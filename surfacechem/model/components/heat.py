@@ -30,29 +30,40 @@ Conductances = dict[tuple[str, str], list[Expression]]
 
 def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
     """Fluxes between nodes and external heat; returns the conductances."""
+    groups = _by_ends(build)
+    found = {ends: list(channels.values()) for ends, channels in groups}
+    for ends, channels in groups:
+        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
+    for law in (law for law in build.scene.heat if _made_across(law)):
+        for ends, h in (yield from _through_film(build, law)).items():
+            found.setdefault(ends, []).append(h)
+    yield from _external_heat(build)
+    if build.interface.temperature is None and build.interface.loss:
+        rest = build.shares()[build.scene.bodies[1].name]
+        reason = "the fractions of the interface's heat add up to more than 1"
+        build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
+    return found
+
+
+def _by_ends(build: Build) -> list[tuple[tuple[str, str], dict[str, Expression]]]:
+    """Conductances between the same two ends together, by what carries the heat."""
     groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
     for law in (law for law in build.scene.heat if not _made_across(law)):
         for ends, channels in _paths(build, law):
             _, together = groups.setdefault(frozenset(ends), (ends, {}))
             for channel, h in channels.items():
                 together[channel] = together.get(channel, symengine.Integer(0)) + h
-    found = {ends: list(channels.values()) for ends, channels in groups.values()}
-    for ends, channels in groups.values():
-        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
-    for law in (law for law in build.scene.heat if _made_across(law)):
-        for ends, h in (yield from _through_film(build, law)).items():
-            found.setdefault(ends, []).append(h)
+    return list(groups.values())
+
+
+def _external_heat(build: Build) -> Iterator[Power]:
+    """Heat that a case prescribes; without a medium that of the interface goes on to the bodies."""
     for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
         if build.variables.has(Q):
             heat, node = build.variables.get(Q, "the energy balance"), build.thermal.node_of.get(member)
             T = build.variables.get("T_c", "the external heat") if node is None else node.T
             text = f"external heat into {member}"
             yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
-    if build.interface.temperature is None and build.interface.loss:
-        rest = build.shares()[build.scene.bodies[1].name]
-        reason = "the fractions of the interface's heat add up to more than 1"
-        build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
-    return found
 
 
 def takers(build: Build) -> dict[str, Expression]:

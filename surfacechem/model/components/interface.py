@@ -160,11 +160,7 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
 def free_energy(build: Build) -> Energy:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
-    # The tangential gap of a potential where that is not the elastic one: the displacement, or none.
-    parallel = in_parallel(build)
-    gaps: dict[Potential, Mapping[str, Expression]] = {law: {} for law in bounds}
-    gaps |= {law: {"g_t": symengine.Integer(0)} for law in bounds if arrangement(law) == "none"}
-    gaps |= {law: {"g_t": displacement(build)} for law in parallel}
+    gaps = _gaps(build)
     energies, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
     # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
@@ -197,6 +193,13 @@ def free_energy(build: Build) -> Energy:
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
     return replace(energy, psi=psi)
+
+
+def _gaps(build: Build) -> dict[Potential, Mapping[str, Expression]]:
+    """The tangential gap of each potential where that is not the elastic one: the displacement, or none."""
+    gaps: dict[Potential, Mapping[str, Expression]] = {law: {} for law in build.interface.potentials}
+    gaps |= {law: {"g_t": symengine.Integer(0)} for law in gaps if arrangement(law) == "none"}
+    return gaps | {law: {"g_t": displacement(build)} for law in in_parallel(build)}
 
 
 def _energies(
