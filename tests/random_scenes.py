@@ -37,7 +37,7 @@ FORMULAS = ("transverse", "limit", "evolution", "spots", "gas", "radiation")
 
 def formulas_read(law: Law | type[Law]) -> set[str]:
     """What the formulas of a law read."""
-    formulas = [getattr(law, name) for name in (law.formula, *FORMULAS) if hasattr(law, name)]
+    formulas = [getattr(law, name) for name in (law.formula, *FORMULAS) if getattr(law, name, None)]
     return {name for formula in formulas for name in reads(formula)} - {"self"}
 
 
@@ -173,7 +173,7 @@ class Composer:
     def _frictions(self) -> None:
         if self.slip in ("none", "elastic only"):
             return
-        across = [law for law in laws(Friction).values() if hasattr(law, "transverse")]
+        across = [law for law in laws(Friction).values() if law.transverse is not None]
         without = tuple(across) if self.slip != "prescribed" else ()
         self.frictions = [self.draw(Friction, without=without)]
         if self.dice.chance(0.15):

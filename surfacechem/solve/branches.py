@@ -74,7 +74,8 @@ def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise:
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    found = float(brentq(lambda g: float(curve([g])[0]), gaps[j - 1], gaps[j], **CLOSEST))
+    # A formula may have no value just where it jumps to the other sign, as the stiffness does at a bend of a traction.
+    found = float(brentq(lambda g: float(np.nan_to_num(curve([g])[0])), gaps[j - 1], gaps[j], **CLOSEST))
     # At a pole the sign changes too, but there is no zero.
     return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found
 

@@ -122,7 +122,7 @@ def test_every_rate_law(name):
 def test_every_friction_law(name):
     law = laws(Friction)[name]
     loading = {"p": Hold(level=1e5), "v": Hold(level=2e-3), "g_n": Hold(level=1e-6)}
-    loading |= {"v_2": Hold(level=1e-3)} if hasattr(law, "transverse") else {}
+    loading |= {"v_2": Hold(level=1e-3)} if law.transverse is not None else {}
     more = {"theta": 0.1} if law.internal else {}
     read = reads(law.traction) + reads(getattr(law, "limit", law.traction))
     loading |= {"phi": Hold(level=0.4)} if "phi" in read else {}

@@ -139,6 +139,14 @@ def test_a_pole_is_no_zero(power):
     assert zero_ahead(lambda g: np.asarray(g) ** power, 1.0, -1.0, 1.0) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_jump_without_a_value_is_a_zero():
+    def jump(gaps):
+        away = np.asarray(gaps) - 0.25
+        return np.where(away == 0, np.nan, np.sign(away) * 0.5)
+
+    assert zero_ahead(jump, 1.0, -1.0, 1.0) == pytest.approx(0.25)
+
+
 # -- masses and dampers that meet ------------------------------------------------------------------------------
 
 
