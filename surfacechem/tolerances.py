@@ -137,3 +137,6 @@ DIGITS, the nearest that a fraction is told from one. An equilibrium that lies n
 
 CREEP = 1e-25
 """Velocity [m/s] that counts where friction remembers: at rest it creeps, by tens of decades slower than it slides."""
+
+INSTANT = 1e-100
+"""Time [s] that is none: a rate at the cap of an exponent, 1e130 times its prefactor, is over within it."""

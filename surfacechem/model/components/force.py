@@ -23,7 +23,7 @@ from surfacechem.expressions import Expression, depends, derivative, positive, w
 from surfacechem.model.build import Build
 from surfacechem.model.system import Margin
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.tolerances import FEWEST, MOMENT, NOTHING, TINY
+from surfacechem.tolerances import FEWEST, INSTANT, MOMENT, NOTHING
 
 SHARED = "load shared by all bonds"
 ELASTIC = "bond elasticity"
@@ -72,7 +72,7 @@ def rupture(build: Build) -> None:
         loss = symengine.Add(*losses)
         if loss != 0:
             # Bonds that would be gone within what the clock resolves of the time that has passed have ruptured.
-            left = bonds - MOMENT * (build.t + TINY) * loss + NOTHING
+            left = bonds - MOMENT * (build.t + INSTANT) * loss + NOTHING
             # What is left of hardly any bonds cannot be told from rounding.
             left = where(bonds > FEWEST, left, NOTHING)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
