@@ -299,7 +299,7 @@ class System:
     follows: Mapping[str, Expression] = field(default_factory=dict)
     """New values of states that follow the normal gap where it jumps, by name."""
     given: Mapping[str, Expression] = field(default_factory=dict)
-    """Tractions of the far field times their gaps, and what impacts rub off a drive [J/m^2], by account of the work."""
+    """Tractions of the far field times their gaps [J/m^2], by account of the work."""
     pulls: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
     """Stiffness [Pa/m], displacement [m] and traction [Pa] of the far field, and the gap [m], by the account of the
     work."""
