@@ -25,39 +25,51 @@ P, G = symengine.symbols("p g_n")
 
 def conductance_warnings(system: System) -> Iterator[str]:
     """Conductances that jump at touch, rise as the gap opens, or hold where nothing touches; numbers at the start."""
-    point: dict[Any, Any] = {system.t: 0.0} | {item.symbol: item.at(0.0) for item in system.parameters}
-    point |= {state.symbol: state.initial for state in system.states if state.symbol not in (P, G)}
-    for item in system.named:
-        if item.name not in ("p", "g_n"):
-            point[symengine.Symbol(item.name)] = symengine.sympify(item.expression).subs(point)
-
-    def at(h: Expression, variable: Any, value: float) -> float | None:
-        """Value of a conductance where the variable has this value; None where it depends on more."""
-        found = symengine.sympify(h).subs(point).subs({variable: value})
-        return None if found.free_symbols else float(found)
-
+    point = _numbers_at_start(system)
     gap = system.definitions.get(G)
     moves = {system.t, *(state.symbol for state in system.states)}
     held_open = gap is not None and not gap.free_symbols & moves and gap.subs(point) > 0
     for (a, b), channels in system.conductances.items():
-        across = [h for h in channels if depends(h, G)]
+        ends = f"the conductance between {a} and {b}"
+        across = [symengine.sympify(h).subs(point) for h in channels if depends(h, G)]
         if not across:
             continue
-        ends = f"the conductance between {a} and {b}"
-        if any(at(h, P, 0.0) for h in channels if depends(h, P) and not depends(h, G)):
+        borne = (symengine.sympify(h).subs(point) for h in channels if depends(h, P) and not depends(h, G))
+        if any(_value(h, P, 0.0) for h in borne):
             yield f"{ends} has a part that reads p and does not vanish without pressure, nor with the gap."
-        total = symengine.Add(*across)
-        at_touch = at(total, G, 0.0)
-        # A pole, as of a film of no thickness, is no jump: the law ends there, and says so itself.
-        if held_open or at_touch is None or not math.isfinite(at_touch):
-            continue
-        before, after = (at(total, G, side * EPS) or 0.0 for side in (-1, 1))
-        highest, where = max((at(total, G, g) or 0.0, g) for g in OPENINGS)
-        if max(before, after) > (1 + CBRT_EPS) * min(before, after):
-            yield f"{ends} jumps at touch, from {before:.6g} to {after:.6g} W/(m^2 K)."
-        elif highest > (1 + CBRT_EPS) * before:
-            values = f"{before:.6g} W/(m^2 K) at touch, {highest:.6g} at a gap of {where:.2g} m"
-            yield f"{ends} is not monotone: {values}. Gas and radiation across the closed gap exceed the contact."
+        if not held_open:
+            yield from _at_touch(ends, symengine.Add(*across))
+
+
+def _numbers_at_start(system: System) -> dict[Any, Any]:
+    """Numbers for everything but the gap and the pressure."""
+    point: dict[Any, Any] = {system.t: 0.0} | {item.symbol: item.at(0.0) for item in system.parameters}
+    point |= {state.symbol: state.initial for state in system.states if state.symbol not in (P, G)}
+    for item in system.named:
+        symbol = symengine.Symbol(item.name)
+        if symbol not in (P, G):
+            point[symbol] = symengine.sympify(item.expression).subs(point)
+    return point
+
+
+def _value(h: Expression, variable: Any, value: float) -> float | None:
+    """Value of a conductance where the variable has this value; None where it depends on more."""
+    found = h.subs({variable: value})
+    return None if found.free_symbols else float(found)
+
+
+def _at_touch(ends: str, h: Expression) -> Iterator[str]:
+    at_touch = _value(h, G, 0.0)
+    # A pole, as of a film of no thickness, is no jump: the law ends there, and says so itself.
+    if at_touch is None or not math.isfinite(at_touch):
+        return
+    before, after = (_value(h, G, side * EPS) or 0.0 for side in (-1, 1))
+    highest, where = max((_value(h, G, g) or 0.0, g) for g in OPENINGS)
+    if max(before, after) > (1 + CBRT_EPS) * min(before, after):
+        yield f"{ends} jumps at touch, from {before:.6g} to {after:.6g} W/(m^2 K)."
+    elif highest > (1 + CBRT_EPS) * before:
+        values = f"{before:.6g} W/(m^2 K) at touch, {highest:.6g} at a gap of {where:.2g} m"
+        yield f"{ends} is not monotone: {values}. Gas and radiation across the closed gap exceed the contact."
 
 
 def check_start(system: System, values: Mapping[str, float], initial: Mapping[str, float]) -> None:
