@@ -184,6 +184,23 @@ def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int)
     return Function(int(address or 0), int(user.value), len(expressions), code)
 
 
+def _derivatives(
+    residual: Sequence[Any], states: Sequence[Any], rates: Sequence[Any], chains: Sequence[Chain]
+) -> list[Any]:
+    """Derivatives of the residual by states, then by rates: of the core, then of its border, then along the chains."""
+    core = chains[0].first if chains else len(states)
+    # Most equations read few variables: looking spares the differentiation.
+    own = [(g, symengine.sympify(g).free_symbols) for g in residual[:core]]
+    zero = symengine.Integer(0)
+    entries = [
+        derivative(g, x) if x in read else zero for over in (states, rates) for g, read in own for x in over[:core]
+    ]
+    places = list(_linked(core, chains))
+    for part in (places[: core * len(chains)], places[core * len(chains) :]):
+        entries += [derivative(residual[i], over[j]) if j >= 0 else zero for over in (states, rates) for i, j in part]
+    return entries
+
+
 def compile_program(
     t: Any,
     states: Sequence[Any],
@@ -205,19 +222,8 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    own = [(g, symengine.sympify(g).free_symbols) for g in residual[:core]]
-    by_state, by_rate = (
-        [derivative(g, x) if x in read else symengine.Integer(0) for g, read in own for x in over[:core]]
-        for over in (states, derivatives)
-    )
-    places = list(_linked(core, chains))
-    border, bands = places[: core * len(chains)], places[core * len(chains) :]
-    linked = [
-        derivative(residual[i], over[j]) if j >= 0 else symengine.Integer(0)
-        for part in (border, bands)
-        for over in (states, derivatives)
-        for i, j in part
-    ]
+    entries = _derivatives(residual, states, derivatives, chains)
+    by_rate = entries[core * core : 2 * core * core]
     pieces = PIECE if chains else None
     read = {symbol for margin in margins for symbol in symengine.sympify(margin).free_symbols}
     outside = {inputs[j] for j in filler.positions} if filler else set()
@@ -227,7 +233,7 @@ def compile_program(
         n_ledger=len(ledger),
         n_margins=len(margins),
         residual=compile_function(inputs, residual, pieces),
-        jacobian=compile_function(inputs, by_state + by_rate + linked, pieces),
+        jacobian=compile_function(inputs, entries, pieces),
         ledger=compile_function(inputs, ledger, pieces) if ledger else None,
         margins=compile_function(inputs, margins, pieces) if margins else None,
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),

@@ -20,14 +20,14 @@ from surfacechem.solve.adapters.evaluation import Evaluation
 from surfacechem.solve.contract import Array
 from surfacechem.solve.diagnose import STALLED
 from surfacechem.solve.run import Model, Run
-from surfacechem.tolerances import TINY
+from surfacechem.tolerances import SQRT_EPS, TINY
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""
 
 
-DIFFERENCE = 1e-7
-"""Cantera's integrator differentiates by steps of about this size, which bounds must not take for the solution."""
+DIFFERENCE = 8 * SQRT_EPS
+"""A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
 
 
 WIDER = 5

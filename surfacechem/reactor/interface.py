@@ -21,6 +21,7 @@ from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import BackOffError, HeldReactor, contents
 from surfacechem.solve.contract import Array
+from surfacechem.tolerances import DIGITS, ROUNDING
 from surfacechem.units import parse
 
 if TYPE_CHECKING:
@@ -30,12 +31,6 @@ AREA = Spec("m^2", "area of the interface", above=0)
 
 LEDGER_UNIT = 1e100
 """Ledgers are counted in this many of their SI units, so that they stay out of the integrator's error norm."""
-
-LOCATED = 1e-12
-"""Relative distance in time at which the end of a scene counts as found."""
-
-STANDSTILL = 2e-15
-"""Relative length of a step that is rounding of the time: the integrator goes on no more."""
 
 
 class InterfaceStopped(Exception):  # noqa: N818 - physics ends here, nothing went wrong
@@ -161,7 +156,7 @@ class InterfaceReactor(HeldReactor):
             rates = self.scene.rates(t, self.x)
         except EndError as end:
             stop = f"{end} at t = {t:.9g} s"
-            if self._last is None or abs(t - self._last[0]) <= LOCATED * abs(t):
+            if self._last is None or abs(t - self._last[0]) <= ROUNDING * abs(t):
                 self.reason, self.error = stop, InterfaceStopped(stop)
             raise self.error or BackOffError(stop) from None
         self._last, self._current = (t, self.x, rates), True
@@ -170,7 +165,7 @@ class InterfaceReactor(HeldReactor):
     def _stands_still(self, t: float) -> bool:
         """Whether steps have become as short as the rounding of the time, other than at a start."""
         step = t - self._last[0] if self._last is not None else 0.0
-        return 0 < step <= STANDSTILL * t and t - self._restarted > LOCATED * t
+        return 0 < step <= 2 * DIGITS * t and t - self._restarted > ROUNDING * t
 
     def _listen(self) -> None:
         """Take over temperatures, heats and multipliers from the network."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from surfacechem.errors import InputError
 from surfacechem.reactor.interface import InterfaceReactor
-from surfacechem.reactor.watch import Event, Watch
+from surfacechem.reactor.watch import Watch
 from surfacechem.solve.contract import Counters
 
 GROWTH = 1e4
@@ -66,7 +66,8 @@ class ReactorNet(cantera.ReactorNet):
             super().advance(min(goal, watch.known if event is None else max(event.t, now)), apply_limit)
             watch.book(now, self.time)
             if event is not None and self.time >= event.t:
-                self._happen(event)
+                event.interface.jump(self.time, event.index)
+                self._anew(f"the event at t = {self.time:g} s")
             elif self.time <= before:
                 return  # a limit that the user has set has stopped it
 
@@ -76,10 +77,6 @@ class ReactorNet(cantera.ReactorNet):
         super().advance(self._watch.ahead(goal), apply_limit)
         self._watch.look()
         self._watch.book(before, self.time)
-
-    def _happen(self, event: Event) -> None:
-        event.interface.jump(self.time, event.index)
-        self._anew(f"the event at t = {self.time:g} s")
 
     def _anew(self, where: str) -> None:
         """Start the integration anew from where it is."""

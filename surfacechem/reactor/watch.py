@@ -18,8 +18,9 @@ from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.solve.adapters.cantera_network import last_step
 from surfacechem.solve.adapters.dense_step import DenseStep, Guards, first_crossing
 from surfacechem.solve.contract import Array, Margin
+from surfacechem.tolerances import NEGLIGIBLE
 
-FIRST = 1e-9
+FIRST = NEGLIGIBLE**3
 """First look ahead after a start, as part of what is integrated: the integrator starts with shorter steps still."""
 
 SHORTEST, AHEAD = 1e4, 4.0
