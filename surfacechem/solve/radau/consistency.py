@@ -21,6 +21,7 @@ from surfacechem.solve.radau.work import (
     RHS,
     TRIAL,
     TRIAL_DOT,
+    any_true,
     compiled,
     evaluate,
     finite,
@@ -153,9 +154,7 @@ def find_consistent(w: Any) -> int:
     if not _residual(w):
         return NOT_FINITE_STATE
     delta = w.g[0]
-    nonlinear = False
-    for flag in w.algebraic:
-        nonlinear = nonlinear or flag
+    nonlinear = any_true(w.algebraic)
     norm_last = np.inf
     for iteration in range(LIMIT):
         if not _factor(w):

@@ -167,6 +167,18 @@ def _follow_rates(w: Any, h: float) -> None:
 
 
 @compiled
+def _any_at_zero(w: Any) -> bool:
+    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
+    found = False
+    for m in range(w.margin.shape[1]):
+        if w.margin[M_SIDE, m] == RISING:
+            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
+        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
+        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
+    return found
+
+
+@compiled
 def _sides_are_known(w: Any, h: float) -> bool:
     """Whether the step tells to which sides limits go that start at zero.
 
@@ -174,13 +186,7 @@ def _sides_are_known(w: Any, h: float) -> bool:
     wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
     goes farther.
     """
-    found = False
-    for m in range(w.margin.shape[1]):
-        if w.margin[M_SIDE, m] == RISING:
-            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
-        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
-        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
-    if not found:
+    if not _any_at_zero(w):
         return True
     # How far each falls and rises in the step, into the rows that will hold brackets.
     for i in range(4 * w.count[MEMBER] + 9):
@@ -225,6 +231,16 @@ def _may_reach(a: float, b: float, c: float, at_a: float, at_b: float, at_c: flo
 
 
 @compiled
+def _vertex(a: float, b: float, c: float, at_a: float, at_b: float, at_c: float) -> float:
+    """Lowest point of the parabola, or a point in the larger part where that is no progress."""
+    left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+    x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+    if a < x < c and abs(x - b) > 1e-2 * (c - a):
+        return x
+    return b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+
+
+@compiled
 def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
     """Where a margin is across zero, or touches it, around a lowest point near b; -1 where it is not.
 
@@ -243,10 +259,7 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
             return b
         if c - a <= SQRT_EPS * c or not _may_reach(a, b, c, at_a, at_b, at_c):
             break
-        left, right = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
-        x = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
-        if not (a < x < c and abs(x - b) > 1e-2 * (c - a)):
-            x = b + 0.1 * (c - b) if c - b > b - a else b - 0.1 * (b - a)
+        x = _vertex(a, b, c, at_a, at_b, at_c)
         at_x = side * _probe(w, h, m, x)
         if at_x < at_b and x > b:
             a, at_a, b, at_b = b, at_b, x, at_x
@@ -462,6 +475,16 @@ def _mark_coincident(w: Any, h: float, size: float) -> None:
 
 
 @compiled
+def _kink_at(w: Any, first: int) -> int:
+    """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
+    found = -1
+    for m in range(w.kinds.shape[0]):
+        if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
+            found = m
+    return found
+
+
+@compiled
 def find_event(w: Any, h: float) -> float:
     """Size of the step onto the first event, marking all that fire there, or onto where one seemed to be, marking
     none; h if there is none, 0 if the step must be repeated, AT_START if a limit is passed at the start.
@@ -481,11 +504,7 @@ def find_event(w: Any, h: float) -> float:
         restore_sides(w)
         return 0.0
     _mark_coincident(w, h, size)
-    # The kink at which the step ends: the margin that it went for, or another that fires there.
-    short = -1
-    for m in range(w.kinds.shape[0]):
-        if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (short < 0 and w.fired[m] != 0)):
-            short = m
+    short = _kink_at(w, first)
     if short >= 0:
         size = _short_of(w, h, short, size)
         _mark_coincident(w, h, size)
