@@ -527,7 +527,7 @@ def test_pressure_begins_at_once_under_a_damper_that_stands_still():
 
 
 def test_a_method_that_passes_an_impact_fails(monkeypatch):
-    monkeypatch.setattr("surfacechem.solve.adapters.stepping.crossings", lambda *_: {})
+    monkeypatch.setattr("surfacechem.solve.adapters.stepping.first_crossing", lambda step, *_: (step.end, []))
     case = surfacechem.load("bouncing-plate")
     trajectory = case.model.solve(replace(case.case.run, solver="lsoda"))
     assert trajectory.status == "failed"
