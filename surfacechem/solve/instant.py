@@ -10,11 +10,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import symengine
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, compile_function
-from surfacechem.expressions import magnitude
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
 from surfacechem.solve.bounces import Rebounds
@@ -96,17 +93,8 @@ class Instant:
         """
         if self.program.margins is None:
             return np.zeros(0)
-        found = self._magnitudes(np.concatenate((point.inputs(), np.maximum(self.peaks, np.abs(point.y)))))
+        found = self.jumper.magnitudes(np.concatenate((point.inputs(), np.maximum(self.peaks, np.abs(point.y)))))
         return np.where(np.isfinite(found), found, 0.0)
-
-    @cached_property
-    def _magnitudes(self) -> Function:
-        """Running error bounds of limits and edges, of the inputs and the peaks of the states."""
-        system = self.system
-        peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
-        guards = [m.expression for m in system.moving_margins()] + [edge.guard for edge in system.edges]
-        bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
-        return compile_function([*system.inputs, *peaks.values()], bounds)
 
     def consistent(self, point: Point) -> Point:
         """The point with the rates and algebraic variables that belong to it."""

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import symengine
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function, Program
+from surfacechem.compile.program import Function, Program, compile_function
 from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
@@ -124,6 +125,15 @@ class Jumper:
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
 
     # -- compiled functions of the inputs -------------------------------------------------------------------------
+
+    @cached_property
+    def magnitudes(self) -> Function:
+        """Running error bounds of limits and edges, of the inputs and the peaks of the states; one a model."""
+        system = self.system
+        peaks = {state.symbol: symengine.Symbol(f"peak of {state.name}") for state in system.states}
+        guards = [m.expression for m in system.moving_margins()] + [edge.guard for edge in system.edges]
+        bounds = [magnitude(system.expand(guard), peaks) for guard in guards]
+        return compile_function([*system.inputs, *peaks.values()], bounds)
 
     @cached_property
     def _resets(self) -> list[Function]:
