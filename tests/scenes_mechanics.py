@@ -185,7 +185,6 @@ def bonded_contact() -> Scene:
 
 SLIDING = ({"slip": 0.0}, {"slip": 1.0}, {"slip": -1.0})
 
-
 PULL = {"F_t": Hold(level=3e3)}
 """A far-field traction beside the displacement."""
 

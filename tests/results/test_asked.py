@@ -13,18 +13,11 @@ from surfacechem.solve.run import Run
 
 WITHIN = 10.0
 
-QUICK = (
-    "case endothermic-kappa-0p99",
-    "case force-spectroscopy",
-    "case stick-slip",
-    "a_linear_equilibrium",
-    "d_cluster_no_rebinding",
-    "g_coulomb_stop",
-    "g_stickslip_V-10000.0",
-    "h_pulloff_k-0.367",
-    "x01_endothermic_kappa_1m2e-40",
-    "x05_closing_film",
-)
+QUICK = [
+    *("case endothermic-kappa-0p99", "case force-spectroscopy", "case stick-slip"),
+    *("a_linear_equilibrium", "d_cluster_no_rebinding", "g_coulomb_stop", "g_stickslip_V-10000.0"),
+    *("h_pulloff_k-0.367", "x01_endothermic_kappa_1m2e-40", "x05_closing_film"),
+]
 """Some that are easy and those that are hardest."""
 
 
