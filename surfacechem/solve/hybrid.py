@@ -184,10 +184,6 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
     """The arcs as one result, which ends at this time with this ledger."""
     last = arcs[-1].result
     happened = [(arc, arc.result.events, np.ones(len(arc.result.events.t), bool)) for arc in arcs]
-    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
-    # The start of an arc, and what time cannot tell from it, is the event that is there already.
-    kept = [(arc, steps, (arc.start.t + steps.t > arc.start.t) | (arc is arcs[0])) for arc, steps in taken]
-    count = [(k, int(keep.sum())) for k, (_, _, keep) in enumerate(kept)]
     return Result(
         problem=problem.changed(
             segments=np.array([*(arc.start.t for arc in arcs), problem.segments[-1]]),
@@ -204,10 +200,18 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         ledger_outputs=np.concatenate([arc.result.ledger_outputs + arc.booked for arc in arcs]),
         events=Events(*_rows(happened), index=np.concatenate([arc.result.events.index for arc in arcs])),
         counters=Counters(*map(sum, zip(*(arc.result.counters for arc in arcs), strict=True))),
-        steps=Points(*_rows(kept), segment=np.repeat(*np.transpose(count))) if problem.record_steps else None,
+        steps=_steps(arcs) if problem.record_steps else None,
         stepping=sum(arc.result.stepping for arc in arcs),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
     )
+
+
+def _steps(arcs: Sequence[Arc]) -> Points:
+    """The steps of all arcs; the start of one, and what time cannot tell from it, is the event that ends the last."""
+    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
+    kept = [(arc, steps, (arc.start.t + steps.t > arc.start.t) | (arc is arcs[0])) for arc, steps in taken]
+    counts = [int(keep.sum()) for _, _, keep in kept]
+    return Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
 
 
 def _rows(found: Sequence[tuple[Arc, Points, NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
