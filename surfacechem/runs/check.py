@@ -213,7 +213,7 @@ def _evaluated(system: System) -> list[Expression]:
     formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
     formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.conductors]]
     formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
-    return formulas
+    return [*formulas, *_heated(system)]
 
 
 def _heated(system: System) -> list[Expression]:

@@ -146,7 +146,6 @@ SLIDER = {
     "rigid": ("tangential: {k: 1e9, beta_1: 0.9}", ""),
     "elastic": ("tangential: {k: 1e9, beta_1: 0.9}", "tangential-stiffness: {E_t: 4e9}"),
     "pressed": ("normal: {k: 1e12, beta_1: 0}, tangential: {k: 1e9, beta_1: 0.9}", "penalty: {E_n: 1e15}"),
-    "plane": ("tangential: {k: 1e9, beta_1: 0.9}, transverse: {k: 1e9, beta_1: 0.3}", ""),
 }
 
 
@@ -159,8 +158,7 @@ def pressure_falls(thermal, slider, jump):
     normal = table("p", [2, 2, 0.2, 0.2], "MPa", jump)
     if slider == "pressed":
         normal = "w_n: -2 um, " + table("F_n", [0, 0, 1.8, 1.8], "MPa", jump)
-    across = ", w_t2: 0.3 mm" if slider == "plane" else ""
-    return text(thermal, f"{normal}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}{across}", mechanics, potential)
+    return text(thermal, f"{normal}, w_t: {{ramp: {{rate: 0.4 mm/s}}}}", mechanics, potential)
 
 
 @pytest.mark.parametrize(("thermal", "slider"), SCENES)
@@ -208,7 +206,7 @@ VARIED = [(thermal, "rigid", "p", 0.4, "") for thermal in CHANGING]
 VARIED += [("spots", "rigid", "p", rate, static) for rate, static in ((0.7, ""), (-0.4, ""), (0.4, ", mu_s: 0.6"))]
 VARIED += [("spots", "elastic", "p", rate, "") for rate in (0.4, 0.7)]
 VARIED += [("spots", slider, load, 0.7, "") for slider in ("pressed", "both") for load in ("F_n", "w_n")]
-VARIED += [("spots", "plane", "p", 0.4, ""), ("outward", "pressed", "w_n", 0.4, ", mu_s: 0.6")]
+VARIED += [("outward", "pressed", "w_n", 0.4, ", mu_s: 0.6")]
 
 
 def limit_of_ramps(case, durations=(1e-4, 1e-5)):
@@ -219,8 +217,7 @@ def limit_of_ramps(case, durations=(1e-4, 1e-5)):
 
 
 def pressing(thermal, slider, load, rate, static, jump, low=0.2):
-    across = ", w_t2: 0.3 mm" if slider == "plane" else ""
-    loads = f"{PRESSING[load](jump, low)}, w_t: {{ramp: {{rate: {rate} mm/s}}}}{across}"
+    loads = f"{PRESSING[load](jump, low)}, w_t: {{ramp: {{rate: {rate} mm/s}}}}"
     return text(thermal, loads, *SLIDER[slider], static)
 
 
