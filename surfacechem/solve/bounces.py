@@ -5,16 +5,11 @@ How large the margin has been before is no measure of its rounding then, and a f
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.compile.program import Function
-from surfacechem.model.system import System
 from surfacechem.solve.contract import Result, Status
-from surfacechem.solve.equilibria import compiled
-from surfacechem.solve.jumps import Jump
+from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.tolerances import PICOMETRE
 
 Array = NDArray[np.float64]
@@ -40,22 +35,18 @@ MISSED = "the method has not seen the gap close; radau does, or a tighter tolera
 class Rebounds:
     """The rebounds of a run; ``first`` is the index of the first transition among the margins."""
 
-    def __init__(self, system: System, first: int) -> None:
-        self.system = system
-        self.margins = [first + j for j, item in enumerate(system.edges) if item.returns is not None]
+    def __init__(self, jumper: Jumper, first: int) -> None:
+        self.jumper = jumper
+        self.margins = [first + j for j, item in enumerate(jumper.system.edges) if item.returns is not None]
         self.count = 0
         self.last = (0.0, 0.0)
         """Time of the last one, and how long it takes to return [s]; zero where that is open."""
-
-    @cached_property
-    def _times(self) -> Function:
-        return compiled(self.system, (edge.returns for edge in self.system.edges if edge.returns is not None))
 
     def see(self, jump: Jump) -> None:
         """Remember a jump where it is a rebound, or ends them."""
         if jump.edge.returns is not None:
             self.count += 1
-            self.last = jump.t, float(np.max(self._times(jump.after.inputs())))
+            self.last = jump.t, float(np.max(self.jumper.times_of_return(jump.after.inputs())))
 
     def pieces(self, start: float, end: float) -> Array:
         """Pieces of a stretch in its own time: one of its own for what returns so soon that a step might miss it."""

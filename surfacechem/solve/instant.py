@@ -60,7 +60,7 @@ class Instant:
         self.peaks = np.zeros(problem.program.n)
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
-        self.rebounds = Rebounds(system, first)
+        self.rebounds = Rebounds(jumper, first)
         self.jumps: list[Jump] = []
         self.limits: list[int] = []
         """Limits that were reached together with the last edge."""

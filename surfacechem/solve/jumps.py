@@ -136,6 +136,11 @@ class Jumper:
         return compile_function([*system.inputs, *peaks.values()], bounds)
 
     @cached_property
+    def times_of_return(self) -> Function:
+        """Times [s] after which what has rebounded is back."""
+        return compiled(self.system, (edge.returns for edge in self.system.edges if edge.returns is not None))
+
+    @cached_property
     def _resets(self) -> list[Function]:
         """For each edge the new states, and then the new modes and registers."""
         states = [state.symbol for state in self.system.states]

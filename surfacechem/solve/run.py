@@ -203,7 +203,7 @@ class Model:
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)
         self.compile_seconds = time.perf_counter() - start
-        """Time to compile the equations, and the code of jumps once one has happened."""
+        """Time to compile the equations, and what is first needed in a run: of gaps at rest, of guards and of jumps."""
 
     def __reduce__(self) -> tuple[type[Model], tuple[System]]:
         """Machine code is not pickled but made again from the system."""
@@ -225,6 +225,11 @@ class Model:
 
     def _segments(self, end: float, values: Mapping[str, float]) -> Array:
         return pieces.segments(self.system, end, values)
+
+    @cached_property
+    def equilibria(self) -> Equilibria:
+        """The quasi-static gaps, with the code that finds them; one a model."""
+        return self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
 
     @cached_property
     def passing(self) -> Passing:
@@ -281,8 +286,7 @@ class Model:
         """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
         if self.system.equilibria:
             parameters = table[0].copy()
-            equilibria = self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
-            settled = equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
+            settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
             if settled is None:
                 raise InputError(
                     "there is no gap at which the tractions are in equilibrium at the start.", path="mechanics"
@@ -331,7 +335,9 @@ class Model:
         pairs = [(replace(each, solver=run.solver), values) for each, values in runs]
         if self.jumper or self.system.fit or run.max_seconds or not isinstance(method, Radau):
             return [self._solve_alone(method, *pair, nudged) for pair in pairs]
+        prepared = PREPARING.seconds
         problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
+        self.compile_seconds += PREPARING.seconds - prepared
         method.prepare()
         start = time.perf_counter()
         results = [
@@ -348,6 +354,7 @@ class Model:
         """A run with its jumps, whose media are fitted again where it leaves the range of their fits."""
         fit = self.system.fit
         values = fit.started(values) if fit else values
+        before = PREPARING.seconds
         problem = self.problem(run, values, nudged=nudged)
         method.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
@@ -355,9 +362,8 @@ class Model:
         while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
             values = wider
             result, jumps, ended = self._integrate(method, self.problem(run, values, nudged=nudged))
-        prepared = PREPARING.seconds - prepared
-        self.compile_seconds += prepared
-        seconds = time.perf_counter() - start - prepared
+        seconds = time.perf_counter() - start - (PREPARING.seconds - prepared)
+        self.compile_seconds += PREPARING.seconds - before
         status, reason = ended or self.verdict(result, values)
         return Trajectory(self, run, result, values, status, reason, seconds, jumps)
 

@@ -2,9 +2,13 @@
 
 from types import SimpleNamespace
 
+import pytest
+
 import surfacechem
 from surfacechem.compile import preparing
 from surfacechem.compile.preparing import PREPARING
+from surfacechem.format.cases import load_text
+from surfacechem.solve.run import Model
 
 
 def test_a_block_within_another_counts_once(monkeypatch):
@@ -27,3 +31,33 @@ def test_the_code_of_jumps_counts_as_compiled_and_not_as_run(monkeypatch):
     assert model.compile_seconds > spent
     monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)  # nothing is compiled again
     assert model.solve(run).jumps
+
+
+RESTING = """
+T_0: 300 K
+bodies: {lower: {temperature: T, C: 1 J/m^2/K, stiffness: 2e12 Pa/m}, upper: {temperature: T, C: 1 J/m^2/K}}
+interface: {temperature: T, potential: [normal-stiffness: {E_n: 1e12 Pa/m}]}
+loading: {w_n: {ramp: {rate: -10 nm/s}}}
+initial: {T: 300 K}
+run: {until: 1 s}
+"""
+
+
+def test_the_code_that_finds_gaps_at_rest_is_compiled_once_and_counts_as_compiled(monkeypatch):
+    case = load_text(RESTING)
+    model = Model(case.system())
+    spent = model.compile_seconds
+    first = model.solve(case.run)
+    assert not first.jumps
+    assert model.compile_seconds > spent
+    monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)  # nothing is compiled again
+    softer = model.solve(case.run, {"interface.potential.normal-stiffness.E_n": 1e11})
+    # The overlap k w / (k + E_n).
+    assert softer.everywhere["g_n"][-1] == pytest.approx(-1e-8 * 2e12 / 2.1e12, rel=1e-9)
+
+
+def test_a_second_run_with_rebounds_compiles_nothing(monkeypatch):
+    simulation = surfacechem.load("bouncing-plate")
+    first = simulation.model.solve(simulation.case.run)
+    monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)
+    assert len(simulation.model.solve(simulation.case.run).jumps) == len(first.jumps) > 1

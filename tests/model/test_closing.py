@@ -178,6 +178,17 @@ def test_a_law_of_an_open_gap_ends_the_run(mount):
     assert "g_n reached zero, where the law viscous ends" in trajectory.reason
 
 
+@pytest.mark.parametrize("E_n", [1.0, 0.01])
+@pytest.mark.parametrize("law", [Penalty, NormalStiffness])
+def test_a_soft_contact_bears_the_bodies_as_well(law, E_n):
+    """The overlap w k / (k + E_n), with far more than a picometre of it."""
+    given = scene([law(E_n=E_n)], {"w_n": Ramp(rate=-1e-8)}, Mounting(k=1e12), {"g_n": 0.0})
+    assert assemble(given).warnings == ()
+    trajectory = solve(given, 1.0)
+    assert trajectory.status == "finished"
+    assert gap(trajectory) == pytest.approx(-1e-8 * 1e12 / (1e12 + E_n), rel=1e-9)
+
+
 def test_a_gap_that_only_opens_is_no_mistake():
     trajectory = solve(scene((), {"F_n": Hold(level=8.0)}, Mounting(m=4.0), {"g_n": 0.0}), 2.0)
     assert trajectory.status == "finished"

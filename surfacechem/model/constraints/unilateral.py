@@ -44,9 +44,10 @@ HIGH, VERY_HIGH, HALF = 1e50, 1e100, 0.5
 """Two pressures [Pa], and the part to which what is conducted per pressure falls, at least, from the one to the other,
 where it is less than in proportion."""
 
-OVERLAP, OPENING, LEAST = -1.0, PICOMETRE / 1e3, 1.0
-"""Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former: a law that
-bears contact has many orders more there, bonds that have all but gone leave less.
+OVERLAP, OPENING, LEAST = -1.0, PICOMETRE / 1e3, 1e-3
+"""Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former. The softest
+contact in use, of 1 Pa/m, has a thousand times as much there; attraction that changes its sign beyond its pole has some
+1e-14 Pa, and bonds that have all but gone leave little more.
 """
 
 TOUCHING = PICOMETRE
