@@ -74,8 +74,14 @@ def zero_ahead(curve: Curve, start: float, direction: float, sign: float, noise:
     j = first + int(crossed[0])
     if values[j] == 0.0:
         return float(gaps[j])
-    # A formula may have no value just where it jumps to the other sign, as the stiffness does at a bend of a traction.
-    found = float(brentq(lambda g: float(np.nan_to_num(curve([g])[0])), gaps[j - 1], gaps[j], **CLOSEST))
+    # The ends count as they were seen among the others: alone they may round to the other sign.
+    seen = {float(gaps[i]): float(values[i]) for i in (j - 1, j)}
+
+    def value(g: float) -> float:
+        # A formula may have no value just where it jumps to the other sign, as stiffness does at a bend of a traction.
+        return float(np.nan_to_num(seen[g] if g in seen else sign * curve([g])[0]))
+
+    found = float(brentq(value, gaps[j - 1], gaps[j], **CLOSEST))
     # At a pole the sign changes too, but there is no zero.
     return None if abs(curve([found])[0]) > max(abs(values[j - 1]), abs(values[j])) else found
 

@@ -26,7 +26,7 @@ from surfacechem.laws.longrange import (
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.branches import zero_ahead
+from surfacechem.solve.branches import steps_ahead, zero_ahead
 from surfacechem.solve.run import Model, Run
 
 CLOSED = "the gap closed, and no potential bears the bodies in contact"
@@ -145,6 +145,19 @@ def test_a_jump_without_a_value_is_a_zero():
         return np.where(away == 0, np.nan, np.sign(away) * 0.5)
 
     assert zero_ahead(jump, 1.0, -1.0, 1.0) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rounding", [1e-9, -1e-9])
+@pytest.mark.parametrize("beside", [1e-12, -1e-12])
+def test_a_zero_is_found_where_a_value_alone_rounds_otherwise_than_among_others(beside, rounding, sign):
+    """As compiled code may do for one gap and for many; the zero is closer to a trial than its rounding tells."""
+    zero = float(steps_ahead(1.0, -1.0)[800]) + beside
+
+    def curve(gaps):
+        return sign * (np.asarray(gaps) - zero + (rounding if len(gaps) == 1 else 0.0))
+
+    assert zero_ahead(curve, 1.0, -1.0, sign) == pytest.approx(zero, abs=2e-9)
 
 
 # -- masses and dampers that meet ------------------------------------------------------------------------------
