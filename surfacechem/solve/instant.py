@@ -57,7 +57,9 @@ class Instant:
         """Times [s] between which the run goes; what is brief is so against them."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
-        self.peaks = np.zeros(problem.program.n)
+        self.scales = np.array([state.finest or state.scale for state in system.states])
+        self.peaks = self.scales.copy()
+        """Largest states seen; what is left of them is rounding, as is what is small against their scales."""
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(jumper, first)
@@ -202,7 +204,7 @@ class Instant:
         Rebounds that follow each other faster than time can tell have come to rest.
         """
         if point.t > self._sharpened + SHARPENED * self.end:
-            self._sharpened, self._resolved, self.peaks = point.t, len(self.jumps), np.zeros_like(self.peaks)
+            self._sharpened, self._resolved, self.peaks = point.t, len(self.jumps), self.scales.copy()
             return True
         rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
         if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == point.t:
