@@ -139,6 +139,7 @@ class InterfaceReactor(HeldReactor):
         began = time.perf_counter()
         self._check_piece(t)
         rates = np.asarray(self._rates(t) / self.unit)
+        self._refuse_passed()
         self.evaluations += 1
         self.seconds += time.perf_counter() - began
         return rates
@@ -177,18 +178,24 @@ class InterfaceReactor(HeldReactor):
             self.scene.give(f"multiplier.{label}", self.surface.multiplier(i))
 
     def _check_piece(self, t: float) -> None:
-        if self.scene.moments and not self.passes_breakpoints:
-            reasons = "; ".join(dict.fromkeys(item.reason for item in self.scene.model.system.edges))
-            raise InputError(
-                f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow. Use "
-                "surfacechem.reactor.ReactorNet."
-            )
         breakpoints = self.scene.breakpoints
         following = bisect_right(breakpoints, self.t)
         if not self.passes_breakpoints and following < len(breakpoints) and t > breakpoints[following]:
             raise InputError(
                 f"the loading has a breakpoint at t = {breakpoints[following]:g} s, which an ordinary ReactorNet steps "
                 "over. Use surfacechem.reactor.ReactorNet."
+            )
+
+    def _refuse_passed(self) -> None:
+        """Refuse a state beyond an edge that no network has carried out."""
+        if self.scene.moments is None or self.passes_breakpoints:
+            return
+        edges = self.scene.model.system.edges
+        passed = [edges[i].reason for i in np.flatnonzero(self.scene.moments.margins() < 0)]
+        if passed:
+            raise InputError(
+                f"the scene jumps ({'; '.join(dict.fromkeys(passed))}), which an ordinary ReactorNet does not follow. Use "
+                "surfacechem.reactor.ReactorNet."
             )
 
     def ledger_rates(self, t: float, x: Array) -> Array:

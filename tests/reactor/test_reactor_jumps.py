@@ -131,11 +131,12 @@ def test_a_reactor_takes_no_heat_at_once():
 SEPARATE = ["heat=[{conductance: {between: [lower, upper], h: 10}}]"]
 
 
-def test_an_ordinary_network_is_refused():
+def test_an_ordinary_network_is_refused_where_it_would_go_on_beyond_a_jump():
     interface = InterfaceReactor("debonding")
     net = ct.ReactorNet([interface])
+    net.advance(1.0)
     with pytest.raises(Exception, match=r"the scene jumps \(.*Use surfacechem\.reactor\.ReactorNet"):
-        net.advance(1.0)
+        net.advance(10.0)
 
 
 def test_what_a_jump_refuses_ends_the_scene():
