@@ -62,7 +62,7 @@ layer that none of its three stages lies in.
 """
 
 MOMENT = 1e-12
-"""Part of the time that has passed that no run resolves: ROUNDING of what is summed along it, to the next power of ten.
+"""Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of what is summed along it, to the next power of ten.
 """
 
 NOTHING = 1e-9
@@ -126,9 +126,6 @@ they are worst. Scenes that differ in more than their sixth digit are told apart
 
 STILL = 1e-14
 """Part of the tractions that cancel in a balance of sliding that counts as none: SOLVED, rounded down."""
-
-MOMENT = 1e-12
-"""Part of the time so far in which what stops is not followed any more: ROUNDING, rounded up."""
 
 INSIDE = 1e-15
 """Distance from a bound, in parts of the range, at which a law that has no rate at the bound itself is asked: about

@@ -193,8 +193,9 @@ class InterfaceReactor(HeldReactor):
         edges = self.scene.model.system.edges
         passed = [edges[i].reason for i in np.flatnonzero(self.scene.moments.margins() < 0)]
         if passed:
+            reasons = "; ".join(dict.fromkeys(passed))
             raise InputError(
-                f"the scene jumps ({'; '.join(dict.fromkeys(passed))}), which an ordinary ReactorNet does not follow. Use "
+                f"the scene jumps ({reasons}), which an ordinary ReactorNet does not follow. Use "
                 "surfacechem.reactor.ReactorNet."
             )
 
