@@ -62,7 +62,8 @@ layer that none of its three stages lies in.
 """
 
 MOMENT = 1e-12
-"""Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of what is summed along it, to the next power of ten.
+"""Part of the time that has passed that no run resolves, in which nothing that stops is followed any more: ROUNDING of
+what is summed along it, to the next power of ten.
 """
 
 NOTHING = 1e-9
