@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from surfacechem.model.automaton import RESTS
 from surfacechem.model.system import System
+from surfacechem.quantities import VELOCITIES
 from surfacechem.solve.bounces import Rebounds
 from surfacechem.solve.contract import Problem, Status
 from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
@@ -57,9 +58,11 @@ class Instant:
         """Times [s] between which the run goes; what is brief is so against them."""
         self.strict = np.array([kind.strict for kind in problem.margins], dtype=bool)
         self.terminal = np.array([kind.terminal for kind in problem.margins], dtype=bool)
-        self.scales = np.array([state.finest or state.scale for state in system.states])
+        self.scales = np.array([(state.finest or state.scale) * (state.name in VELOCITIES) for state in system.states])
         self.peaks = self.scales.copy()
-        """Largest states seen; what is left of them is rounding, as is what is small against their scales."""
+        """Largest states seen; what is left of them is rounding. A velocity adds up what forces have given and taken,
+        and is rounding where it is small against its scale; a gap may be exactly zero, at touch.
+        """
         self.booked = np.zeros(problem.program.n_ledger)
         """Ledger now."""
         self.rebounds = Rebounds(jumper, first)
