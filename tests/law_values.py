@@ -14,15 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from surfacechem.contracts.terms import Law, Load, RateFactor
-from surfacechem.laws import FAMILIES, bonds, laws
+from surfacechem.contracts.terms import Law, Load
+from surfacechem.laws import FAMILIES, laws
 from surfacechem.quantities import VARIABLES
 
 TABLE = Path(__file__).with_suffix(".json")
 POINTS = 8
 FAR = 6
 """Points at which what may have either sign is a thousand times as large or as small, or of usual size."""
-CONTRACTS = (*FAMILIES, RateFactor)
+CONTRACTS = tuple(FAMILIES)
 USUAL = {
     "K": 300.0, "m": 1e-9, "N": 1e-11, "J": 1e-20, "J/mol": 2e4, "1/m^2": 1e18, "N/m": 1e-3, "Pa": 1e5, "m/s": 1e-3,
     "1/K": 1e-3, "Pa s": 0.1, "W/(m K)": 0.1, "J/(mol K)": 8.0, "J/m^2": 0.1, "m^2": 1e-12, "Pa/m": 1e14,
@@ -40,9 +40,7 @@ OPTIONS |= {"shear": "parallel", "pressure": "net"}
 
 def every() -> dict[str, type[Law]]:
     """All laws, by contract and name."""
-    of_loads = [law for law in RateFactor.__subclasses__() if law.__module__ == bonds.__name__]
-    found = {f"{contract.contract} {name}": law for contract in FAMILIES for name, law in laws(contract).items()}
-    return found | {f"rate factor {law.name()}": law for law in of_loads}
+    return {f"{contract.contract} {name}": law for contract in FAMILIES for name, law in laws(contract).items()}
 
 
 def instance(law: type[Law], draw: random.Random, far: bool = False) -> Law:

@@ -50,15 +50,17 @@ class Drag(Friction):
 '''
 FACTOR = '''
 
-class SteepFactor(RateFactor):
+class Steep(StatedBothWays):
     """Twice the work of the force."""
 
-    rate_type = "steep"
+    rate_types = (RateType("steep", "log_off", {"k_off": 1.0}, ("x",)),)
 
+    k_off: float = parameter("1/s", "rate of rupture at no force")
+    k_on: float = parameter("1/s", "rate of formation", default=0.0)
     x: float = parameter("m", "distance to the transition state")
 
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        """Logarithm of what the force does to rupture."""
         return 2 * f * self.x / (BOLTZMANN * T_c)
 '''
 RATE = """

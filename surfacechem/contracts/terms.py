@@ -11,7 +11,6 @@ contract           states                                              audited f
 :class:`BodyEnergy`    free energy of a body as a function of T            capacity > 0
 :class:`Friction`      traction that opposes sliding                       traction * v >= 0
 :class:`RateLaw`       net reaction rate                                   -mu * rate >= 0
-:class:`RateFactor`    logarithm of what load does to a rate coefficient   --
 :class:`HeatTransfer`  conductance between two temperatures                conductance >= 0
 :class:`Load`          prescribed history of a variable                    --
 :class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
@@ -23,6 +22,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from surfacechem.contracts.law import Factor, Law, Spec, Varying, option, optional, parameter, reads, resolved_unit
@@ -37,8 +37,8 @@ __all__ = [
     "Limit",
     "Load",
     "Potential",
-    "RateFactor",
     "RateLaw",
+    "RateType",
     "Spec",
     "TangentialPotential",
     "UnderPressure",
@@ -143,6 +143,25 @@ class Friction(Law):
         return hasattr(self, "limit")
 
 
+@dataclass(frozen=True)
+class RateType:
+    """A rate type of mechanisms: an Arrhenius coefficient times what load does to one coefficient of a law."""
+
+    name: str
+    """Name in a mechanism."""
+    factor: str
+    """Method of the law that states the logarithm of what load does."""
+    constants: Mapping[str, float]
+    """Parameters of the law that the Arrhenius coefficient stands for: one, or zero where the other way counts."""
+    names: tuple[str, ...] = ()
+    """Parameters of the law that a reaction has by the same names, and with the same defaults."""
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    """Parameters that every reaction gives, by names of its own, each with that in the law. Rate constants among them
+    count in the Arrhenius coefficient."""
+    distance: str = ""
+    """Parameter of the law whose work against the force per bond is the whole factor, if it is."""
+
+
 class RateLaw(Law):
     """Net rate [1/(m^2 s)] of a reaction per unit current area; dissipates -mu * rate >= 0."""
 
@@ -152,6 +171,8 @@ class RateLaw(Law):
     keeps_range: ClassVar[bool] = False
     """Whether its form keeps phi between zero and one, or below phi_max where it reads the partners n_1 and n_2; what
     any other law carries to a bound is held there."""
+    rate_types: ClassVar[tuple[RateType, ...]] = ()
+    """What mechanisms may use of it."""
     rate: ClassVar[Callable[..., Expression]]
     envelope: ClassVar[Callable[..., Expression] | None] = None
     """Largest fraction of bonds that an opening leaves, for a law by which bonds break gradually."""
@@ -211,21 +232,6 @@ class RateLaw(Law):
 
         It is held against the equilibrium of the potential.
         """
-        return None
-
-
-class RateFactor(Law):
-    """What multiplies a rate coefficient under load; stated as its logarithm, so that no factor can overflow."""
-
-    contract = "rate factor"
-    formula = "log_factor"
-    rate_type: ClassVar[str]
-    """Name in a mechanism of an Arrhenius rate that it multiplies."""
-    log_factor: ClassVar[Callable[..., Expression]]
-
-    @property
-    def work_distance(self) -> Expression | None:
-        """Distance [m] along the force per bond whose work is the whole factor; None where it is more than that."""
         return None
 
 

@@ -1,7 +1,8 @@
 """Bonds under load: Bell, Dembo spring, two pathways, Dudko-Hummer-Szabo, attachment across a gap.
 
-What load does to a rate coefficient is one formula each, for bonding laws and mechanisms alike. It is stated as its
-logarithm: a rate is one exponential of a sum, and a factor of e^1000 is no infinity.
+What load does to a rate coefficient is one formula each, for bonding laws and mechanisms alike: ``log_on`` of formation
+and ``log_off`` of rupture. It is stated as its logarithm: a rate is one exponential of a sum, and a factor of e^1000 is
+no infinity. A law lists in ``rate_types`` what mechanisms may use of it.
 """
 
 from __future__ import annotations
@@ -9,9 +10,9 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
-from surfacechem.contracts.terms import RateFactor, RateLaw, Varying, parameter
+from surfacechem.contracts.terms import RateLaw, RateType, Varying, parameter
 from surfacechem.expressions import (
     Expression,
     is_symbolic,
@@ -26,196 +27,35 @@ from surfacechem.expressions import (
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.tolerances import FRACTION_FLOOR
 
-Coefficient = tuple[Expression, Expression]
-
-
-class BellFactor(RateFactor):
-    r"""Force lowers the barrier by its work on the way to the transition state.
-
-    .. math:: \ln\frac{k}{k_0} = \frac{f x_\beta}{k_B T}
-
-    Positive x for rupture, negative for formation under load. Source: Bell (1978), Science 200, 618, doi
-    10.1126/science.347575; Evans & Ritchie (1997), doi 10.1016/S0006-3495(97)78802-7. While f x stays below
-    the barrier.
-
-    >>> round(BellFactor(x_beta=4e-10).log_factor(f=30e-12, T_c=300.0), 6)
-    2.897188
-    """
-
-    rate_type = "Bell"
-
-    x_beta: float = parameter("m", "distance to the transition state")
-
-    @property
-    def work_distance(self) -> Expression | None:
-        """All of it."""
-        return self.x_beta
-
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        return f * self.x_beta / (BOLTZMANN * T_c)
-
-
-class DemboFactor(RateFactor):
-    r"""A bond spring that is stiffer or softer in the transition state.
-
-    .. math:: \ln\frac{k}{k_0} = \frac{(\kappa - \kappa_{ts}) f^2}{2 \kappa^2 k_B T}
-
-    A slip bond for :math:`\kappa_{ts} < \kappa`, an ideal bond where both are equal, a catch bond beyond; f is the
-    spring's :math:`\kappa (l - \lambda)`. Source: Dembo, Torney, Saxman & Hammer (1988), Proc. R. Soc. Lond. B 234, 55,
-    doi 10.1098/rspb.1988.0038.
-
-    >>> round(DemboFactor(stiffness=2e-3, transition_stiffness=1e-3).log_factor(f=4e-12, T_c=300.0), 6)
-    0.482865
-    """
-
-    rate_type = "Dembo"
-
-    stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
-    transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
-
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        softening = self.stiffness - self.transition_stiffness
-        return softening * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
-
-
-class DemboFormationFactor(RateFactor):
-    r"""Formation of a stretched bond: its spring in the transition state has to be stretched first.
-
-    .. math:: \ln\frac{k}{k_0} = -\frac{\kappa_{ts} f^2}{2 \kappa^2 k_B T}
-
-    With the rupture rate of Dembo's spring the two keep detailed balance for the elastic energy
-    :math:`f^2 / 2 \kappa`. Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038.
-
-    >>> round(DemboFormationFactor(stiffness=2e-3, transition_stiffness=1e-3).log_factor(f=4e-12, T_c=300.0), 6)
-    -0.482865
-    """
-
-    rate_type = "Dembo-formation"
-
-    stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
-    transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
-
-    @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """A spring that forms unstretched."""
-        return {"f": 0.0}
-
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        return -self.transition_stiffness * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
-
-
-class TwoPathwayFactor(RateFactor):
-    r"""Two ways out of one bound state: force closes the catch pathway and opens the slip pathway.
-
-    .. math:: \frac{k}{k_{slip}} = e^{f x_{slip} / k_B T} + r_c\,e^{-f x_{catch} / k_B T}
-
-    The lifetime is longest at :math:`f^* = \frac{k_B T}{x_{slip} + x_{catch}} \ln\frac{r_c x_{catch}}{x_{slip}}`.
-    Source: Pereverzev, Prezhdo, Forero, Sokurenko & Thomas (2005), Biophys. J. 89, 1446, doi
-    10.1529/biophysj.105.062158.
-
-    >>> law = TwoPathwayFactor(x_slip=2e-10, x_catch=2e-9, catch_ratio=100.0)
-    >>> [round(law.log_factor(f=f, T_c=300.0), 4) for f in (0.0, 10e-12, 50e-12)]
-    [4.6151, 0.884, 2.4143]
-    """
-
-    rate_type = "two-pathway"
-
-    x_slip: float = parameter("m", "distance to the barrier of the slip pathway", at_least=0)
-    x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
-    catch_ratio: float = parameter("1", "rate of the catch pathway over that of the slip pathway, at no force", above=0)
-
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        work = f / (BOLTZMANN * T_c)
-        return log_sum([work * self.x_slip, log(self.catch_ratio) - work * self.x_catch])
-
-
-class DudkoFactor(RateFactor):
-    r"""Escape over a barrier of a given shape that the force tilts away.
-
-    .. math:: \ln\frac{k}{k_0} = \left(\frac1\nu - 1\right) \ln s + \frac{\Delta G}{k_B T}\left(1 - s^{1/\nu}\right),
-              \quad s = 1 - \frac{\nu f x_\beta}{\Delta G}
-
-    :math:`\nu = 1/2` is a cusp, 2/3 a cubic well, 1 the law of Bell. Source: Dudko, Hummer & Szabo (2006), Phys. Rev.
-    Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. While a barrier above k_B T is left, s^(1/nu) > k_B T / dG;
-    beyond, the rate stays at its largest value.
-
-    >>> law = DudkoFactor(x_beta=4e-10, barrier=6e-20, nu=0.5)
-    >>> round(law.log_factor(f=50e-12, T_c=300.0), 6)
-    4.243938
-    """
-
-    rate_type = "Dudko-Hummer-Szabo"
-
-    x_beta: float = parameter("m", "distance to the transition state at no force", above=0)
-    barrier: float = parameter("J", "free energy of activation at no force", above=0)
-    nu: float = parameter("1", "shape of the barrier: 1/2 cusp, 2/3 cubic, 1 linear", above=0, at_most=1, varies=False)
-
-    @property
-    def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Forces below that at which the barrier vanishes."""
-        numbers: tuple[Any, ...] = (self.barrier, self.x_beta, self.nu)
-        if any(isinstance(number, Varying) for number in numbers):
-            return {}
-        return {"f": (-math.inf, self.barrier / (self.nu * self.x_beta))}
-
-    def log_factor(self, f: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        height = self.barrier / (BOLTZMANN * T_c)
-        tilt = 1 - self.nu * f * self.x_beta / self.barrier
-        lowest = power((1 - self.nu) / height, self.nu) + FRACTION_FLOOR
-        s = where(tilt > lowest, tilt, lowest)
-        return (1 / self.nu - 1) * log(s) + height * (1 - s ** (1 / self.nu))
-
-
-class GapFactor(RateFactor):
-    r"""Bonds form where thermal motion stretches their tether across the gap.
-
-    .. math:: \ln\frac{k}{k_0} = -\frac{k_b (g_n - l_0)^2}{2 k_B T}
-
-    Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038, for a transition state as stiff as the
-    bond. Any g_n.
-
-    >>> round(GapFactor(stiffness=1e-3, rest_length=2e-8).log_factor(g_n=2.4e-8, T_c=300.0), 6)
-    -1.931459
-    """
-
-    rate_type = "gap-attachment"
-
-    stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
-    rest_length: float = parameter("m", "gap at which the tether is not stretched", default=0.0)
-
-    @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """The gap that does not stretch the tether."""
-        return {"g_n": self.rest_length}
-
-    def log_factor(self, g_n: Expression, T_c: Expression) -> Expression:
-        """Logarithm of the factor."""
-        return -self.stiffness * (g_n - self.rest_length) ** 2 / (2 * BOLTZMANN * T_c)
-
 
 class StatedBothWays(RateLaw):
-    """Bonds that form and break at coefficients of their own; subclasses state these."""
+    """Bonds that form and break at coefficients of their own; subclasses state what load does to each."""
 
     keeps_range = True
+    off: ClassVar[str] = "k_off"
+    """Parameter that is the rate of rupture at no force."""
+
+    def log_on(self, f: Expression, T_c: Expression) -> Expression:
+        """Logarithm of what the force does to formation: nothing."""
+        return 0
 
     @abstractmethod
-    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        """Of formation and of rupture: the rate at no force [1/s] and the logarithm of the factor of the force."""
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        """Logarithm of what the force does to rupture."""
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        on, off = (scaled_exp(k, log_factor) for k, log_factor in self._coefficients(f, T_c))
-        return n_c * (on * (1 - phi) - off * phi)
+        numbers = vars(self)
+        on = scaled_exp(numbers["k_on"], self.log_on(f, T_c))
+        return n_c * (on * (1 - phi) - scaled_exp(numbers[self.off], self.log_off(f, T_c)) * phi)
 
     def log_coefficients(self, f: Expression, T_c: Expression) -> tuple[Expression, Expression]:
         """Logarithms of the coefficients of formation and rupture."""
-        on, off = (log_fraction(k) + log_factor for k, log_factor in self._coefficients(f, T_c))
-        return on, off
+        numbers = vars(self)
+        return (
+            log_fraction(numbers["k_on"]) + self.log_on(f, T_c),
+            log_fraction(numbers[self.off]) + self.log_off(f, T_c),
+        )
 
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
@@ -240,8 +80,10 @@ class Bell(StatedBothWays):
     -1.8123115...
     """
 
+    rate_types = (RateType("Bell", "log_off", {"k_off": 1.0}, renamed={"x_beta": "x_off"}, distance="x_off"),)
+
     k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
-    x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
+    x_off: float = parameter("m", "distance to the transition state", default=0.0)
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
     x_on: float = parameter("m", "distance to the transition state of formation", default=0.0)
 
@@ -250,9 +92,23 @@ class Bell(StatedBothWays):
         """What the two distances to the transition state differ by, where bonds form too."""
         return None if self.log_ratio is None else self.x_on - self.x_off
 
-    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        on, off = (BellFactor(x_beta=x).log_factor(f, T_c) for x in (self.x_on, self.x_off))
-        return (self.k_on, on), (self.k_off, off)
+    def log_on(self, f: Expression, T_c: Expression) -> Expression:
+        """Logarithm of what the force does to formation: its work on the way to the transition state."""
+        return f * self.x_on / (BOLTZMANN * T_c)
+
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        r"""Force lowers the barrier by its work on the way to the transition state.
+
+        .. math:: \ln\frac{k}{k_0} = \frac{f x_\beta}{k_B T}
+
+        Positive x for rupture, negative for formation under load. Source: Bell (1978), Science 200, 618, doi
+        10.1126/science.347575; Evans & Ritchie (1997), doi 10.1016/S0006-3495(97)78802-7. While f x stays below
+        the barrier.
+
+        >>> round(Bell(k_off=1.0, x_off=4e-10).log_off(f=30e-12, T_c=300.0), 6)
+        2.897188
+        """
+        return f * self.x_off / (BOLTZMANN * T_c)
 
 
 class ReversibleBell(RateLaw):
@@ -276,7 +132,7 @@ class ReversibleBell(RateLaw):
     """
 
     k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
-    x_off: float = parameter("m", "distance to the transition state of rupture", default=0.0)
+    x_off: float = parameter("m", "distance to the transition state", default=0.0)
     x_on: float | None = parameter(
         "m", "distance to the transition state of formation, under a prescribed force only", default=None
     )
@@ -288,7 +144,7 @@ class ReversibleBell(RateLaw):
 
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        breaking = BellFactor(x_beta=self.x_off).log_factor(f, T_c) + log_fraction(phi)
+        breaking = Bell(k_off=self.k_off, x_off=self.x_off).log_off(f, T_c) + log_fraction(phi)
         return n_c * scaled_expm1(self.k_off, -mu / (BOLTZMANN * T_c), breaking)
 
 
@@ -306,15 +162,50 @@ class DemboSpring(StatedBothWays):
     -0.162071...
     """
 
+    rate_types = (
+        RateType("Dembo", "log_off", {"k_off": 1.0}, ("stiffness", "transition_stiffness")),
+        RateType("Dembo-formation", "log_on", {"k_off": 0.0, "k_on": 1.0}, ("stiffness", "transition_stiffness")),
+    )
+
     k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
     stiffness: float = parameter("N/m", "stiffness of the bond", above=0)
     transition_stiffness: float = parameter("N/m", "stiffness of the bond in the transition state", at_least=0)
     k_on: float = parameter("1/s", "rate of formation at no force", default=0.0, at_least=0)
 
-    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        springs: Any = {"stiffness": self.stiffness, "transition_stiffness": self.transition_stiffness}
-        on, off = (factor(**springs).log_factor(f, T_c) for factor in (DemboFormationFactor, DemboFactor))
-        return (self.k_on, on), (self.k_off, off)
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """A spring that forms unstretched."""
+        return {} if self.log_ratio is None else {"f": 0.0}
+
+    def log_on(self, f: Expression, T_c: Expression) -> Expression:
+        r"""Formation of a stretched bond: its spring in the transition state has to be stretched first.
+
+        .. math:: \ln\frac{k}{k_0} = -\frac{\kappa_{ts} f^2}{2 \kappa^2 k_B T}
+
+        With the rupture rate of Dembo's spring the two keep detailed balance for the elastic energy
+        :math:`f^2 / 2 \kappa`. Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038.
+
+        >>> spring = DemboSpring(k_off=0.0, k_on=1.0, stiffness=2e-3, transition_stiffness=1e-3)
+        >>> round(spring.log_on(f=4e-12, T_c=300.0), 6)
+        -0.482865
+        """
+        return -self.transition_stiffness * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
+
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        r"""A bond spring that is stiffer or softer in the transition state.
+
+        .. math:: \ln\frac{k}{k_0} = \frac{(\kappa - \kappa_{ts}) f^2}{2 \kappa^2 k_B T}
+
+        A slip bond for :math:`\kappa_{ts} < \kappa`, an ideal bond where both are equal, a catch bond beyond; f is the
+        spring's :math:`\kappa (l - \lambda)`. Source: Dembo, Torney, Saxman & Hammer (1988), Proc. R. Soc. Lond. B 234,
+        55, doi 10.1098/rspb.1988.0038.
+
+        >>> spring = DemboSpring(k_off=1.0, stiffness=2e-3, transition_stiffness=1e-3)
+        >>> round(spring.log_off(f=4e-12, T_c=300.0), 6)
+        0.482865
+        """
+        softening = self.stiffness - self.transition_stiffness
+        return softening * f**2 / (2 * self.stiffness**2 * BOLTZMANN * T_c)
 
 
 class TwoPathway(StatedBothWays):
@@ -330,16 +221,32 @@ class TwoPathway(StatedBothWays):
     -10.1...
     """
 
+    off = "k_slip"
+    rate_types = (
+        RateType("two-pathway", "log_off", {"k_slip": 1.0}, ("x_slip", "x_catch"), {"catch_ratio": "k_catch"}),
+    )
+
     k_slip: float = parameter("1/s", "rate of the slip pathway at no force", above=0)
     x_slip: float = parameter("m", "distance to the barrier of the slip pathway", at_least=0)
     k_catch: float = parameter("1/s", "rate of the catch pathway at no force", above=0)
     x_catch: float = parameter("m", "distance to the barrier of the catch pathway", at_least=0)
     k_on: float = parameter("1/s", "rate of formation", default=0.0, at_least=0)
 
-    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        ratio = self.k_catch / self.k_slip
-        factor = TwoPathwayFactor(x_slip=self.x_slip, x_catch=self.x_catch, catch_ratio=ratio)
-        return (self.k_on, 0), (self.k_slip, factor.log_factor(f, T_c))
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        r"""Two ways out of one bound state: force closes the catch pathway and opens the slip pathway.
+
+        .. math:: \frac{k}{k_{slip}} = e^{f x_{slip} / k_B T} + r_c\,e^{-f x_{catch} / k_B T}
+
+        The lifetime is longest at :math:`f^* = \frac{k_B T}{x_{slip} + x_{catch}} \ln\frac{r_c x_{catch}}{x_{slip}}`.
+        Source: Pereverzev, Prezhdo, Forero, Sokurenko & Thomas (2005), Biophys. J. 89, 1446, doi
+        10.1529/biophysj.105.062158.
+
+        >>> law = TwoPathway(k_slip=1.0, x_slip=2e-10, x_catch=2e-9, k_catch=100.0)
+        >>> [round(law.log_off(f=f, T_c=300.0), 4) for f in (0.0, 10e-12, 50e-12)]
+        [4.6151, 0.884, 2.4143]
+        """
+        work = f / (BOLTZMANN * T_c)
+        return log_sum([work * self.x_slip, log(self.k_catch / self.k_slip) - work * self.x_catch])
 
 
 class DudkoHummerSzabo(StatedBothWays):
@@ -356,6 +263,8 @@ class DudkoHummerSzabo(StatedBothWays):
     -8.3417844...
     """
 
+    rate_types = (RateType("Dudko-Hummer-Szabo", "log_off", {"k_off": 1.0}, ("barrier", "nu"), {"x_beta": "x_off"}),)
+
     k_off: float = parameter("1/s", "rate of rupture at no force", at_least=0)
     x_off: float = parameter("m", "distance to the transition state at no force", above=0)
     barrier: float = parameter("J", "free energy of activation at no force", above=0)
@@ -365,11 +274,30 @@ class DudkoHummerSzabo(StatedBothWays):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Forces below that at which the barrier vanishes."""
-        return DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu).ranges
+        numbers: tuple[Any, ...] = (self.barrier, self.x_off, self.nu)
+        if any(isinstance(number, Varying) for number in numbers):
+            return {}
+        return {"f": (-math.inf, self.barrier / (self.nu * self.x_off))}
 
-    def _coefficients(self, f: Expression, T_c: Expression) -> tuple[Coefficient, Coefficient]:
-        factor = DudkoFactor(x_beta=self.x_off, barrier=self.barrier, nu=self.nu)
-        return (self.k_on, 0), (self.k_off, factor.log_factor(f, T_c))
+    def log_off(self, f: Expression, T_c: Expression) -> Expression:
+        r"""Escape over a barrier of a given shape that the force tilts away.
+
+        .. math:: \ln\frac{k}{k_0} = \left(\frac1\nu - 1\right) \ln s
+                  + \frac{\Delta G}{k_B T}\left(1 - s^{1/\nu}\right), \quad s = 1 - \frac{\nu f x_\beta}{\Delta G}
+
+        :math:`\nu = 1/2` is a cusp, 2/3 a cubic well, 1 the law of Bell. Source: Dudko, Hummer & Szabo (2006), Phys.
+        Rev. Lett. 96, 108101, doi 10.1103/PhysRevLett.96.108101. While a barrier above k_B T is left,
+        s^(1/nu) > k_B T / dG; beyond, the rate stays at its largest value.
+
+        >>> law = DudkoHummerSzabo(k_off=1.0, x_off=4e-10, barrier=6e-20, nu=0.5)
+        >>> round(law.log_off(f=50e-12, T_c=300.0), 6)
+        4.243938
+        """
+        height = self.barrier / (BOLTZMANN * T_c)
+        tilt = 1 - self.nu * f * self.x_off / self.barrier
+        lowest = power((1 - self.nu) / height, self.nu) + FRACTION_FLOOR
+        s = where(tilt > lowest, tilt, lowest)
+        return (1 / self.nu - 1) * log(s) + height * (1 - s ** (1 / self.nu))
 
 
 class GapAttachment(RateLaw):
@@ -385,6 +313,7 @@ class GapAttachment(RateLaw):
     """
 
     keeps_range = True
+    rate_types = (RateType("gap-attachment", "log_on", {"k_on": 1.0}, ("stiffness", "rest_length")),)
 
     k_on: float = parameter("1/s", "rate of formation at the rest length", at_least=0)
     stiffness: float = parameter("N/m", "stiffness of the tether", at_least=0)
@@ -395,7 +324,20 @@ class GapAttachment(RateLaw):
         """The gap that does not stretch the tether."""
         return {"g_n": self.rest_length}
 
+    def log_on(self, g_n: Expression, T_c: Expression) -> Expression:
+        r"""Bonds form where thermal motion stretches their tether across the gap.
+
+        .. math:: \ln\frac{k}{k_0} = -\frac{k_b (g_n - l_0)^2}{2 k_B T}
+
+        Source: Dembo, Torney, Saxman & Hammer (1988), doi 10.1098/rspb.1988.0038, for a transition state as stiff as
+        the bond. Any g_n.
+
+        >>> law = GapAttachment(k_on=1.0, stiffness=1e-3, rest_length=2e-8)
+        >>> round(law.log_on(g_n=2.4e-8, T_c=300.0), 6)
+        -1.931459
+        """
+        return -self.stiffness * (g_n - self.rest_length) ** 2 / (2 * BOLTZMANN * T_c)
+
     def rate(self, phi: Expression, n_c: Expression, g_n: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
-        factor = GapFactor(stiffness=self.stiffness, rest_length=self.rest_length)
-        return n_c * scaled_exp(self.k_on, factor.log_factor(g_n, T_c)) * (1 - phi)
+        return n_c * scaled_exp(self.k_on, self.log_on(g_n, T_c)) * (1 - phi)

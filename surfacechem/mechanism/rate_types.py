@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import inspect
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, field, fields, replace
 from functools import cache
-from typing import cast
+from typing import Any, ClassVar, cast
 
-from surfacechem.contracts.terms import RateFactor, parameter, reads
+from surfacechem.contracts.terms import RateLaw, RateType, parameter, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, log, log_fraction, log_sum, where
 from surfacechem.laws import bonds
@@ -20,23 +21,35 @@ from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 PREFIX = "interface-"
 
 
-class LoadedReaction(InterfaceArrhenius, RateFactor):
-    """A surface reaction whose Arrhenius coefficient is multiplied by the factor of a load, which subclasses add.
+class LoadedReaction(InterfaceArrhenius):
+    """A surface reaction whose Arrhenius coefficient a load changes as it changes a coefficient of a law of bonds.
 
-    What the factor calls ``f`` is the force on the bond of this reaction.
+    What the law calls ``f`` is the force on the bond of this reaction. Subclasses are made by :func:`_loaded`.
     """
-
-    formula = "rate"
-    contract = "bonding"
 
     kind = ""
     native = False
+    law: ClassVar[type[RateLaw]]
+    rate_type: ClassVar[RateType]
 
     @classmethod
     def own_keys(cls) -> dict[str, str]:
-        """Keys of the reaction in a mechanism file: the parameters of the factor."""
-        arrhenius = dict(InterfaceArrhenius.specs())
-        return {name.replace("_", "-"): name for name, _ in cls.specs() if name not in arrhenius}
+        """Keys of the reaction in a mechanism file: the parameters of the law, but for its rate constants."""
+        return {name.replace("_", "-"): name for name in (*cls.rate_type.renamed, *cls.rate_type.names)}
+
+    @property
+    def stated(self) -> RateLaw:
+        """The law with the numbers of this reaction, and a rate constant of one."""
+        names = {name: name for name in self.rate_type.names} | dict(self.rate_type.renamed)
+        own = {name: getattr(self, own) for own, name in names.items()}
+        values: dict[str, Any] = {**self.rate_type.constants, **own}
+        return self.law(**values)
+
+    @property
+    def log_factor(self) -> Callable[..., Expression]:
+        """Logarithm of what the load does to the coefficient."""
+        factor: Callable[..., Expression] = getattr(self.stated, self.rate_type.factor)
+        return factor
 
     @property
     def load(self) -> str:
@@ -46,18 +59,19 @@ class LoadedReaction(InterfaceArrhenius, RateFactor):
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Those of the factor."""
-        return {self.load if name == "f" else name: limits for name, limits in super().ranges.items()}
+        """Those of the law."""
+        return {self.load if name == "f" else name: limits for name, limits in self.stated.ranges.items()}
 
     @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """Those of the factor."""
-        return {self.load if name == "f" else name: top for name, top in super().peaks.items()}
+    def peaks(self) -> Mapping[str, Expression | Sequence[Expression]]:
+        """Those of the law."""
+        return {self.load if name == "f" else name: top for name, top in self.stated.peaks.items()}
 
     @property
     def distance(self) -> Expression | None:
         """That to the transition state, under a force that is not the bond's own."""
-        return self.work_distance if self.load == "f" else None
+        known = self.rate_type.distance and self.load == "f"
+        return vars(self.stated)[self.rate_type.distance] if known else None
 
     def own_reads(self) -> tuple[str, ...]:
         """Coverages, and the force or the gap."""
@@ -66,8 +80,32 @@ class LoadedReaction(InterfaceArrhenius, RateFactor):
 
     def exponent(self, values: Mapping[str, Expression]) -> Expression:
         """Exponent of the rate coefficient with that of the load."""
-        arguments = {name: values[self.load if name == "f" else name] for name in reads(self.log_factor)}
-        return super().exponent(values) + self.log_factor(**arguments)
+        log_factor = self.log_factor
+        arguments = {name: values[self.load if name == "f" else name] for name in reads(log_factor)}
+        return super().exponent(values) + log_factor(**arguments)
+
+
+def _loaded(law: type[RateLaw], rate_type: RateType) -> type[LoadedReaction]:
+    """The reaction of a rate type: its parameters are fields of the law, its documentation that of the factor."""
+    given = {item.name: item for item in fields(law)}
+    own: dict[str, Any] = {}
+    for name, source in (*rate_type.renamed.items(), *zip(rate_type.names, rate_type.names, strict=True)):
+        spec, default = given[source].metadata["spec"], given[source].default
+        if spec.unit == "1/s":
+            spec = replace(spec, unit="1", text=f"{spec.text}, over the rate constant")
+        own[name] = field(default=MISSING if name in rate_type.renamed else default, metadata={"spec": spec})
+    text = inspect.getdoc(getattr(law, rate_type.factor)) or ""
+    namespace = {
+        "__doc__": text.partition("\n\n>>>")[0],  # the worked number is that of the law
+        "__module__": __name__,
+        "__annotations__": dict.fromkeys(own, float),
+        "kind": PREFIX + rate_type.name,
+        "law": law,
+        "rate_type": rate_type,
+        **own,
+    }
+    name = "Interface" + rate_type.name.replace("-", " ").title().replace(" ", "")
+    return cast(type[LoadedReaction], type(name, (LoadedReaction,), namespace))
 
 
 class AffinityReaction(InterfaceArrhenius):
@@ -192,20 +230,16 @@ class InterfaceKamalSourour(InterfaceArrhenius):
 
 @cache
 def kinds() -> dict[str, type[InterfaceArrhenius]]:
-    """Every rate type that is lowered, by Cantera's name: those of this module, and one for each factor of a load."""
+    """Every rate type that is lowered, by Cantera's name: those of this module, and those of bonds under load."""
     known: list[type[InterfaceArrhenius]] = [
         InterfaceArrhenius,
         InterfaceLinearAffinity,
         InterfaceExponentialAffinity,
         InterfaceKamalSourour,
     ]
-    for factor in vars(bonds).values():
-        if inspect.isclass(factor) and issubclass(factor, RateFactor) and factor is not RateFactor:
-            text = inspect.getdoc(factor) or ""
-            words = text.partition("\n\n>>>")[0]  # the worked number is that of the factor
-            own = {"kind": PREFIX + factor.rate_type, "__doc__": words, "__module__": __name__}
-            name = f"Interface{factor.__name__.removesuffix('Factor')}"
-            known.append(cast(type[InterfaceArrhenius], type(name, (LoadedReaction, factor), own)))
+    for law in vars(bonds).values():
+        if inspect.isclass(law) and issubclass(law, RateLaw):
+            known.extend(_loaded(law, rate_type) for rate_type in law.rate_types)
     return {law.kind: law for law in known}
 
 

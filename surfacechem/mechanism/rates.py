@@ -1,7 +1,8 @@
 """Rates of surface reactions: mass action whose reverse follows from the thermo, and Cantera's Arrhenius coefficient.
 
-The other rate types are in :mod:`surfacechem.mechanism.rate_types`. A factor of load in :mod:`surfacechem.laws.bonds`
-is one by its ``rate_type``; any other is a subclass with Cantera's name of the type as ``kind`` and a ``coefficient``.
+The other rate types are in :mod:`surfacechem.mechanism.rate_types`. What load does in a law of
+:mod:`surfacechem.laws.bonds` is one by the law's ``rate_types``; any other is a subclass with Cantera's name as
+``kind`` and a ``coefficient``.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import tables_bonds as tables
 from tables import read
 from test_tables import errors, solved
 
-from surfacechem.laws.bonds import Bell, BellFactor
+from surfacechem.laws.bonds import Bell
 from surfacechem.laws.loading import Hold
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
@@ -91,11 +91,11 @@ def test_largest_load_that_rebinding_bonds_carry(row):
 def test_rates_beyond_what_a_double_holds(row):
     p, columns = read("x03_bell_overflow")
     force = columns["Fx_over_kT"][row] * BOLTZMANN * p["T"] / p["x"]
-    log_rate = math.log(p["k0"]) + BellFactor(x_beta=p["x"]).log_factor(f=force, T_c=p["T"])
+    law = Bell(k_off=p["k0"], x_off=p["x"])
+    log_rate = math.log(p["k0"]) + law.log_off(f=force, T_c=p["T"])
     assert log_rate == pytest.approx(columns["ln_rate"][row], rel=1e-14)
     hazard = math.exp(min(log_rate + math.log(1e-300), 700.0))
     assert math.exp(-hazard) == pytest.approx(columns["S_at_1e-300_s"][row], rel=1e-6, abs=1e-300)
-    law = Bell(k_off=p["k0"], x_off=p["x"])
     scene = tables.isothermal(law, {"f": Hold(level=force)}, T=p["T"])
     trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1e-3, 1.0]))
     assert trajectory.status == "finished", trajectory.reason
