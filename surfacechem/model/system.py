@@ -371,6 +371,21 @@ class System:
         """The named quantities that go into the dataset."""
         return tuple(item for item in self.named if item.output)
 
+    @cached_property
+    def state_columns(self) -> dict[str, int]:
+        """Columns of the states, by name."""
+        return {state.name: j for j, state in enumerate(self.states)}
+
+    @cached_property
+    def output_columns(self) -> dict[str, int]:
+        """Columns of the named quantities of the dataset, by name."""
+        return {item.name: j for j, item in enumerate(self.outputs)}
+
+    @cached_property
+    def paths_by_symbol(self) -> dict[str, str]:
+        """Paths of the parameters, by the names of their symbols."""
+        return {str(parameter.symbol): parameter.path for parameter in self.parameters}
+
     def reason(self, margin: Margin, inputs: Array) -> str:
         """Why a margin closed, at the arguments of compiled functions there."""
         if margin.below is None:

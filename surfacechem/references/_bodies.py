@@ -6,56 +6,46 @@ temperature. Source: Sauer, Duong & Mandadapu (2021), quadratic model; Callen (1
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from fractions import Fraction
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Parameters, Reference, SceneView
+from surfacechem.references.base import Array, Reference, read
 
 
-class EnergyModel(ABC):
-    """Energy and entropy of a capacity `C` as functions of temperature; both are zero at `T_0`."""
+class QuadraticEnergy:
+    r""":math:`U=\frac{C}{2T_0}(T^2-T_0^2)`, :math:`S=C\,(T/T_0-1)`, capacity :math:`C\,T/T_0`; both zero at T_0."""
 
-    @abstractmethod
     def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
         """Temperature rise above `T_i` when `energy` is added."""
-
-    @abstractmethod
-    def energy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Energy at the temperature `T_0 + excess`."""
-
-    @abstractmethod
-    def entropy(self, excess: Array, C: float, T_0: float) -> Array:
-        """Entropy at the temperature `T_0 + excess`."""
-
-
-class QuadraticEnergy(EnergyModel):
-    r""":math:`U=\frac{C}{2T_0}(T^2-T_0^2)`, :math:`S=C\,(T/T_0-1)`, capacity :math:`C\,T/T_0`."""
-
-    def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
         difference_of_squares = 2.0 * T_0 * energy / C
         return np.asarray(difference_of_squares / (T_i + np.sqrt(T_i**2 + difference_of_squares)))
 
     def energy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Energy at the temperature `T_0 + excess`."""
         return C * excess * (1.0 + excess / (2.0 * T_0))
 
     def entropy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Entropy at the temperature `T_0 + excess`."""
         return C * excess / T_0
 
 
-class ConstantCapacity(EnergyModel):
+class ConstantCapacity:
     r""":math:`U=C\,(T-T_0)`, :math:`S=C\ln(T/T_0)`."""
 
     def rise(self, energy: Array, C: float, T_0: float, T_i: float) -> Array:
+        """Temperature rise above `T_i` when `energy` is added."""
         return energy / C
 
     def energy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Energy at the temperature `T_0 + excess`."""
         return C * excess
 
     def entropy(self, excess: Array, C: float, T_0: float) -> Array:
+        """Entropy at the temperature `T_0 + excess`."""
         return np.asarray(C * np.log1p(excess / T_0))
 
 
@@ -67,16 +57,14 @@ class PerfectContact(Reference):
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the interface at T_0", default=0.0, at_least=0)
     T_0: float = parameter("K", "reference temperature", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {name: scene.constant(name) for name in ("C_1", "C_2", "C_c", "T_0")}
+    told = read(constant="C_1 C_2 C_c T_0")
 
-    @property
+    @cached_property
     def C(self) -> float:
         """Total heat capacity at T_0."""
         return float(self.exact_capacity)
 
-    @property
+    @cached_property
     def exact_capacity(self) -> Fraction:
         """Total heat capacity at T_0 without rounding."""
         return Fraction(self.C_1) + Fraction(self.C_2) + Fraction(self.C_c)
@@ -85,15 +73,13 @@ class PerfectContact(Reference):
 class UniformBody(Reference):
     """Bodies and interface at one temperature; quadratic energies, if a subclass has no other model."""
 
-    model: ClassVar[EnergyModel] = QuadraticEnergy()
+    model: ClassVar[QuadraticEnergy] = QuadraticEnergy()
 
     C: float = parameter("J/(m^2 K)", "total heat capacity at T_0", above=0)
     T_0: float = parameter("K", "reference temperature", above=0)
     T_i: float = parameter("K", "initial temperature", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {"C": scene.capacity, "T_0": scene.constant("T_0"), "T_i": scene.temperature}
+    told = read(constant="T_0", capacity="C", temperature="T_i")
 
     def heated(self, heat: Array) -> Array:
         """Temperature [K] after a supply of heat [J/m^2]."""
@@ -105,6 +91,4 @@ class FrictionallyHeated(UniformBody):
 
     D_0: float = parameter("W/m^2", "dissipation at T_0", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "D_0": scene.heating_at_T_0}
+    told = read(heating_at_T_0="D_0")

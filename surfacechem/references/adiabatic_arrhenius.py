@@ -10,7 +10,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._numerics import increasing_root, scaled_Ei, short_integral
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class AdiabaticArrhenius(Reference):
@@ -37,10 +37,7 @@ class AdiabaticArrhenius(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     delta_T: float = parameter("K", "adiabatic temperature rise of the complete reaction", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.reaction(name) for name in ("A", "E_a")}
-        return {**own, "T_i": scene.temperature, "delta_T": scene.adiabatic_rise}
+    told = read(reaction="A E_a", temperature="T_i", adiabatic_rise="delta_T")
 
     @property
     def initial_rate(self) -> float:

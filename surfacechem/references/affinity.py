@@ -6,7 +6,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class LinearAffinitySolution(Reference):
@@ -30,11 +30,7 @@ class LinearAffinitySolution(Reference):
     phi_eq: float = parameter("1", "equilibrium bonding state", at_least=0, at_most=1)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        sites = {"n_c": scene.constant("N_c"), "c_r": scene.reaction("c_r")}
-        bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
-        return {**sites, **bonds}
+    told = read(constant="n_c=N_c", reaction="c_r", potential="phi_eq K_c=K_0", initial="phi_i=phi")
 
     def quantities(self, t: Array) -> Quantities:
         relaxation, distance = self.c_r * self.K_c / self.n_c, self.phi_eq - self.phi_i
@@ -73,11 +69,7 @@ class ExponentialAffinitySolution(Reference):
     phi_eq: float = parameter("1", "equilibrium bonding state", default=1.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        sites = {"n_c": scene.constant("N_c"), "C_r": scene.reaction("C_r"), "T": scene.temperature}
-        bonds = {"K_c": scene.potential("K_0"), "phi_eq": scene.potential("phi_eq"), "phi_i": scene.initial("phi")}
-        return {**sites, **bonds}
+    told = read(constant="n_c=N_c", reaction="C_r", potential="phi_eq K_c=K_0", initial="phi_i=phi", temperature="T")
 
     def quantities(self, t: Array) -> Quantities:
         steepness = self.K_c / (self.n_c * BOLTZMANN * self.T)  # affinity in k_B T per distance of phi from equilibrium

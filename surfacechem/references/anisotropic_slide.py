@@ -8,7 +8,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 from surfacechem.tolerances import DIGITS
 
 NEWTON = 100
@@ -41,15 +41,7 @@ class AnisotropicSlide(UniformBody):
     v_i: float = parameter("m/s", "initial velocity", above=0)
     v_2_i: float = parameter("m/s", "initial velocity across it")
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {
-            "m": scene.support("tangential", "m"),
-            **{name: scene.friction(name) for name in ("mu_1", "mu_2")},
-            **{f"{name}_i": scene.initial(name) for name in ("v", "v_2")},
-            "p": scene.initial("p"),
-            **super().from_scene(scene),
-        }
+    told = read(tangential="m", friction="mu_1 mu_2", initial="p v_i=v v_2_i=v_2")
 
     @property
     def stop_time(self) -> float:

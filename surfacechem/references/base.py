@@ -20,7 +20,7 @@ from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references.scene_view import SceneView
 
-__all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView"]
+__all__ = ["Array", "Parameters", "Quantities", "Reference", "SceneView", "read"]
 
 Array: TypeAlias = NDArray[np.float64]
 Parameters: TypeAlias = Mapping[str, float | None]
@@ -28,6 +28,21 @@ Parameters: TypeAlias = Mapping[str, float | None]
 
 Quantities: TypeAlias = Mapping[str, Array | float]
 """Exact values by the names of the dataset; what does not change in time may be one number."""
+
+
+def read(**readings: str) -> dict[str, tuple[str, str]]:
+    """How parameters are read off a scene: by which reading of the :class:`SceneView`, and what it is called there.
+
+    >>> read(friction="mu", initial="p phi_i=phi", temperature="T_i")["phi_i"]
+    ('initial', 'phi')
+    """
+    told = {}
+    for reading, names in readings.items():
+        assert hasattr(SceneView, reading), reading
+        for name in names.split():
+            ours, _, theirs = name.partition("=")
+            told[ours] = (reading, theirs or ours)
+    return told
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
@@ -39,9 +54,12 @@ class Reference(ABC):
     continuous: ClassVar[bool] = False
     """True if it solves for bodies without cells: a scene then meets it but for the error of its cells, and
     `from_scene` alone tells whether it is the scene's."""
+    told: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    """How its parameters are read off a scene, those of its bases among them."""
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
+        cls.told = {name: how for kind in cls.__mro__[::-1] for name, how in vars(kind).get("told", {}).items()}
         cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__.removesuffix("Solution")).lower()
         dataclass(frozen=True, kw_only=True)(cls)
 
@@ -51,12 +69,12 @@ class Reference(ABC):
             item.metadata["spec"].check(f"{self.name}: {item.name}", getattr(self, item.name))
 
     @classmethod
-    @abstractmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         """The parameters that the solution has in a scene; InputError, which says why, if it cannot be the scene's.
 
-        That it is the scene's is then tested on the scene's equations.
+        That it is the scene's is then tested on the scene's equations. What takes several readings is added here.
         """
+        return {name: scene.read(*how) for name, how in cls.told.items()}
 
     @property
     def end_time(self) -> float:
@@ -70,11 +88,13 @@ class Reference(ABC):
             raise InputError(f"{self.name}: exact for 0 <= t <= {self.end_time!r} s only.")
         with np.errstate(all="ignore"):
             values = self.quantities(times.reshape(-1))
-        exact = {key: np.array(np.broadcast_to(value, times.size)) for key, value in values.items()}
-        for key, value in exact.items():
-            for moment in times.reshape(-1)[np.isnan(value)][:1]:
-                raise InputError(f"{self.name}: {key} has no real value at t = {moment} s.")
-        return {key: value.reshape(times.shape) for key, value in exact.items()}
+        table = np.empty((len(values), times.size))
+        for row, value in zip(table, values.values(), strict=True):
+            row[:] = value
+        if np.isnan(table).any():
+            j, moment = np.argwhere(np.isnan(table))[0]
+            raise InputError(f"{self.name}: {list(values)[j]} has no real value at t = {times.flat[moment]} s.")
+        return dict(zip(values, table.reshape(len(values), *times.shape), strict=True))
 
     def profile(self, number: int, x: Array, t: Array) -> Array:
         """Temperatures of body 1 or 2 at distances from the contact [m], shape (times, places), if it is continuous."""

@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.references._numerics import scaled_expint
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class BellBond(Reference):
@@ -22,10 +22,7 @@ class BellBond(Reference):
     T: float = parameter("K", "temperature", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=1.0, above=0, at_most=1)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.reaction(name) for name in ("k_off", "x_off")}
-        return {**own, "T": scene.temperature, "phi_i": scene.initial("phi")}
+    told = read(reaction="k_off x_off", initial="phi_i=phi", temperature="T")
 
     @property
     def force_scale(self) -> float:
@@ -50,9 +47,7 @@ class BellConstantForce(BellBond):
 
     f: float = parameter("N", "force per bond")
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "f": scene.initial("f")}
+    told = read(initial="f")
 
     @property
     def log_rate(self) -> float:
@@ -89,9 +84,7 @@ class BellRamp(BellBond):
 
     rate: float = parameter("N/s", "loading rate", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "rate": scene.ramp("f")}
+    told = read(ramp="rate=f")
 
     @property
     def severity(self) -> float:

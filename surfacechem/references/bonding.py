@@ -11,9 +11,9 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.quantities import GAS_CONSTANT
-from surfacechem.references._bodies import EnergyModel, PerfectContact, QuadraticEnergy
+from surfacechem.references._bodies import PerfectContact, QuadraticEnergy
 from surfacechem.references._numerics import first_difference, scaled_expint, short_integral
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 
 class Bonding(PerfectContact):
@@ -43,7 +43,7 @@ class Bonding(PerfectContact):
     '295.841884102745'
     """
 
-    model: ClassVar[EnergyModel] = QuadraticEnergy()
+    model: ClassVar[QuadraticEnergy] = QuadraticEnergy()
 
     T_i: float = parameter("K", "initial temperature", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
@@ -53,11 +53,9 @@ class Bonding(PerfectContact):
     tau: float = parameter("s", "relaxation time of bonding", above=0)
     D: float = parameter("W/m^2", "friction power, traction times sliding velocity", default=0.0, at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        bonds = {name: scene.potential(name) for name in ("K_0", "K_1", "K_2")}
-        start = {"T_i": scene.temperature, "phi_i": scene.initial("phi"), "tau": scene.relaxation_time}
-        return {**super().from_scene(scene), **bonds, **start, "D": scene.friction_power()}
+    told = read(
+        potential="K_0 K_1 K_2", initial="phi_i=phi", temperature="T_i", relaxation_time="tau", friction_power="D"
+    )
 
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""
@@ -128,9 +126,7 @@ class ExothermicBonding(PerfectContact):
     K_0: float = parameter("J/m^2", "bond energy density", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "K_0": scene.potential("K_0"), "tau": scene.relaxation_time}
+    told = read(potential="K_0", relaxation_time="tau")
 
     def quantities(self, t: Array) -> Quantities:
         kappa = self.K_0 / (self.T_0 * self.C)
@@ -163,9 +159,7 @@ class EndothermicBonding(PerfectContact):
     K_2: float = parameter("J/m^2", "bond energy density at T_0", at_least=0)
     tau: float = parameter("s", "relaxation time of bonding", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "K_2": scene.potential("K_2"), "tau": scene.relaxation_time}
+    told = read(potential="K_2", relaxation_time="tau")
 
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""
@@ -261,11 +255,7 @@ class FrictionIgnitedBonding(Reference):
     D: float = parameter("W/m^2", "friction power", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.reaction(name) for name in ("A", "E_a")}
-        heat = {"T_i": scene.temperature, "C": scene.capacity, "D": scene.friction_power()}
-        return {**own, **heat, "phi_i": scene.initial("phi")}
+    told = read(reaction="A E_a", initial="phi_i=phi", temperature="T_i", capacity="C", friction_power="D")
 
     def quantities(self, t: Array) -> Quantities:
         heating, T_E = self.D / self.C, self.E_a / GAS_CONSTANT

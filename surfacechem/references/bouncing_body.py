@@ -8,7 +8,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 
 
 class BouncingBody(UniformBody):
@@ -32,11 +32,7 @@ class BouncingBody(UniformBody):
     g_n_i: float = parameter("m", "initial gap", at_least=0)
     v_n_i: float = parameter("m/s", "initial opening velocity")
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.support("normal", name) for name in ("m", "e")}
-        start = {"F_n": scene.initial("F_n"), "g_n_i": scene.initial("g_n"), "v_n_i": scene.initial("v_n")}
-        return {**own, **start, **super().from_scene(scene)}
+    told = read(normal="m e", initial="F_n g_n_i=g_n v_n_i=v_n")
 
     @property
     def _fall(self) -> tuple[float, float]:

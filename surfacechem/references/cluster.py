@@ -18,7 +18,7 @@ from surfacechem.references._numerics import (
     scaled_expint,
     short_integral,
 )
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 from surfacechem.references.bell import BellBond
 
 FAR = 0.1
@@ -31,9 +31,7 @@ class Cluster(BellBond):
     n_c: float = parameter("1/m^2", "density of bonding sites", above=0)
     t_n: float = parameter("Pa", "tensile traction", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "n_c": scene.constant("N_c"), "t_n": scene.initial("t_n")}
+    told = read(constant="n_c=N_c", initial="t_n")
 
     @property
     def load(self) -> float:
@@ -144,9 +142,7 @@ class RebindingCluster(Cluster):
 
     k_on: float = parameter("1/s", "rate at which free sites bond", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "k_on": scene.reaction("k_on")}
+    told = read(reaction="k_on")
 
     @property
     def critical_load(self) -> float:

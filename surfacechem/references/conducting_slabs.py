@@ -116,7 +116,7 @@ class ConductingSlabs(Reference):
     def from_scene(cls, scene: SceneView) -> Parameters:
         for reason in _beside_conduction(scene.scene):
             raise InputError(f"it knows conduction between two bodies alone, and {reason}.")
-        h = scene.conductance()
+        h = scene.total_conductance
         return {"R": 1.0 / h if h else None, **_of_body(scene, 1), **_of_body(scene, 2)}
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 
 
 class CoulombStop(UniformBody):
@@ -29,10 +29,7 @@ class CoulombStop(UniformBody):
     p: float = parameter("Pa", "contact pressure", above=0)
     v_i: float = parameter("m/s", "initial velocity", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {"m": scene.support("tangential", "m"), "mu": scene.friction("mu")}
-        return {**own, "p": scene.initial("p"), "v_i": scene.initial("v"), **super().from_scene(scene)}
+    told = read(tangential="m", friction="mu", initial="p v_i=v")
 
     @property
     def stop_time(self) -> float:

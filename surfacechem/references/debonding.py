@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._bodies import UniformBody
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 
 class SuddenDebonding(UniformBody):
@@ -40,7 +40,7 @@ class SuddenDebonding(UniformBody):
     def from_scene(cls, scene: SceneView) -> Parameters:
         loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.limit("t_max")
         bonds = {"K_0": scene.potential("K_0"), "phi_i": scene.initial("phi")}
-        return {**super().from_scene(scene), **bonds, "t_n": loaded, "k": scene.support("normal", "k")}
+        return {**super().from_scene(scene), **bonds, "t_n": loaded, "k": scene.normal("k")}
 
     @property
     def traction(self) -> float:
@@ -96,9 +96,7 @@ class PulledToDebonding(SuddenDebonding):
 
     w_dot: float = parameter("m/s", "speed of the far field", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "w_dot": scene.ramp("w_n")}
+    told = read(ramp="w_dot=w_n")
 
     @property
     def debonding_time(self) -> float:
@@ -147,10 +145,7 @@ class BilinearDebonding(Reference):
     g_1: float = parameter("m", "gap at which it is first closed again", at_least=0)
     speed: float = parameter("m/s", "speed of the gap", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.reaction(name) for name in ("t_max", "E_b", "g_f")}
-        return {**own, "H_r": scene.potential("H_r")}
+    told = read(reaction="t_max E_b g_f", potential="H_r")
 
     def __post_init__(self) -> None:
         """Refuse a line that does not fall."""

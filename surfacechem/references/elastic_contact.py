@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class ElasticContact(Reference):
@@ -27,10 +27,7 @@ class ElasticContact(Reference):
     w_i: float = parameter("m", "initial far-field displacement")
     w_dot: float = parameter("m/s", "speed of the far field", default=0.0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {"k": scene.support("normal", "k"), "E_n": scene.potential("E_n")}
-        return {**own, "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
+    told = read(normal="k", potential="E_n", initial="w_i=w_n", ramp="w_dot=w_n")
 
     def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t

@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
 from surfacechem.references._numerics import increasing_root, second_difference
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class PairExchange(Reference):
@@ -45,10 +45,7 @@ class PairExchange(Reference):
     T_1: float = parameter("K", "initial temperature of body 1", above=0)
     T_2: float = parameter("K", "initial temperature of body 2", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        bodies = {name: scene.constant(name) for name in ("C_1", "C_2", "T_0")}
-        return {**bodies, "h": scene.conductance(), "T_1": scene.initial("T_1"), "T_2": scene.initial("T_2")}
+    told = read(constant="C_1 C_2 T_0", initial="T_1 T_2", total_conductance="h")
 
     @property
     def equilibrium_temperature(self) -> float:
@@ -108,9 +105,7 @@ class ReservoirExchange(UniformBody):
     h: float = parameter("W/(m^2 K)", "conductance to the reservoir", at_least=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "h": scene.conductance(), "T_a": scene.surroundings_temperature}
+    told = read(total_conductance="h", surroundings_temperature="T_a")
 
     def quantities(self, t: Array) -> Quantities:
         relative, distance = self.T_i / self.T_a, self.T_a - self.T_i

@@ -7,7 +7,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import FrictionallyHeated, UniformBody
 from surfacechem.references._numerics import first_difference, increasing_root, second_difference
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, SceneView, read
 
 
 class ThinningFilm(FrictionallyHeated):
@@ -31,9 +31,7 @@ class ThinningFilm(FrictionallyHeated):
 
     beta: float = parameter("1/K", "decay of the viscosity per kelvin", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "beta": scene.friction("beta")}
+    told = read(friction="beta")
 
     def quantities(self, t: Array) -> Quantities:
         initial = self.D_0 * np.exp(-self.beta * (self.T_i - self.T_0))

@@ -7,7 +7,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import UniformBody
 from surfacechem.references._numerics import increasing_root
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 
 
 class IsentropicCohesiveOpening(UniformBody):
@@ -31,10 +31,7 @@ class IsentropicCohesiveOpening(UniformBody):
     g_i: float = parameter("m", "initial gap", default=0.0, at_least=0)
     g_dot: float = parameter("m/s", "opening speed", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
-        return {**zone, **super().from_scene(scene), "g_i": scene.initial("g_n"), "g_dot": scene.ramp("g_n")}
+    told = read(potential="t_max g_0", initial="g_i=g_n", ramp="g_dot=g_n")
 
     @property
     def open_temperature(self) -> float:

@@ -10,7 +10,7 @@ from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.references._numerics import Separable
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class KamalCureConstantCapacity(Reference):
@@ -39,10 +39,7 @@ class KamalCureConstantCapacity(Reference):
     delta_T: float = parameter("K", "heat of reaction over the heat capacity at T_0", default=0.0, at_least=0)
     phi_i: float = parameter("1", "initial degree of cure", default=0.0, at_least=0, at_most=1)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.reaction(name) for name in ("A_1", "E_1", "A_2", "E_2", "m", "n")}
-        return {**own, "T_i": scene.temperature, "delta_T": scene.adiabatic_rise, "phi_i": scene.initial("phi")}
+    told = read(reaction="A_1 E_1 A_2 E_2 m n", initial="phi_i=phi", temperature="T_i", adiabatic_rise="delta_T")
 
     def __post_init__(self) -> None:
         """Refuse what cannot start."""

@@ -12,7 +12,7 @@ from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._bodies import UniformBody
 from surfacechem.references._numerics import increasing_root
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 from surfacechem.references.semenov_fold import scaled_rise
 
 GRID = 200
@@ -43,10 +43,7 @@ class SpringAndZone(Reference):
     g_0: float = parameter("m", "gap at the strength", above=0)
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        zone = {name: scene.potential(name) for name in ("t_max", "g_0")}
-        return {**zone, "k": scene.support("normal", "k")}
+    told = read(potential="t_max g_0", normal="k")
 
     @property
     def severity(self) -> float:
@@ -121,9 +118,7 @@ class CohesivePullOff(SpringAndZone):
     w_i: float = parameter("m", "initial far-field displacement", default=0.0, at_least=0)
     w_dot: float = parameter("m/s", "speed of the far field", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "w_i": scene.initial("w_n"), "w_dot": scene.ramp("w_n")}
+    told = read(initial="w_i=w_n", ramp="w_dot=w_n")
 
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
@@ -173,10 +168,6 @@ class CohesivePullOffHeating(CohesivePullOff, UniformBody):
     '433.274971584'
     """
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), **UniformBody.from_scene(scene)}
-
     def quantities(self, t: Array) -> Quantities:
         mechanics = super().quantities(t)
         return {**mechanics, "T": self.heated(np.asarray(mechanics["heat"]))}
@@ -206,7 +197,7 @@ class OverdampedPullOff(SpringAndZone):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        dampers = [c for c in (scene.support("normal", name) for name in ("c_b", "c_g")) if c is not None]
+        dampers = [c for c in (scene.normal(name) for name in ("c_b", "c_g")) if c is not None]
         return {**super().from_scene(scene), "c": sum(dampers) if dampers else None, "g_i": scene.initial("g_n")}
 
     @property

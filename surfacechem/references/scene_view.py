@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -22,14 +22,21 @@ class SceneView:
     """
 
     def __init__(self, scene: Scene, run: Trajectory) -> None:
-        self.scene, self.run = scene, run
-        self._parameters = {str(p.symbol): run.values[p.path] for p in run.model.system.parameters}
-        self._states = {state.name: state.from_given(run.values) for state in run.model.system.states}
+        self.scene, self.run, self._system = scene, run, run.model.system
+
+    @cached_property
+    def _states(self) -> dict[str, float]:
+        return {state.name: state.from_given(self.run.values) for state in self._system.states}
 
     @cached_property
     def _outputs(self) -> dict[str, float]:
-        names = (item.name for item in self.run.model.system.outputs)
-        return dict(zip(names, self.run.outputs[0], strict=True))
+        return dict(zip(self._system.output_columns, self.run.outputs[0].tolist(), strict=True))
+
+    def read(self, reading: str, name: str) -> float | None:
+        """What one of the readings below tells, of a name if it asks for one."""
+        found = getattr(self, reading)
+        told: float | None = found(name) if callable(found) else found
+        return told
 
     # -- laws, loads, supports -----------------------------------------------------------------------------------------
 
@@ -58,46 +65,55 @@ class SceneView:
         found = [self.run.values[f"{path}.{name}"] for path in paths if f"{path}.{name}" in self.run.values]
         return found[0] if len(found) == 1 else None
 
-    def ramp(self, variable: str) -> float | None:
+    def ramp(self, name: str) -> float | None:
         """The constant rate at which a variable is driven, in its unit per second."""
-        return self.run.values.get(f"loading.{variable}.ramp.rate")
+        return self.run.values.get(f"loading.{name}.ramp.rate")
 
-    def support(self, direction: str, name: str) -> float | None:
-        """A constant of what supports the bodies in the direction 'normal' or 'tangential'."""
-        return self.run.values.get(f"mechanics.{direction}.{name}")
+    def normal(self, name: str) -> float | None:
+        """A constant of what supports the bodies along the normal."""
+        return self.run.values.get(f"mechanics.normal.{name}")
 
-    def conductance(self, into: int | None = None) -> float | None:
-        """Sum of the conductances of all heat paths, or of those between the interface and body 1 or 2 [W/(m^2 K)].
+    def tangential(self, name: str) -> float | None:
+        """A constant of what supports the bodies along the interface."""
+        return self.run.values.get(f"mechanics.tangential.{name}")
 
-        None if there is no path, or one has no constant h.
-        """
-        ends = {"interface", self.scene.bodies[into - 1].name} if into else None
-        chosen = [law for law in self.scene.heat if ends is None or set(law.between) == ends]
-        found = [self.run.values.get(f"{law.path}.h") for law in chosen]
+    def conductance(self, into: str) -> float | None:
+        """Sum of the conductances between the interface and body '1' or '2' [W/(m^2 K)]."""
+        ends = {"interface", self.scene.bodies[int(into) - 1].name}
+        return self._sum([law for law in self.scene.heat if set(law.between) == ends])
+
+    @property
+    def total_conductance(self) -> float | None:
+        """Sum of the conductances of all heat paths [W/(m^2 K)]."""
+        return self._sum(self.scene.heat)
+
+    def _sum(self, paths: Sequence[Law]) -> float | None:
+        """Sum of the conductances of heat paths; None if there is no path, or one has no constant h."""
+        found = [self.run.values.get(f"{law.path}.h") for law in paths]
         return sum(h for h in found if h is not None) if found and None not in found else None
 
     # -- bodies and sites ----------------------------------------------------------------------------------------------
 
     def constant(self, name: str) -> float | None:
         """A constant of bodies or sites by its symbol: C_1, C_2, C_c, T_0, N_c, N_1, N_2, thickness_1, ..."""
-        return self._parameters.get(name)
+        path = self._system.paths_by_symbol.get(name)
+        return None if path is None else self.run.values[path]
 
     @property
     def capacity(self) -> float:
         """Sum of all heat capacities at T_0 [J/(m^2 K)]."""
-        return sum(value for name, value in self._parameters.items() if name in ("C_1", "C_2", "C_c"))
+        return sum(self.constant(name) or 0.0 for name in ("C_1", "C_2", "C_c"))
 
     @property
     def temperature(self) -> float | None:
         """The first temperature that evolves, or that of the interface [K]."""
-        names = [state.name for state in self.run.model.system.states if state.quantity.unit == "K"]
-        return self._states[names[0]] if names else self._outputs.get("T_c")
+        own = next((state.name for state in self._system.states if state.is_temperature), "T_c")
+        return self.initial(own)
 
     @property
     def surroundings_temperature(self) -> float | None:
         """Temperature of the surroundings, else of a body that is held at one [K]."""
-        names = [name for name in ("T_a", "T_2", "T_1") if name in self._outputs]
-        return self._outputs[names[0]] if names else None
+        return next((self._outputs[name] for name in ("T_a", "T_2", "T_1") if name in self._outputs), None)
 
     @property
     def adiabatic_rise(self) -> float | None:
@@ -114,8 +130,8 @@ class SceneView:
     @property
     def bonding_rate(self) -> float | None:
         """Initial rate of the bonding state [1/s]."""
-        names = [state.name for state in self.run.model.system.states]
-        return float(self.run.rates[0, names.index("phi")]) if "phi" in names else None
+        column = self._system.state_columns.get("phi")
+        return None if column is None else float(self.run.rates[0, column])
 
     @property
     def relaxation_time(self) -> float | None:
@@ -127,17 +143,15 @@ class SceneView:
         equilibrium = self.potential("phi_eq")
         return ((1.0 if equilibrium is None else equilibrium) - self._states["phi"]) / self.bonding_rate
 
-    def friction_power(self, temperature: float | None = None) -> float:
-        """Power of all friction [W/m^2], at the start or with every temperature set to one value."""
-        names = [account.quantity.name for account in self.run.model.system.ledger]
-        laws = [name[2:] for name in names if name.startswith("W_") and f"heat_{name[2:]}" in names]
-        values = self._outputs
-        if temperature is not None:
-            result = self.run.result
-            y = np.array([[value if name == "phi" else temperature for name, value in self._states.items()]])
-            at = self.run.model.evaluate(result, result.times[:1], y, np.zeros_like(y))[0]
-            values = dict(zip(values, at, strict=True))
-        return float(sum(values[f"D_{law}"] for law in laws))
+    @property
+    def friction_power(self) -> float:
+        """Power of all friction [W/m^2] at the start."""
+        return self._dissipated(self._outputs)
+
+    def _dissipated(self, outputs: Mapping[str, float]) -> float:
+        accounts = {account.quantity.name for account in self._system.ledger}
+        laws = (name[2:] for name in outputs if name.startswith("D_"))
+        return sum((outputs[f"D_{law}"] for law in laws if {f"W_{law}", f"heat_{law}"} <= accounts), 0.0)
 
     @property
     def heat_supply(self) -> float:
@@ -148,4 +162,8 @@ class SceneView:
     def heating_at_T_0(self) -> float | None:
         """Friction at the reference temperature and external heat [W/m^2]."""
         T_0 = self.constant("T_0")
-        return None if T_0 is None else self.friction_power(T_0) + self.heat_supply
+        if T_0 is None:
+            return None
+        y = np.array([[value if name == "phi" else T_0 for name, value in self._states.items()]])
+        at = self.run.model.evaluate(self.run.result, self.run.result.times[:1], y, np.zeros_like(y))[0]
+        return self._dissipated(dict(zip(self._outputs, at.tolist(), strict=True))) + self.heat_supply

@@ -43,7 +43,7 @@ class SemenovFold(Reference):
     def from_scene(cls, scene: SceneView) -> Parameters:
         decay = scene.friction("beta")  # per kelvin, of the factor of a law; here what grows is counted
         growth = None if decay is None else -decay
-        heat = {"H": scene.conductance(), "D_0": scene.heating_at_T_0}
+        heat = {"H": scene.total_conductance, "D_0": scene.heating_at_T_0}
         return {"T_0": scene.constant("T_0"), "beta": growth, **heat}
 
     def __post_init__(self) -> None:

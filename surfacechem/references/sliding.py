@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references._bodies import ConstantCapacity, EnergyModel, PerfectContact, QuadraticEnergy
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references._bodies import ConstantCapacity, PerfectContact, QuadraticEnergy
+from surfacechem.references.base import Array, Quantities, read
 
 
 class Sliding(PerfectContact):
@@ -24,14 +24,12 @@ class Sliding(PerfectContact):
     '519.6152422707'
     """
 
-    model: ClassVar[EnergyModel] = QuadraticEnergy()
+    model: ClassVar[QuadraticEnergy | ConstantCapacity] = QuadraticEnergy()
 
     T_i: float = parameter("K", "initial temperature", above=0)
     D: float = parameter("W/m^2", "friction power, traction times sliding velocity", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "T_i": scene.temperature, "D": scene.friction_power()}
+    told = read(temperature="T_i", friction_power="D")
 
     def quantities(self, t: Array) -> Quantities:
         rise = self.model.rise(self.D * t, self.C, self.T_0, self.T_i)
@@ -55,4 +53,4 @@ class SlidingConstantCapacity(Sliding):
     '600.0000000000'
     """
 
-    model: ClassVar[EnergyModel] = ConstantCapacity()
+    model: ClassVar[QuadraticEnergy | ConstantCapacity] = ConstantCapacity()

@@ -13,7 +13,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
 from surfacechem.references._numerics import increasing_root
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 CYCLES = 1_000_000
 """Cycles at most, so that a time far beyond them is refused and not waited for."""
@@ -88,7 +88,7 @@ class StickSlip(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        held = {name: scene.support("tangential", name) for name in ("m", "k")}
+        held = {name: scene.tangential(name) for name in ("m", "k")}
         mu, mu_s, p = scene.friction("mu"), scene.friction("mu_s"), scene.initial("p")
         if mu is None or p is None:
             return {**held, "V": scene.ramp("w_t")}
@@ -173,7 +173,7 @@ class BondedSlider(Reference):
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        held = {name: scene.support("tangential", name) for name in ("m", "k")}
+        held = {name: scene.tangential(name) for name in ("m", "k")}
         T, T_0 = scene.temperature, scene.constant("T_0")
         cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
         limits = {name: scene.friction(name) for name in ("mu_b", "mu_ub")}
@@ -265,9 +265,7 @@ class StickSlipRebonding(BondedSlider):
 
     tau: float = parameter("s", "time scale of bonding", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "tau": scene.relaxation_time}
+    told = read(relaxation_time="tau")
 
     @property
     def critical_speed(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._numerics import first_difference, second_difference
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class HeatedMedium(Reference):
@@ -24,12 +24,7 @@ class HeatedMedium(Reference):
     D_1: float = parameter("W/m^2", "decaying part of the source at the start", default=0.0)
     gamma: float = parameter("1/s", "decay rate of the source", default=0.0, at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        bodies = {name: scene.constant(name) for name in ("C_1", "C_2")}
-        start = {name: scene.initial(name) for name in ("T_1", "T_2")}
-        paths = {f"h_{k}": scene.conductance(into=k) for k in (1, 2)}
-        return {**bodies, **start, **paths, "D_0": scene.heating_at_T_0}
+    told = read(constant="C_1 C_2", initial="T_1 T_2", conductance="h_1=1 h_2=2", heating_at_T_0="D_0")
 
 
 class ThreeTemperatures(HeatedMedium):
@@ -55,9 +50,7 @@ class ThreeTemperatures(HeatedMedium):
     C_c: float = parameter("J/(m^2 K)", "heat capacity of the medium", above=0)
     T_c: float = parameter("K", "initial temperature of the medium", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "C_c": scene.constant("C_c"), "T_c": scene.initial("T_c")}
+    told = read(constant="C_c", initial="T_c")
 
     def quantities(self, t: Array) -> Quantities:
         zero, decay, total = np.zeros_like(t), -self.gamma * t, self.C_1 + self.C_2 + self.C_c

@@ -9,7 +9,7 @@ import numpy as np
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Quantities, Reference, read
 
 
 class VelocitySteps(Reference):
@@ -29,10 +29,7 @@ class VelocitySteps(Reference):
     t_1: float = parameter("s", "time of the first step", at_least=0)
     t_2: float = parameter("s", "time of the second step", at_least=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        own = {name: scene.friction(name) for name in ("mu_0", "a", "b", "L", "v_0")}
-        return {**own, "p": scene.initial("p"), "theta_i": scene.initial("theta"), "v_i": scene.initial("v")}
+    told = read(friction="mu_0 a b L v_0", initial="p theta_i=theta v_i=v")
 
     def __post_init__(self) -> None:
         """Refuse steps in the wrong order."""

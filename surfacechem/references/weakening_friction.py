@@ -9,7 +9,7 @@ import numpy as np
 from surfacechem.contracts.terms import parameter
 from surfacechem.references._bodies import FrictionallyHeated
 from surfacechem.references._numerics import increasing_root, short_integral
-from surfacechem.references.base import Array, Parameters, Quantities, SceneView
+from surfacechem.references.base import Array, Quantities, read
 
 
 class WeakeningFriction(FrictionallyHeated):
@@ -55,9 +55,7 @@ class WeakeningFrictionWithLoss(FrictionallyHeated):
     H: float = parameter("W/(m^2 K)", "conductance to the surroundings", above=0)
     T_a: float = parameter("K", "temperature of the surroundings", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView) -> Parameters:
-        return {**super().from_scene(scene), "H": scene.conductance(), "T_a": scene.surroundings_temperature}
+    told = read(total_conductance="H", surroundings_temperature="T_a")
 
     @property
     def steady_temperature(self) -> float:

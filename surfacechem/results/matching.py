@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,46 +56,64 @@ def exact_values(name: str, options: Mapping[str, float], scene: Scene, run: Tra
     view = SceneView(scene, run)
     reference = match(references.get(name), options, view)
     solution = partial(_solution, reference, view)
-    exact = beside_events(solution, run)
+    times = run.result.times
+    before_end = times[-1] * (1 - SIDE * np.array([2.0, 4.0]))
+    tested = len(times) > 1 and not reference.continuous  # a run that ends at its start meets no equation
+    probes, since = _probes(*_edges(run)) if tested else (np.empty(0), np.empty(0))
+    step = STEP * since
+    around = [probes + k * step for k in (-2, -1, 0, 1, 2)]
+    # All of it at once, as an exact solution costs by the call.
+    every = solution(np.concatenate([times, before_end, *around]))
+    first = len(times) + len(before_end)
+    exact = {each: values[: len(times)].copy() for each, values in every.items()}
+    _choose_sides(exact, {each: values[len(times) : first] for each, values in every.items()}, solution, run)
     if reference.continuous:
         return _with_profiles(reference, exact, scene, run)
     _check_start(exact, run)
-    check_equations(solution, run)
+    if tested:
+        near = {each: values[first:].reshape(5, -1) for each, values in every.items()}
+        _check_equations(near, run, probes, step)
     return exact
 
 
-def beside_events(solution: Solution, run: Trajectory) -> dict[str, Array]:
-    """Exact values at the output times; where one of them is that of a jump, on the side on which the run has it.
+def _choose_sides(
+    exact: dict[str, Array], before_end: Mapping[str, Array], solution: Solution, run: Trajectory
+) -> None:
+    """Where an output time is that of a jump, take the exact values on the side on which the run has it.
 
     That may be a jump of the run, or one of the solution at the very end, of which rounding decides whether a run
     still has it.
     """
-    times, jumps = run.result.times, np.array([jump.t for jump in run.jumps])
-    exact = {name: np.array(values) for name, values in solution(times).items()}
-    near = np.any(np.abs(times[:, None] - jumps) <= SIDE * times[:, None], axis=1)
-    for way in (-SIDE, SIDE) if near.any() else ():
-        _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
-    if len(times) and not near[-1]:
-        last = np.arange(len(times)) == len(times) - 1
-        before = solution(times[-1] * (1 - SIDE * np.array([2.0, 4.0])))
-        jumped = {
-            name: other[:1]
-            for name, other in before.items()
-            if abs(exact[name][-1] - other[0]) > STEEPER * abs(other[0] - other[1]) + SAME * abs(other[0])
-        }
-        _take_nearer(exact, jumped, run, last)
-    return exact
+    times = run.result.times
+    near = np.zeros(len(times), dtype=bool)
+    if run.jumps:
+        jumps = np.array([jump.t for jump in run.jumps])
+        near = np.any(np.abs(times[:, None] - jumps) <= SIDE * times[:, None], axis=1)
+        for way in (-SIDE, SIDE) if near.any() else ():
+            _take_nearer(exact, solution(times[near] * (1 + 2 * way)), run, near)
+    if near[-1]:
+        return
+    jumped = {
+        name: np.array([close])
+        for name, (close, far) in ((name, values.tolist()) for name, values in before_end.items())
+        if abs(exact[name][-1] - close) > STEEPER * abs(close - far) + SAME * abs(close)
+    }
+    if jumped:
+        _take_nearer(exact, jumped, run, np.arange(len(times)) == len(times) - 1)
 
 
 def _take_nearer(exact: dict[str, Array], others: Mapping[str, Array], run: Trajectory, at: NDArray[np.bool_]) -> None:
     """Put other values at some outputs in the place of those that are farther from the run's."""
-    names = [*(state.name for state in run.model.system.states), *(item.name for item in run.model.system.outputs)]
-    ours = np.concatenate([run.result.outputs[at], run.outputs[at]], axis=1)
+    system = run.model.system
     for name, other in others.items():
-        if name in names:
-            own = ours[:, names.index(name)]
-            nearer = np.abs(other - own) < np.abs(exact[name][at] - own)
-            exact[name][at] = np.where(nearer, other, exact[name][at])
+        if name in system.state_columns:
+            own = run.result.outputs[at, system.state_columns[name]]
+        elif name in system.output_columns:
+            own = run.outputs[at, system.output_columns[name]]
+        else:
+            continue
+        nearer = np.abs(other - own) < np.abs(exact[name][at] - own)
+        exact[name][at] = np.where(nearer, other, exact[name][at])
 
 
 def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) -> Reference:
@@ -178,16 +196,22 @@ def _check_start(exact: Mapping[str, Array], run: Trajectory) -> None:
                 raise InputError(f"it starts from {state.name} = {start:.9g}, the scene from {ours:.9g}.")
 
 
-def check_equations(solution: Solution, run: Trajectory) -> None:
-    """Refuse a solution that does not satisfy the scene's equations."""
-    if len(run.result.times) < 2:
-        return  # the run ended at its start
+def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step: Array) -> None:
+    """Refuse a solution that does not satisfy the scene's equations, by its values at the probes ``t`` and at two steps
+    before and after each, shape (5, probes).
+    """
     system, problem, program = run.model.system, run.result.problem, run.model.program
-    probes, since = _probes(run)
-    y, ydot, rounding = _along(solution, run, probes, since)
-    _check_given(solution(probes), run, run.model.evaluate(run.result, probes, y, ydot), probes)
-    segment = np.searchsorted(problem.segments[1:-1], probes, side="left")
-    inputs = np.concatenate([probes[:, None], y, ydot, problem.parameters[segment]], axis=1)
+    names = list(system.state_columns)
+    if missing := [name for name in names if name not in near]:
+        raise InputError(f"it says nothing of {', '.join(missing)}.")
+    values = np.array([near[name] for name in names]).reshape(len(names), 5, len(t))
+    # Rates by central differences, and how far these are rounding.
+    slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
+    rounding = (LAST_DIGITS * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
+    y, ydot = values[:, 2].T, slope.T
+    _check_given({name: found[2] for name, found in near.items()}, run, t, y, ydot)
+    segment = np.searchsorted(problem.segments[1:-1], t, side="left")
+    inputs = np.concatenate([t[:, None], y, ydot, problem.parameters[segment]], axis=1)
     misses = program.residual(inputs)
     by_state, by_rate = program.derivatives(inputs)
     terms = by_rate * ydot[:, None, :]
@@ -203,54 +227,42 @@ def check_equations(solution: Solution, run: Trajectory) -> None:
     if still.any():
         reach = np.abs(y[:, algebraic]).max(axis=0)
         reach = np.where(reach > 0, reach, [state.scale for state in system.states if state.algebraic])
-        for part, miss, slopes in zip(
-            parts, misses[:, still], by_state[:, still][:, :, algebraic] * reach, strict=True
-        ):
-            if np.all(np.isfinite(miss)) and np.all(np.isfinite(slopes)):
-                part[still] = np.abs(np.linalg.lstsq(slopes, -miss)[0]).max()
+        slopes = by_state[:, still][:, :, algebraic] * reach
+        for part, miss, matrix in zip(parts, misses[:, still], slopes, strict=True):
+            if np.all(np.isfinite(miss)) and np.all(np.isfinite(matrix)):
+                part[still] = np.abs(np.linalg.lstsq(matrix, -miss)[0]).max()
     if parts.max() > MISMATCH:
         j, row = np.unravel_index(parts.argmax(), parts.shape)
         equation = list(system.rows)[row]
-        raise InputError(f"at t = {probes[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
+        raise InputError(f"at t = {t[j]:.3g} s it misses the equation of {equation} by {100 * parts.max():.3g}%.")
 
 
-def _check_given(exact: Mapping[str, Array], run: Trajectory, named: Array, t: Array) -> None:
+def _check_given(exact: Mapping[str, Array], run: Trajectory, t: Array, y: Array, ydot: Array) -> None:
     """Refuse a solution under another load."""
-    given = {role.variable for role in run.model.system.roles if role.role == "prescribed"}
-    for j, item in enumerate(run.model.system.outputs):
-        if item.name in given and item.name in exact:
-            theirs, ours = exact[item.name], named[:, j]
-            largest = float(np.max(np.abs(ours)))
-            for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME * largest))[:1]:
-                raise InputError(f"at t = {t[k]:.3g} s its {item.name} is {theirs[k]:.6g}, the scene's {ours[k]:.6g}.")
+    columns = run.model.system.output_columns
+    loads = {role.variable for role in run.model.system.roles if role.role == "prescribed"}
+    given = [name for name in columns if name in loads and name in exact]
+    named = run.model.evaluate(run.result, t, y, ydot) if given else np.empty(0)
+    for name in given:
+        theirs, ours = exact[name], named[:, columns[name]]
+        for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME * np.abs(ours).max()))[:1]:
+            raise InputError(f"at t = {t[k]:.3g} s its {name} is {theirs[k]:.6g}, the scene's {ours[k]:.6g}.")
 
 
-def _probes(run: Trajectory) -> tuple[Array, Array]:
-    """Times at which the equations are tested, inside the stretches between events, and how long each has lasted."""
-    edges = np.unique(np.append(run.result.problem.segments, run.result.times[-1]))
-    edges = edges[edges <= run.result.times[-1]]
+def _edges(run: Trajectory) -> tuple[float, ...]:
+    """Times between which a run has no event or breakpoint, in order."""
+    end = float(run.result.times[-1])
+    return tuple(sorted({end, *(t for t in run.result.problem.segments.tolist() if t <= end)}))
+
+
+@lru_cache
+def _probes(*edges: float) -> tuple[Array, Array]:
+    """Times at which the equations are tested, inside the stretches between ``edges``, and how long each has lasted."""
     if len(edges) < 2:
         raise InputError("the run ended before anything could be compared.")
-    long = np.flatnonzero(np.diff(edges) > BRIEF * edges[1:])
+    long = np.flatnonzero(np.diff(edges) > BRIEF * np.array(edges[1:]))
     spread = np.linspace(0, len(long) - 1, PROBES).astype(int)
     chosen = long[np.union1d(spread, np.arange(min(PROBES, len(long))))]
     parts = np.linspace(EDGE, 1 - EDGE, max(2, PROBES // len(chosen)))
-    starts, lengths = edges[chosen], np.diff(edges)[chosen]
-    since = np.multiply.outer(lengths, parts)
-    return np.ravel(starts[:, None] + since), np.ravel(since)
-
-
-def _along(solution: Solution, run: Trajectory, t: Array, since: Array) -> tuple[Array, Array, Array]:
-    """Exact states, their rates by central differences, and how far these are rounding.
-
-    InputError where the solution leaves a state open.
-    """
-    step = STEP * since
-    exact = solution(np.concatenate([t - 2 * step, t - step, t, t + step, t + 2 * step]))
-    names = [state.name for state in run.model.system.states]
-    missing = [name for name in names if name not in exact]
-    if missing:
-        raise InputError(f"it says nothing of {', '.join(missing)}.")
-    values = np.array([exact[name] for name in names]).reshape(len(names), 5, len(t))
-    slope = (8 * (values[:, 3] - values[:, 1]) - (values[:, 4] - values[:, 0])) / (12 * step)
-    return values[:, 2].T, slope.T, (LAST_DIGITS * (np.abs(values[:, 2]) + np.abs(t * slope)) / step).T
+    since = np.multiply.outer(np.diff(edges)[chosen], parts)
+    return np.ravel(np.array(edges)[chosen, None] + since), np.ravel(since)

@@ -66,7 +66,7 @@ ADDED = '''
 import numpy as np
 
 from surfacechem.contracts.terms import parameter
-from surfacechem.references.base import Array, Reference, SceneView
+from surfacechem.references.base import Array, Reference, read
 
 
 class NewtonCooling(Reference):
@@ -82,10 +82,7 @@ class NewtonCooling(Reference):
     T_i: float = parameter("K", "initial temperature", above=0)
     T_a: float = parameter("K", "temperature of the reservoir", above=0)
 
-    @classmethod
-    def from_scene(cls, scene: SceneView):
-        start = {"T_i": scene.temperature, "T_a": scene.surroundings_temperature}
-        return {"C": scene.capacity, "h": scene.conductance(), **start}
+    told = read(capacity="C", total_conductance="h", temperature="T_i", surroundings_temperature="T_a")
 
     def quantities(self, t: Array):
         return {"T": self.T_a + (self.T_i - self.T_a) * np.exp(-self.h * t / self.C)}
