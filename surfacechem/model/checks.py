@@ -77,22 +77,21 @@ def check_start(system: System, values: Mapping[str, float], initial: Mapping[st
 
     ``values`` holds the parameters of the first piece of time by path, ``initial`` the states by name.
     """
-    point = {parameter.symbol: _exact(values[parameter.path]) for parameter in system.parameters}
-    point |= {state.symbol: _exact(initial[state.name]) for state in system.states if not state.algebraic}
-    point[system.t] = symengine.Integer(0)
-    for margin in system.margins:
-        if margin.terminal:
-            try:
-                value = system.expand(margin.masked).subs(point)
-                if value.free_symbols:  # needs an algebraic variable or a derivative, which only the run can find
-                    continue
-                number = float(value)
-            except (RuntimeError, TypeError):  # an undefined number, zero over zero for instance
-                number = math.nan
-            if not number > 0:
-                remedy = f" {margin.remedy}" if margin.remedy else ""
-                message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
-                raise InputError(message, path=margin.path)
+    given = {parameter.symbol: values[parameter.path] for parameter in system.parameters}
+    given |= {state.symbol: initial[state.name] for state in system.states if not state.algebraic}
+    given[system.t] = 0.0
+    for margin, expression in system.limits:
+        try:
+            value = expression.subs({x: _exact(given[x]) for x in expression.free_symbols if x in given})
+            if value.free_symbols:  # needs an algebraic variable or a derivative, which only the run can find
+                continue
+            number = float(value)
+        except (RuntimeError, TypeError):  # an undefined number, zero over zero for instance
+            number = math.nan
+        if not number > 0:
+            remedy = f" {margin.remedy}" if margin.remedy else ""
+            message = f"at the start {margin.reason} ({margin.name} does not hold: {number:.6g}).{remedy}"
+            raise InputError(message, path=margin.path)
 
 
 def _exact(value: float) -> Any:

@@ -430,6 +430,11 @@ class System:
         return tuple(m for m in self.margins if self.expand(m.masked).free_symbols & moving[m.peak])
 
     @cached_property
+    def limits(self) -> tuple[tuple[Margin, Expression], ...]:
+        """The margins that end a run, with their expanded expressions."""
+        return tuple((m, self.expand(m.masked)) for m in self.margins if m.terminal)
+
+    @cached_property
     def _when(self) -> list[list[tuple[int, Collection[int]]]]:
         columns = {parameter.symbol: j for j, parameter in enumerate(self.parameters)}
         items: tuple[Margin | Edge, ...] = (*self.moving_margins(), *self.edges)

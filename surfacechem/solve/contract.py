@@ -7,6 +7,7 @@ is integrated beside the state, outside the error norm. A result always carries 
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import NamedTuple
@@ -255,3 +256,7 @@ class Solver(ABC):
         """Integrate a problem. Failure of the method is a status of the result, never an exception or a wrong
         number.
         """
+
+    def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
+        """Integrate problems of one model, whatever the number of threads with the same results as one by one."""
+        return [self.solve(problem) for problem in problems]

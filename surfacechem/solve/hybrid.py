@@ -2,33 +2,90 @@
 
 Within an arc the modes are constant and any solver of the contract integrates; where the guard of an edge reaches zero
 the arc ends, the instant carries out what is due, and the next arc starts from there.
+
+A run calls no solver: it is a generator of problems that is sent their results, so that the arcs of many runs are
+solved in one compiled batch.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
-from surfacechem.solve.bounces import ENDLESS, MANY, MISSED
 from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.equilibria import ATOM, Point
-from surfacechem.solve.instant import BRIEF, REACHED, Instant
+from surfacechem.solve.instant import BRIEF, ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
-from surfacechem.solve.roundoff import solve
+from surfacechem.tolerances import ULPS
 
 Array = NDArray[np.float64]
+Found = TypeVar("Found")
+Flow = Generator[Problem, Result, Found]
+"""What asks for the solution of one problem after another."""
 
 LOST = (Status.STEP_UNDERFLOW, Status.SINGULAR, Status.NO_CONSISTENT_STATE)
 """Ways in which a solver ends where a quasi-static equilibrium is lost."""
 
 RENEWALS = 4
 """Number of brief arcs that time could not resolve that may follow each other."""
+
+SEEN, AGAIN = 100.0, 3
+"""Tolerance of a sliding velocity in units of its rounding, and how often it is raised."""
+
+
+def solve_together(flows: Sequence[Flow[Found]], method: Solver, threads: int = 1) -> list[Found]:
+    """What the flows return; the problems that they ask for at one time are solved in one batch."""
+    found: dict[int, Found] = {}
+    results: dict[int, Any] = dict.fromkeys(range(len(flows)))
+    while results:
+        problems = {}
+        for i, result in results.items():
+            try:
+                problems[i] = flows[i].send(result)
+            except StopIteration as ended:
+                found[i] = ended.value
+        solved = method.solve_all(list(problems.values()), threads) if problems else []
+        results = dict(zip(problems, solved, strict=True))
+    return [found[i] for i in range(len(flows))]
+
+
+def without_stall(problem: Problem, velocities: NDArray[np.bool_]) -> Flow[Result]:
+    """The result of a problem; ``velocities`` marks the algebraic states that tractions determine.
+
+    Where such a velocity is near zero it is rounding: what is left of large tractions, divided by a resistance. Where a
+    run stalls at that, its absolute tolerance is raised to this rounding.
+    """
+    result = yield problem
+    for _ in range(AGAIN if velocities.any() else 0):
+        if result.status is not Status.STEP_UNDERFLOW:
+            break
+        atol = np.where(velocities, np.maximum(problem.atol, SEEN * rounding(result)), problem.atol)
+        if not np.all(np.isfinite(atol)) or np.all(atol == problem.atol):
+            break
+        problem = problem.changed(atol=atol)
+        result = yield problem
+    return result
+
+
+def rounding(result: Result) -> Array:
+    """What rounding of the equations' terms leaves uncertain of each unknown at the end of a run, shape (states,)."""
+    problem, n = result.problem, len(result.y)
+    inputs = np.concatenate(([result.t], result.y, result.ydot, problem.parameters[-1]))
+    both = problem.program.jacobian(problem.program.filled(inputs)).reshape(2, n, n)
+    terms = np.abs(both[0] * result.y).sum(axis=1) + np.abs(both[1] * result.ydot).sum(axis=1)
+    matrix = np.where(problem.program.algebraic_mask, both[0], both[1])
+    try:
+        found: Array = np.abs(np.linalg.inv(matrix)) @ (ULPS * terms)
+    except np.linalg.LinAlgError:
+        return np.zeros(n)
+    return found
 
 
 @dataclass(frozen=True)
@@ -49,8 +106,8 @@ class Arc:
 class Hybrid:
     """One run of a system with edges."""
 
-    def __init__(self, system: System, method: Solver, jumper: Jumper, problem: Problem, first: int) -> None:
-        self.system, self.method, self.jumper, self.problem = system, method, jumper, problem
+    def __init__(self, system: System, jumper: Jumper, problem: Problem, first: int) -> None:
+        self.system, self.jumper, self.problem = system, jumper, problem
         self.instant = Instant(system, jumper, problem, first)
         self.arcs: list[Arc] = []
         self.exchanged = np.zeros(problem.program.n_ledger)
@@ -60,54 +117,48 @@ class Hybrid:
         self._renewed = 0
         """Number of brief arcs in a row that time could not resolve."""
 
-    def run(self) -> Result:
+    def run(self) -> Flow[Result]:
         """The whole run as one result; the instant holds its jumps, and why it ended where one of them ended it."""
         problem, instant, columns = self.problem, self.instant, self.jumper.mode_columns
-        ended, y, modes = None, problem.y0, problem.parameters[0, columns]
+        last, y, modes = None, problem.y0, problem.parameters[0, columns]
         for start, end, row in zip(problem.segments, problem.segments[1:], problem.parameters, strict=False):
             parameters = row.copy()
             parameters[columns] = modes
-            begun = instant.begin(Point(float(start), y, np.zeros(len(y)), parameters), ended)
-            ended = self._segment(begun, float(end)) if begun is not None else None
-            if ended is None:
+            point = instant.begin(Point(float(start), y, np.zeros(len(y)), parameters), last)
+            while point is not None and point.t < end:
+                point = instant.resolve(point)
+                arc = (yield from self._flow(point, float(end))) if point is not None else None
+                point = self._after(arc, float(end)) if arc is not None else None
+            if point is None:
                 break
-            y, modes = ended.y, ended.parameters[columns]
+            last, y, modes = point, point.y, point.parameters[columns]
         if instant.status is Status.MAX_STEPS and instant.rebounds.count > MANY:
             instant.status, instant.reason = Status.FAILED, ENDLESS
         reached = self.arcs[-1].end if self.arcs else float(problem.segments[0])
-        end = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
+        # A jump may have led beyond the last arc, to the very time of a fold.
+        t = max(reached, instant.jumps[-1].t) if instant.reason and instant.jumps else reached
         if not self.arcs:
-            return unbegun(problem, instant.status, end, instant.booked)
-        return merged(problem, self.arcs, instant.status, end, instant.booked)
+            return unbegun(problem, instant.status, t, instant.booked)
+        return merged(problem, self.arcs, instant.status, t, instant.booked)
 
-    def _segment(self, point: Point, end: float) -> Point | None:
-        """From a point to the end of its load segment; None where the run ends before."""
-        while point.t < end:
-            started = self.instant.resolve(point)
-            arc = self._flow(started, end) if started is not None else None
-            if started is None or arc is None:
-                return None
-            point = Point(arc.end, arc.result.y, arc.result.ydot, started.parameters)
-            if arc.status is Status.FINISHED:
-                return point
-            self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
-            index = self._edge(arc, point)
-            if index is not None:
-                jumped = self.instant.apply(index, self.jumper.equilibria.in_time(index, point, end), point)
-                if jumped is None:
-                    return None
-                point = jumped
-                continue
-            across = self._across_touch(point) if arc.status in LOST else None
-            # What time could not resolve any more goes on in a time of its own.
-            renews = arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS
-            if across is None and not renews:
-                self.instant.status = arc.status
-                return None
-            point = across or point
-        return point
+    def _after(self, arc: Arc, end: float) -> Point | None:
+        """The point from which a run goes on after an arc; None where it ends with it."""
+        point = Point(arc.end, arc.result.y, arc.result.ydot, arc.start.parameters)
+        if arc.status is Status.FINISHED:
+            return point
+        self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
+        index = self._edge(arc, point)
+        if index is not None:
+            return self.instant.apply(index, self.jumper.equilibria.in_time(index, point, end), point)
+        if arc.status in LOST and (across := self._across_touch(point)) is not None:
+            return across
+        # What time could not resolve any more goes on in a time of its own.
+        if arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS:
+            return point
+        self.instant.status = arc.status
+        return None
 
-    def _flow(self, start: Point, end: float) -> Arc | None:
+    def _flow(self, start: Point, end: float) -> Flow[Arc | None]:
         """Integrate until an edge, a limit or the end of the segment; None where the run ends before or without it."""
         problem, instant = self.problem, self.instant
         seconds = None if self.deadline is None else self.deadline - time.monotonic()
@@ -131,7 +182,7 @@ class Hybrid:
             seen=instant.rebounds.seen(start.t, instant.sizes(start)),
             in_play=self.system.in_play(local),
         )
-        result = solve(self.method, problem, self.system.sliding)
+        result = yield from without_stall(problem, self.system.sliding)
         reached, status = min(start.t + result.t, end), result.status
         if status is Status.FINISHED or (status in LOST and end - reached <= REACHED * end):
             # Where a gap closes at the very end, the last of its digits are rounding of the time.
@@ -182,8 +233,15 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
 
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
     """The arcs as one result, which ends at this time with this ledger."""
-    last = arcs[-1].result
-    happened = [(arc, arc.result.events, np.ones(len(arc.result.events.t), bool)) for arc in arcs]
+    results = [arc.result for arc in arcs]
+    last, steps = results[-1], None
+    if problem.record_steps:
+        taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
+        # The start of an arc, and what time cannot tell from it, is the event that ends the last one.
+        kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]
+        counts = [int(keep.sum()) for _, _, keep in kept]
+        steps = Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
+    events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
         problem=problem.changed(
             segments=np.array([*(arc.start.t for arc in arcs), problem.segments[-1]]),
@@ -196,25 +254,17 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         ledger=ledger,
         margins=last.margins,
         times=np.concatenate([arc.times for arc in arcs]),
-        outputs=np.concatenate([arc.result.outputs for arc in arcs]),
-        ledger_outputs=np.concatenate([arc.result.ledger_outputs + arc.booked for arc in arcs]),
-        events=Events(*_rows(happened), index=np.concatenate([arc.result.events.index for arc in arcs])),
-        counters=Counters(*map(sum, zip(*(arc.result.counters for arc in arcs), strict=True))),
-        steps=_steps(arcs) if problem.record_steps else None,
-        stepping=sum(arc.result.stepping for arc in arcs),
+        outputs=np.concatenate([result.outputs for result in results]),
+        ledger_outputs=np.concatenate([arc.booked + arc.result.ledger_outputs for arc in arcs]),
+        events=Events(*events, index=np.concatenate([result.events.index for result in results])),
+        counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
+        steps=steps,
+        stepping=sum((result.stepping for result in results), 0.0),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
     )
 
 
-def _steps(arcs: Sequence[Arc]) -> Points:
-    """The steps of all arcs; the start of one, and what time cannot tell from it, is the event that ends the last."""
-    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
-    kept = [(arc, steps, (arc.start.t + steps.t > arc.start.t) | (arc is arcs[0])) for arc, steps in taken]
-    counts = [int(keep.sum()) for _, _, keep in kept]
-    return Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
-
-
-def _rows(found: Sequence[tuple[Arc, Points, NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
+def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:
     """Times, states, rates and ledgers of the points that are kept of each arc, in the time and ledger of the run."""
     return (
         np.concatenate([arc.start.t + points.t[keep] for arc, points, keep in found]),

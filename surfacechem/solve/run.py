@@ -23,10 +23,9 @@ from surfacechem.solve import segments as pieces
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
-from surfacechem.solve.hybrid import Hybrid
+from surfacechem.solve.hybrid import Flow, Hybrid, solve_together, without_stall
 from surfacechem.solve.jumps import Jump, Jumper
-from surfacechem.solve.radau.solver import Radau, output_rates
-from surfacechem.solve.roundoff import solve
+from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
 
@@ -321,9 +320,7 @@ class Model:
     def solve_all(
         self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1, *, nudged: bool = False
     ) -> list[Trajectory]:
-        """Runs that differ in values and output times: in the compiled loop together where nothing but the stepper is
-        needed, else one after the other.
-        """
+        """Runs that differ in values and output times, together in the compiled loop."""
         run = self.chosen(runs[0][0])
         method = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
@@ -332,50 +329,54 @@ class Model:
                 f"`solver: {ASKING[0]}` under `run`.",
                 path="run.solver",
             )
-        pairs = [(replace(each, solver=run.solver), values) for each, values in runs]
-        if self.jumper or self.system.fit or run.max_seconds or not isinstance(method, Radau):
-            return [self._solve_alone(method, *pair, nudged) for pair in pairs]
-        prepared = PREPARING.seconds
-        problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
-        self.compile_seconds += PREPARING.seconds - prepared
-        method.prepare()
-        start = time.perf_counter()
-        results = [
-            solve(method, problem, self.system.sliding, first)
-            for problem, first in zip(problems, method.solve_all(problems, threads), strict=True)
-        ]
-        seconds = (time.perf_counter() - start) / len(pairs)
-        return [
-            Trajectory(self, each, result, values, *self.verdict(result, values), seconds)
-            for (each, values), result in zip(pairs, results, strict=True)
-        ]
+        pairs = [(self.chosen(each), values) for each, values in runs]
+        # A limit in seconds is one of each run by itself.
+        groups = [[pair] for pair in pairs] if run.max_seconds else [pairs]
+        return [done for group in groups for done in self._solve_together(method, group, threads, nudged)]
 
-    def _solve_alone(self, method: Solver, run: Run, values: Mapping[str, float], nudged: bool) -> Trajectory:
-        """A run with its jumps, whose media are fitted again where it leaves the range of their fits."""
-        fit = self.system.fit
-        values = fit.started(values) if fit else values
+    def _solve_together(
+        self, method: Solver, pairs: Sequence[tuple[Run, Mapping[str, float]]], threads: int, nudged: bool
+    ) -> list[Trajectory]:
+        """Runs whose arcs are solved in batches; each has its part of their time."""
         before = PREPARING.seconds
-        problem = self.problem(run, values, nudged=nudged)
+        fit = self.system.fit
+        pairs = [(run, fit.started(values)) for run, values in pairs] if fit else pairs
+        problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
         method.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
-        result, jumps, ended = self._integrate(method, problem)
-        while fit and (wider := fit.wider(values, self._visited(result, fit.temperature))):
-            values = wider
-            result, jumps, ended = self._integrate(method, self.problem(run, values, nudged=nudged))
-        seconds = time.perf_counter() - start - (PREPARING.seconds - prepared)
+        flows = [self._flow(*pair, problem, nudged) for pair, problem in zip(pairs, problems, strict=True)]
+        ends = solve_together(flows, method, threads)
+        seconds = (time.perf_counter() - start - (PREPARING.seconds - prepared)) / len(pairs)
         self.compile_seconds += PREPARING.seconds - before
-        status, reason = ended or self.verdict(result, values)
-        return Trajectory(self, run, result, values, status, reason, seconds, jumps)
+        done = []
+        for (run, _), (values, result, jumps, ended) in zip(pairs, ends, strict=True):
+            status, reason = ended or self.verdict(result, values)
+            done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
+        return done
 
-    def _integrate(self, method: Solver, problem: Problem) -> tuple[Result, tuple[Jump, ...], tuple[str, str] | None]:
-        """The result, its jumps, and how the run ended where a jump ended it."""
-        if self.jumper is None:
-            return solve(method, problem, self.system.sliding), (), None
-        hybrid = Hybrid(self.system, method, self.jumper, problem, len(self.margins))
-        result = hybrid.run()
-        word = "failed" if hybrid.instant.status is Status.FAILED else "stopped"
-        ended = (word, f"{hybrid.instant.reason} at t = {result.t:.9g} s") if hybrid.instant.reason else None
-        return result, tuple(hybrid.instant.jumps), ended
+    def _flow(self, run: Run, values: Mapping[str, float], problem: Problem, nudged: bool) -> Flow[tuple[Any, ...]]:
+        """A run as a flow: its values, its result, its jumps, and how it ended where a jump ended it.
+
+        Media are fitted again where it leaves the range of their fits.
+        """
+        fit = self.system.fit
+        while True:
+            jumps: list[Jump] = []
+            ended = None
+            if self.jumper is None:
+                result = yield from without_stall(problem, self.system.sliding)
+            else:
+                hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
+                result, instant = (yield from hybrid.run()), hybrid.instant
+                jumps = instant.jumps
+                if instant.reason:
+                    word = "failed" if instant.status is Status.FAILED else "stopped"
+                    ended = word, f"{instant.reason} at t = {result.t:.9g} s"
+            wider = fit.wider(values, self._visited(result, fit.temperature)) if fit else None
+            if not wider:
+                return values, result, tuple(jumps), ended
+            values = wider
+            problem = self.problem(run, values, nudged=nudged)
 
     def _visited(self, result: Result, temperature: str) -> Array:
         """A temperature at all steps and at the end."""

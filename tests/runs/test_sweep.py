@@ -15,6 +15,7 @@ from surfacechem.references import get
 from surfacechem.runs import rerun
 from surfacechem.runs.summaries import sweep_summary
 from surfacechem.solve import run as integrate
+from surfacechem.solve.radau.solver import Radau
 
 RATE = "loading.f.ramp.rate"
 K_0 = "interface.potential.bond-energy.K_0"
@@ -168,14 +169,27 @@ def test_forces_that_overflow(exponent):
     np.testing.assert_allclose(data["phi"], bond.solution(data["time"].values)["phi"], rtol=1e-6, atol=1e-12)
 
 
-def test_scenes_with_jumps_are_swept_run_by_run():
-    case = surfacechem.load("press-hold-pull")
-    data = case.sweep({"programme.approach.until.p": ["8 kPa", "10 kPa"]}).dataset
-    single = case.run({"programme.approach.until.p": 8e3})
-    for name in ("g_n", "t_n", "theta_bond_s", "E_total"):
-        assert data[name].values[0].tobytes() == single.dataset[name].values.tobytes()
-    for name in ("energy_error", "entropy_error", "site_error"):
-        assert data[name].values[0] == single.dataset.attrs[name]
+@pytest.mark.parametrize(
+    ("case", "path", "values"),
+    [
+        ("stick-slip", "interface.friction.coulomb.mu_s", 0.1 + np.linspace(0.2, 0.5, 7)),
+        ("press-hold-pull", "programme.approach.until.p", ["8 kPa", "10 kPa"]),
+        ("exothermic", "initial.T", ["290 K", "300 K", "310 K"]),
+        ("closing-gas-gap", "initial.T_2", [500.0, 600.0]),
+    ],
+)
+def test_runs_with_edges_or_fits_share_batches_and_stay_what_they_are(case, path, values, monkeypatch):
+    case, rounds, solve_all = surfacechem.load(case), [], Radau.solve_all
+    monkeypatch.setattr(Radau, "solve_all", lambda *given: rounds.append(len(given[1])) or solve_all(*given))
+    one, two = (case.sweep({path: values}, threads=n).sweep for n in (1, 2))
+    assert rounds[0] == len(values) > 1
+    for i in range(len(values)):
+        alone = case.run(one.plan.points[i]).trajectory
+        for run in (one[i], two[i]):
+            assert run.outputs.tobytes() == alone.outputs.tobytes()
+            assert run.result.steps.y.tobytes() == alone.result.steps.y.tobytes()
+            assert [jump.t for jump in run.jumps] == [jump.t for jump in alone.jumps]
+            assert (run.status, run.reason) == (alone.status, alone.reason)
 
 
 def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
@@ -238,12 +252,6 @@ def test_an_output_at_a_jump_is_compared_on_its_side():
     """The first two debond at a multiple of the spacing of the outputs."""
     path = "interface.limits.tensile-strength.t_max"
     assert surfacechem.sweep("debonding", {path: ["20 MPa", "55 MPa", "80.01 MPa"]}).dataset.error.max() < 1e-12
-
-
-def test_fitted_media_are_swept_run_by_run():
-    case = surfacechem.load("closing-gas-gap")
-    data = case.sweep({"initial.T_2": [500.0, 600.0]}).dataset
-    assert data["T_2"].values[1].tobytes() == case.run().dataset["T_2"].values.tobytes()
 
 
 def test_a_run_that_ends_at_its_start_leaves_the_others_alone(tmp_path):

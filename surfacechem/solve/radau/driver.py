@@ -236,7 +236,7 @@ def _accept(w: Any, batch: Any, i: int, size: float, end: float, goes_on: bool) 
 def _run_segment(w: Any, batch: Any, i: int, end: float, goes_on: bool) -> int:
     """Integrate to the end of a segment; GOOD, or the status that ends the run."""
     h, size_last, norm_last, aim = 0.0, 0.0, 1.0, np.inf
-    spacing = batch.spacing[row_of(batch.spacing, i)]
+    spacing, max_steps = batch.spacing[row_of(batch.spacing, i)], batch.max_steps[row_of(batch.max_steps, i)]
     if spacing < np.inf:
         spacing = min(spacing, (end - w.clock[BASE]) / FEWEST)
     while end - w.clock[BASE] - w.clock[TAU] > 0.0:
@@ -248,7 +248,7 @@ def _run_segment(w: Any, batch: Any, i: int, end: float, goes_on: bool) -> int:
         left = (end - w.clock[BASE]) - w.clock[TAU]
         remaining = min(left, aim - w.clock[TAU])
         outcome, h, norm, proposed = advance(
-            w, _next_try(h, remaining), batch.max_steps, batch.counts[i], size_last, norm_last
+            w, _next_try(h, remaining), max_steps, batch.counts[i], size_last, norm_last
         )
         if outcome != GOOD:
             return outcome
@@ -290,9 +290,9 @@ def _run(w: Any, batch: Any, i: int) -> None:
     clear(w.fired)
     clear(w.count)
     clear(w.ledger[Q])
-    accounts = w.ledger.shape[1]
-    copy(batch.peaks[:accounts], w.ledger[Q_LARGEST])
-    copy(batch.peaks[accounts:], w.margin[M_LARGEST])
+    accounts, peaks = w.ledger.shape[1], batch.peaks[row_of(batch.peaks, i)]
+    copy(peaks[:accounts], w.ledger[Q_LARGEST])
+    copy(peaks[accounts:], w.margin[M_LARGEST])
     copy(batch.y0[i], w.vector[Y])
     clear(w.vector[YDOT])
     status = GOOD

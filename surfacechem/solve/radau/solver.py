@@ -35,6 +35,15 @@ def _no_rows(runs: int) -> Array:
     return np.empty((runs, 0, 0))
 
 
+def _peaks(problem: Problem) -> Array:
+    """Largest accounts and guards of what a problem continues; none where it continues nothing."""
+    accounts, guards = problem.exchanged, problem.seen
+    return np.concatenate((
+        np.zeros(problem.program.n_ledger) if accounts is None else accounts,
+        np.zeros(problem.program.n_margins) if guards is None else guards,
+    ))  # fmt: skip
+
+
 def _contiguous(values: ArrayLike) -> Array:
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and values.flags.c_contiguous:
         return values
@@ -42,16 +51,11 @@ def _contiguous(values: ArrayLike) -> Array:
 
 
 def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: int) -> Any:
-    """Runs that share with a problem all but their y0, parameters, spacing, segments and times, which are given in this
-    order with the run as first axis; with room for so many steps and events of each.
+    """Runs that share with a problem all but their y0, parameters, spacing, max_steps, peaks, segments and times,
+    which are given in this order with the run as first axis; with room for so many steps and events of each.
     """
-    program, (y0, parameters, spacing, segments, times) = problem.program, runs
-    n, q, m, count = program.n, program.n_ledger, program.n_margins, len(y0)
-    peaks = np.zeros(q + m)
-    if problem.exchanged is not None:
-        peaks[:q] = problem.exchanged
-    if problem.seen is not None:
-        peaks[q:] = problem.seen
+    program, times = problem.program, runs[-1]
+    n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
         program.addresses,
         program.algebraic_mask,
@@ -59,15 +63,9 @@ def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: 
         program.ledger_groups,
         min(problem.rtol, LONGEST_STEP),
         _contiguous(problem.atol),
-        problem.max_steps,
         _kinds(problem.margins, problem.in_play),
-        peaks,
         int(problem.goes_on),
-        y0,
-        parameters,
-        spacing,
-        segments,
-        times,
+        *runs,
         np.empty((count, 1 + 2 * n + q + m)),
         np.zeros((count, COLUMNS), np.int64),
         np.empty((count, times.shape[1], n + q)),
@@ -84,9 +82,11 @@ def _shared(rows: Sequence[Array]) -> Array:
 
 def _run_one(problem: Problem, step_rows: int, event_rows: int) -> Any:
     """A batch of one, run; the compiled loop looks at the stop flag before every step."""
-    columns = problem.y0, problem.parameters, problem.segments, problem.times
-    y0, parameters, segments, times = (_contiguous(values)[None] for values in columns)
-    batch = _batch(problem, (y0, parameters, np.array((problem.spacing,)), segments, times), step_rows, event_rows)
+    y0, parameters, segments, times = (
+        _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
+    )
+    columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
+    batch = _batch(problem, (*columns, segments, times), step_rows, event_rows)
     if problem.max_seconds is None:
         stepper.run_batch()(0, 1, tuple(batch))
         return batch
@@ -121,11 +121,13 @@ class Radau(Solver):
         """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
         number of threads; limits in seconds do not count.
         """
+        if len(problems) == 1:
+            return [self.solve(problems[0])]
         alike: dict[tuple[Any, ...], list[int]] = {}
         for i, problem in enumerate(problems):
-            alike.setdefault((len(problem.segments), len(problem.times), problem.in_play), []).append(i)
-        chunks = [group[k : k + CHUNK] for group in alike.values() for k in range(0, len(group), CHUNK)]
-        self.prepare()
+            alike.setdefault(_shape(problem), []).append(i)
+        most = min(CHUNK, -(-len(problems) // threads))
+        chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
             spread = pool.map if len(chunks) > 1 else map
             solved = spread(lambda chunk: _solved([problems[i] for i in chunk]), chunks)
@@ -137,12 +139,20 @@ class Radau(Solver):
         return [found[i] for i in range(len(problems))]
 
 
+def _shape(problem: Problem) -> tuple[Any, ...]:
+    """What problems of one batch have in common, beside the model and its margins."""
+    common = problem.in_play, problem.goes_on, problem.rtol, problem.atol.tobytes()
+    return len(problem.segments), len(problem.times), *common
+
+
 def _solved(problems: Sequence[Problem]) -> list[Result]:
-    """Results of problems of one model with as many segments and output times each."""
+    """Results of problems of one model and of one shape."""
+    own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
+    y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
+    max_steps = np.array([each.max_steps for each in problems])
     segments, times = (_shared([getattr(problem, name) for problem in problems]) for name in ("segments", "times"))
-    own = [(problem.y0, problem.parameters, problem.spacing) for problem in problems]
-    y0, parameters, spacing = (np.array(values, float) for values in zip(*own, strict=True))
-    batch = _batch(problems[0], (y0, parameters, spacing, segments, times), *_usual_rows(problems[0]))
+    columns = y0, parameters, spacing, max_steps, peaks, segments, times
+    batch = _batch(problems[0], columns, *_usual_rows(problems[0]))
     stepper.run_batch()(0, len(problems), tuple(batch))
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
@@ -236,7 +246,8 @@ def solve_many(
     first = states[0] if len(states) else np.zeros(n)
     fixed = table[0] if len(table) else np.zeros((len(breaks) - 1, program.n_parameters))
     shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
-    batch = _batch(shared, (states, table, np.array((np.inf,)), breaks[None], outputs[None]), 0, 0)
+    limits = np.array((np.inf,)), np.array((max_steps,)), _peaks(shared)[None]
+    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), 0, 0)
     kernel, fields = stepper.run_batch(), tuple(batch)
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda i: kernel(i, min(i + CHUNK, len(states)), fields), range(0, len(states), CHUNK)))
@@ -264,11 +275,11 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
 
     ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, COLUMNS] gets the outcomes under END.
     """
-    none, rows, nothing = np.zeros(0), np.zeros((1, 0)), _no_rows(len(ends))
+    none, rows, nothing = np.empty(0, np.int64), np.zeros((1, 0)), _no_rows(len(ends))
     return (
-        program.addresses, program.algebraic_mask, program.chain_table, np.empty(0, np.int64),
-        1.0, np.ones(program.n), 0, _kinds(()), none, 0,
-        ends, table, none, rows, rows, ends, counts, nothing, nothing, nothing,
+        program.addresses, program.algebraic_mask, program.chain_table, none,
+        1.0, np.ones(program.n), _kinds(()), 0,
+        ends, table, np.zeros(0), none, rows, rows, rows, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 
 

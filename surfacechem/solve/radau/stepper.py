@@ -22,16 +22,17 @@ FIELDS: dict[str, tuple[Any, int]] = {
     # the method
     "rtol": (float, 0),
     "atol": (float, 1),
-    "max_steps": (int, 0),
     # guards: a row (terminal, direction, smooth, strict, in play) for each
     "kinds": (np.int64, 2),
-    # runs that continue others: largest accounts and guards before; and whether others follow
-    "peaks": (float, 1),
+    # runs that others follow
     "goes_on": (int, 0),
-    # the runs; spacing, segments and times have one row for all where these are alike
+    # the runs; all but the first two have one row for all where these are alike
     "y0": (float, 2),
     "parameters": (float, 3),
     "spacing": (float, 1),
+    "max_steps": (np.int64, 1),
+    # largest accounts and guards of what a run continues
+    "peaks": (float, 2),
     "segments": (float, 2),
     "times": (float, 2),
     # results
