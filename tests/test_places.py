@@ -1,7 +1,7 @@
 """How many places one touches to add something: each addition is made in a copy of the package, and runs there.
 
-A law, a rate type, an exact solution and an output are one file. A component, a constraint and the solver of a library
-are a file and its line in the one list of their kind. A key of a case is tested in ``format/test_declarations.py``, the
+A law, a rate type, an exact solution, an output, a component and a constraint are one file. The solver of a library is
+a file and its line in the one list of their kind. A key of a case is tested in ``format/test_declarations.py``, the
 law of the page "Adding a law" in ``test_docs.py``.
 """
 
@@ -106,7 +106,7 @@ COMPONENT = '''
 from surfacechem.model.balances import HEAT, OUTSIDE, Power
 
 
-def cooling(build):
+def laws(build):
     """One statement of a power: balances, ledger and entropy follow."""
     body = build.scene.bodies[0].name
     T = build.thermal.node_of[body].T
@@ -118,10 +118,10 @@ CONSTRAINT = '''
 from surfacechem.model.system import Margin
 
 
-def track(build):
+def jumps(build):
     """The slider stays on its track."""
     way = build.variables.get("u_t", "the track")
-    build.margins.append(Margin("track", 1e-3 - way, "the slider leaves its track"))
+    yield Margin("track", 1e-3 - way, "the slider leaves its track")
 '''
 ADAPTER = '''
 """Dormand and Prince's method of order 8."""
@@ -146,7 +146,6 @@ class Place(NamedTuple):
     script: str = RUN
 
 
-MODEL, AFTER = "model/assemble.py", "    stated(friction(build))\n"
 PLACES = {
     "a law": Place(
         {"laws/friction.py": ("", LAW)},
@@ -175,21 +174,12 @@ PLACES = {
         {"rubbed": MU_P * (V_I - MU_P / M * 1e-3)},
     ),
     "a component": Place(
-        {
-            "model/components/cooling.py": ("", COMPONENT),
-            MODEL: (
-                AFTER,
-                "    from surfacechem.model.components.cooling import cooling\n\n    stated(cooling(build))\n",
-            ),
-        },
+        {"model/components/cooling.py": ("", COMPONENT)},
         {"v: 2 m/s": "v: 0 m/s"},
         {"H_cooled": -1e3, "T": T_I * math.sqrt(1 - 2e3 / (C * T_I)), "text": "()"},
     ),
     "a constraint": Place(
-        {
-            "model/constraints/track.py": ("", CONSTRAINT),
-            MODEL: (AFTER, "    from surfacechem.model.constraints.track import track\n\n    track(build)\n"),
-        },
+        {"model/constraints/track.py": ("", CONSTRAINT)},
         {},
         {"text": "the slider leaves its track"},
     ),
@@ -202,7 +192,7 @@ PLACES = {
         {"v": V_I - MU_P / M * 1e-3},
     ),
 }
-FILES = {"a component": 2, "a constraint": 2, "a solver": 2}
+FILES = {"a solver": 2}
 """Files to touch where it is more than one: the file itself and the list of its kind."""
 
 

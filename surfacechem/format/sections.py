@@ -41,7 +41,8 @@ from surfacechem.format.declarations import (
     law_keys,
     quantity,
 )
-from surfacechem.model.assemble import LOADABLE, TRACTIONS
+from surfacechem.model.components.interface import LOADABLE
+from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import DEFAULT_RTOL, OWN

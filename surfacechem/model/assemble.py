@@ -1,105 +1,114 @@
-"""From a scene to its system: roles read off, potentials differentiated, dissipative laws stated, balances formed."""
+"""From a scene to its system: phase by phase its components state what they add; the balances follow from all of it.
+
+A component is a module in one of the folders beside this one. Its functions named like the phases take what has been
+stated so far and yield records: nodes, bonds and energies, powers, states, margins, edges, notes, warnings.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+import pkgutil
+from collections.abc import Callable
+from functools import cache, partial
+from importlib import import_module
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.model.automaton import Sink
-from surfacechem.model.balances import INTERFACE
+from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
-from surfacechem.model.components.chemistry import reactions
-from surfacechem.model.components.conduction import conductors, profiles, slabs
-from surfacechem.model.components.force import force, rupture
-from surfacechem.model.components.friction import friction
-from surfacechem.model.components.gap import normal_gap, normal_motion
-from surfacechem.model.components.heat import heat_paths
-from surfacechem.model.components.interface import LOADABLE, bonding_variables, free_energy, prescribed_variables
-from surfacechem.model.components.logarithms import logarithmic_state
-from surfacechem.model.components.medium import medium
-from surfacechem.model.components.programme import TRACTIONS, programme, stage_ends
-from surfacechem.model.components.thermal import body_energies, equations, surface_rates, surface_work, temperatures
-from surfacechem.model.constraints.bound import released
-from surfacechem.model.constraints.envelope import apart_from_envelope, softening_mode
-from surfacechem.model.constraints.fold import folds
-from surfacechem.model.constraints.load_steps import load_steps
-from surfacechem.model.constraints.threshold import bonded_mode, limits, relaxing
-from surfacechem.model.constraints.unilateral import impacts, missed
-from surfacechem.model.ledger import flow, regime, sinks, state, totals
 from surfacechem.model.refit import Fit
 from surfacechem.model.sliding.rate_and_state import stands_for_velocity
-from surfacechem.model.sliding.tangential import tangential_gap, tangential_motion
-from surfacechem.model.system import START, Capped, Caution, Outside, Pace, Pair, Profile, Range, Role, System
+from surfacechem.model.system import (
+    START,
+    Capped,
+    Caution,
+    Conductor,
+    Outside,
+    Pace,
+    Pair,
+    Profile,
+    Range,
+    Role,
+    System,
+)
 from surfacechem.scene import Scene
 
-__all__ = ["LOADABLE", "TRACTIONS", "assemble"]
+PHASES = ("variables", "energies", "laws"), ("rows", "jumps", "stages"), ("outputs",)
+"""What components state first, and what from all powers, and when all is known that a run may show.
+
+Roles of variables, states and modes; the free energy with tractions and forces; laws, with the powers that they pass on
+and the balances of bonds and tractions; the balances of energy; what jumps, and what that takes with it; the ends of
+stages of the loading, which wait for any of these; what stands behind all other states.
+"""
+
+ORDER = (
+    "thermal",
+    "conduction",
+    "programme",
+    "interface",
+    "threshold",
+    "chemistry",
+    "force",
+    "friction",
+    "gap",
+    "tangential",
+    "unilateral",
+    "medium",
+    "heat",
+    "fold",
+    "load_steps",
+    "envelope",
+    "bound",
+)
+"""Components that build on those before them, or are printed behind them; all others follow by name."""
+
+ASKED_FOR: dict[str, Callable[[Scene], object]] = {
+    "conduction": lambda scene: any(body.conduction for body in scene.bodies),
+    "programme": lambda scene: scene.programme,
+    "medium": lambda scene: scene.interface.medium,
+}
+"""Components that are not imported where the scene has no part that asks for them."""
+
+
+@cache
+def _places() -> dict[str, str]:
+    """The module of each component by its file's name."""
+    folders = (components, constraints, sliding)
+    found = {
+        file.name: f"{room.__name__}.{file.name}" for room in folders for file in pkgutil.iter_modules(room.__path__)
+    }
+    return {name: found[name] for name in (*ORDER, *sorted(found.keys() - {*ORDER}))}
 
 
 def assemble(scene: Scene) -> System:
     """The system of a scene; InputError where a variable that is read has no role, or two."""
     build = Build(scene)
-    stated = partial(state, build)
-    # Variables: what evolves, what is prescribed, and the modes that laws read.
-    build.thermal = temperatures(build)
-    build.thermal = body_energies(build)
-    build.thermal = stated(slabs(build))
-    prescribed_variables(build)
-    programme(build)
-    build.bonding = bonding_variables(build)
-    normal_gap(build)
-    tangential_gap(build)
-    bonded_mode(build)
-    softening_mode(build)
-    fit = medium(build)
-    # The free energy, and the tractions and forces that are its derivatives.
-    build.energy = free_energy(build)
-    if build.interface.temperature is not None:
-        build.thermal = build.thermal.with_energy(INTERFACE, build.psi)
-    force(build)
-    # Laws: what they pass on, and the balances of bonds and of tractions.
-    limits(build)
-    stated(reactions(build))
-    rupture(build)
-    stated(friction(build))
-    stated(normal_motion(build))
-    stated(tangential_motion(build))
-    impacts(build)
-    relaxing(build)
-    build.conductances = stated(heat_paths(build))
-    missed(build)
-    # Balances of energy, from all that passes energy on.
-    build.rates = surface_rates(build)
-    stated(surface_work(build))
-    build.inflow = flow(build)
-    stated(equations(build))
-    # What jumps and what it takes with it.
-    folds(build)
-    load_steps(build)
-    apart_from_envelope(build)
-    released(build)
-    stage_ends(build)
-    # Outputs.
-    totals(build)
-    logarithmic_state(build)
-    layers = profiles(build)
+    needed = [place for name, place in _places().items() if name not in ASKED_FOR or ASKED_FOR[name](scene)]
+    found = [import_module(place) for place in needed]
+    for phases, follow in zip(PHASES, (ledger.flows, ledger.totals, _close), strict=True):
+        for phase in phases:
+            for component in found:
+                for record in getattr(component, phase, lambda _: None)(build) or ():
+                    ledger.take(build, record)
+        follow(build)
+    return _system(build)
+
+
+def _close(build: Build) -> None:
+    """What must hold for the whole, and what of it takes part in events."""
     build.varying_margins()
     _refuse_idle_initial_values(build)
-    taking = sinks(build)
+    build.sinks = ledger.sinks(build)
     if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
     shared = own & {item.name for item in build.named}
     assert not shared, f"parameters and quantities share the names {shared}"
-    unread = [name for name in scene.loading if name not in build.thermal.nodes and not build.variables.was_read(name)]
+    loading = (name for name in build.scene.loading if name not in build.thermal.nodes)
+    unread = (name for name in loading if not build.variables.was_read(name))
     build.warnings += [f"loading: {name} is prescribed but nothing reads it." for name in unread]
-    return _system(build, layers, taking, fit())
 
 
-def _system(
-    build: Build, layers: tuple[Profile, ...], taking: Mapping[str, tuple[Sink, ...]], fit: Fit | None
-) -> System:
+def _system(build: Build) -> System:
     """All that was stated, as one frozen graph."""
     far_fields = build.motion.far_fields
     return System(
@@ -117,32 +126,29 @@ def _system(
         pairs=build.noted(Pair),
         paces=build.noted(Pace),
         cautions=build.noted(Caution),
-        profiles=layers,
-        conductors=tuple(conductors(build)),
+        profiles=build.noted(Profile),
+        conductors=build.noted(Conductor),
         conductances=build.conductances,
-        regime=regime(build),
+        regime=ledger.regime(build),
         breakpoints=tuple(sorted({t for load in build.loads.values() for t in load.breakpoints()})),
-        cycles=tuple(_cycles(build)),
+        cycles=tuple(
+            f"{load.path if load.place else f'loading.{name}'}.{load.cycle}"
+            for name, load in build.loads.items()
+            if load.cycle
+        ),
         modes=tuple(build.modes),
         registers=tuple(build.registers),
         edges=tuple(build.edges),
         equilibria=tuple(build.equilibria),
-        sinks=taking,
+        sinks=build.sinks,
         follows={str(x): value for x, value in build.motion.follows.items()},
         given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
         pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
-        fit=fit,
+        fit=next(iter(build.noted(Fit)), None),
         warnings=(*build.interface.remarks, *build.warnings),
         outside=_outside(build),
         origin=partial(assemble, build.scene),
     )
-
-
-def _cycles(build: Build) -> Iterator[str]:
-    """Paths of the frequencies of histories that repeat themselves."""
-    for name, load in build.loads.items():
-        if load.cycle:
-            yield f"{load.path if load.place else f'loading.{name}'}.{load.cycle}"
 
 
 def _is_there(build: Build, role: Role) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import symengine
@@ -13,10 +14,23 @@ from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.model import balances
-from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register
+from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink
 from surfacechem.model.balances import Node, Power, Rows
-from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, Thermal
-from surfacechem.model.system import Account, Capped, Caution, Margin, Named, Pace, Pair, Range, State
+from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
+from surfacechem.model.refit import Fit
+from surfacechem.model.system import (
+    Account,
+    Capped,
+    Caution,
+    Conductor,
+    Margin,
+    Named,
+    Pace,
+    Pair,
+    Profile,
+    Range,
+    State,
+)
 from surfacechem.model.variables import Parameters, Variables, unit_of
 from surfacechem.quantities import Quantity
 from surfacechem.scene import Interface, Scene
@@ -63,25 +77,27 @@ class Motion:
     """New values of modes that a rigid contact has as it closes again."""
 
 
+Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor | Fit
+Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Edge | Equilibrium | Power | Note | str
+"""What components state; a string is a warning."""
+
+
 @dataclass(eq=False)
 class Build:
-    """What has been assembled so far, and how its parts add to it.
-
-    What the phases hand on is set once, by :func:`assemble`: ``thermal`` to ``conductances``.
-    """
+    """What has been stated so far, and what components ask for when they state more."""
 
     scene: Scene
     parameters: Parameters = field(init=False)
     variables: Variables = field(init=False)
     t: Any = field(default_factory=lambda: symengine.Symbol("t"))
     thermal: Thermal = NO_NODES
-    bonding: Mapping[str, Bond] = field(default_factory=dict)
+    bonding: dict[str, Bond] = field(default_factory=dict)
     energy: Energy = NO_ENERGY
     rates: Mapping[Any, Expression] = field(default_factory=dict)
     """Time derivatives of what the interface's free energy depends on beside temperature."""
-    inflow: Mapping[str, Sequence[Expression]] = field(default_factory=dict)
+    inflow: dict[str, list[Expression]] = field(default_factory=dict)
     """Heat and mechanical power that flow into each node [W/m^2]."""
-    conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
+    conductances: dict[tuple[str, str], list[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
     states: list[State] = field(default_factory=list)
     named: list[Named] = field(default_factory=list)
@@ -98,9 +114,11 @@ class Build:
     edges: list[Edge] = field(default_factory=list)
     equilibria: list[Equilibrium] = field(default_factory=list)
     motion: Motion = field(default_factory=Motion)
-    notes: list[Range | Capped | Pair | Pace | Caution] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     """What is watched along a run, and told where it matters; no equation depends on it."""
     warnings: list[str] = field(default_factory=list)
+    sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
+    """Who takes the heat of jumps."""
     used_names: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -126,6 +144,33 @@ class Build:
     def about(self) -> dict[Any, Expression]:
         """Initial values of the bonding variables, about which capacities are written."""
         return {bond.symbol: bond.initial for bond in self.bonding.values()}
+
+    def add(self, record: Record) -> None:
+        """Keep what a component states."""
+        match record:
+            case Thermal():
+                self.thermal = record
+            case Energy():
+                self.energy = record
+            case Bond():
+                self.bonding[str(record.symbol)] = record
+            case HeatPath():
+                self.conductances.setdefault(record.ends, []).append(record.h)
+            case _:
+                self.lists.get(type(record), self.notes).append(record)
+
+    @cached_property
+    def lists(self) -> Mapping[type, list[Any]]:
+        """Where records are kept, by their types; notes are all others."""
+        return {
+            State: self.states,
+            Account: self.ledger,
+            Margin: self.margins,
+            Edge: self.edges,
+            Equilibrium: self.equilibria,
+            Power: self.powers,
+            str: self.warnings,
+        }
 
     def energy_row(self, node: Node) -> Expression:
         """Energy balance of a node as a residual."""

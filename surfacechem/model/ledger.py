@@ -16,12 +16,15 @@ from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
 from surfacechem.model.automaton import Sink
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Node, Power
-from surfacechem.model.build import Build
+from surfacechem.model.build import Build, Record
 from surfacechem.model.components.heat import takers
-from surfacechem.model.components.thermal import GAPS, GEOMETRY
 from surfacechem.model.system import Account
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Body
+
+GAPS = ("g_n", "g_t", "u_t", "u_t2")
+GEOMETRY = (*GAPS, "J_c")
+"""Variables of the free energy that move the surfaces rather than their bonds."""
 
 
 @dataclass(frozen=True)
@@ -51,36 +54,52 @@ def passages(build: Build) -> Iterator[Passage]:
                 yield Passage(power.source, place, share * power.amount, power.channels)
 
 
-def state(build: Build, phase: Iterator[Power]) -> Any:
-    """Keep the powers that a phase yields, with their accounts, and return what it returns.
-
-    What dissipates has its accounts when all of that is known.
-    """
-    while True:
-        try:
-            power = next(phase)
-        except StopIteration as end:
-            return end.value
-        build.powers.append(power)
-        if power.kind != DISSIPATION:
-            _account(build, power)
+def take(build: Build, record: Record) -> None:
+    """Keep what a component states; a power with its accounts, but for what dissipates, before all of it is known."""
+    build.add(record)
+    if isinstance(record, Power) and record.kind != DISSIPATION:
+        _account(build, record)
 
 
-def flow(build: Build) -> dict[str, list[Expression]]:
-    """What flows into each node, by its name; what is dissipated gets its accounts first."""
+def _surface_rates(build: Build) -> dict[Any, Expression]:
+    """Time derivatives of what the interface's free energy depends on beside temperature."""
+    rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
+    for name in (*GEOMETRY, "phi"):
+        x = symengine.Symbol(name)
+        if x not in rates and depends(build.psi, x):
+            moved = build.motion.gap_rates.get(name)
+            rates[x] = build.rate_of(name) if moved is None else moved
+    return rates
+
+
+def _surface_work(build: Build) -> Iterator[Power]:
+    """Work that tractions do on the interface: from outside where the gap is prescribed, else from the bodies."""
+    for name in GEOMETRY:
+        x = symengine.Symbol(name)
+        power = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
+        if power != 0:
+            stretches = name == "J_c"
+            label = "W_J" if stretches else f"W_{name}"
+            text = "work done in stretching the surface" if stretches else f"work done on the gap {name}"
+            yield Power(WORK, MECHANICS if name in build.motion.gap_rates else OUTSIDE, INTERFACE, power, label, text)
+
+
+def flows(build: Build) -> None:
+    """What flows into each node, from all powers and the work of tractions; what is dissipated gets its accounts."""
+    build.rates = _surface_rates(build)
+    for power in _surface_work(build):
+        take(build, power)
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
-    inflow: dict[str, list[Expression]] = {}
     for passage in passages(build):
         source, target = build.thermal.places.get(passage.source), build.thermal.places.get(passage.target)
         if source is target:  # what bonds release stays where they are
             continue
         if target is not None:
-            inflow.setdefault(target.name, []).append(passage.rate)
+            build.inflow.setdefault(target.name, []).append(passage.rate)
         if source is not None:
-            inflow.setdefault(source.name, []).append(-passage.rate)
-    return inflow
+            build.inflow.setdefault(source.name, []).append(-passage.rate)
 
 
 def _account(build: Build, power: Power) -> None:

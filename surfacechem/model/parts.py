@@ -94,6 +94,14 @@ class Thermal:
 
 
 @dataclass(frozen=True)
+class HeatPath:
+    """A conductance [W/(m^2 K)] between two ends, in parallel with others of the same ends."""
+
+    ends: tuple[str, str]
+    h: Expression
+
+
+@dataclass(frozen=True)
 class Energy:
     """Free energy of the interface [J/m^2], and how much of it friction acts beside."""
 

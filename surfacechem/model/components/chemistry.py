@@ -48,7 +48,7 @@ class Reaction:
     """What a prescribed force adds to the affinity [J]."""
 
 
-def reactions(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
     laws = {}

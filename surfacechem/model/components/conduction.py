@@ -6,7 +6,7 @@ capacity: the body's own node, which heat paths, laws and perfect contact know. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -25,8 +25,8 @@ from surfacechem.quantities import Quantity
 from surfacechem.scene import Body, Conduction
 
 
-def slabs(build: Build) -> Generator[Power, None, Thermal]:
-    """Divide the bodies that conduct, and let heat flow along them; returns the nodes with what is divided."""
+def variables(build: Build) -> Iterator[Power | Thermal]:
+    """Divide the bodies that conduct, and let heat flow along them."""
     thermal = build.thermal
     for number, body in enumerate(build.scene.bodies, start=1):
         if body.conduction is None:
@@ -37,7 +37,7 @@ def slabs(build: Build) -> Generator[Power, None, Thermal]:
         if body.conduction.cells:
             slab, thermal = _divided(build, thermal, number, body, body.conduction)
             yield from _conduct(build, slab, thermal.node_of[body.name], bound)
-    return thermal
+    yield thermal
 
 
 def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction:
@@ -55,7 +55,7 @@ def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction
     )
 
 
-def conductors(build: Build) -> Iterator[Conductor]:
+def _conductors(build: Build) -> Iterator[Conductor]:
     """What it takes to judge whether a body may be one lump."""
     for number, body in enumerate(build.scene.bodies, start=1):
         law = body.conduction
@@ -157,9 +157,9 @@ def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression)
     return conductivity
 
 
-def profiles(build: Build) -> tuple[Profile, ...]:
+def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
     """The balances and states of the nodes inside the bodies, behind all others."""
-    found = []
+    yield from _conductors(build)
     for slab in build.thermal.slabs.values():
         surface, initial = build.thermal.node_of[slab.body.name], build.scene.initial.get(slab.profile)
         start = slab.profile if initial is not None else surface.name
@@ -174,21 +174,16 @@ def profiles(build: Build) -> tuple[Profile, ...]:
             build.rows.balance(node.name, build.energy_row(node))
             text = f"temperature of {slab.body.name}, point {i} from the contact"
             quantity = Quantity(node.name, "K", text)
-            build.states.append(
-                State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
-            )
+            yield State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
         law, last = slab.law, slab.behind[-1]
         thickness = f"{law.path if law.place else f'bodies.{slab.body.name}.conduction'}.thickness"
-        found.append(
-            Profile(
-                number=slab.number,
-                body=slab.body.name,
-                points=slab.points,
-                thickness=thickness,
-                surface=surface.name,
-                anchored=not surface.prescribed,
-                states=tuple(node.name for node in slab.inner),
-                far=last.name if last.prescribed else "",
-            )
+        yield Profile(
+            number=slab.number,
+            body=slab.body.name,
+            points=slab.points,
+            thickness=thickness,
+            surface=surface.name,
+            anchored=not surface.prescribed,
+            states=tuple(node.name for node in slab.inner),
+            far=last.name if last.prescribed else "",
         )
-    return tuple(found)

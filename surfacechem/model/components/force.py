@@ -30,7 +30,7 @@ ELASTIC = "bond elasticity"
 OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from zero."
 
 
-def force(build: Build) -> None:
+def energies(build: Build) -> None:
     """Give the normal traction and the force per bond their roles."""
     g_n = symengine.Symbol("g_n")
     loaded = depends(build.psi, g_n)
@@ -62,7 +62,7 @@ def _shared(build: Build) -> Expression:
     return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
 
 
-def rupture(build: Build) -> None:
+def laws(build: Build) -> None:
     """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
     carriers = list(_carriers(build))
     for name, bonds in carriers:

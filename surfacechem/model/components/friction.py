@@ -21,7 +21,7 @@ from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
 
-def friction(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     rubs, total = build.energy.rubs, symengine.Integer(0)
     for law in build.interface.frictions:

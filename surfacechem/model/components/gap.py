@@ -23,7 +23,7 @@ SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not
 OVERLAP = "the bodies overlap, and their contact is rigid"
 
 
-def normal_gap(build: Build) -> None:
+def variables(build: Build) -> None:
     """Give the normal gap its role; where it moves by a balance, it and its velocity become states."""
     mount = held(build, "n")
     if mount is None:
@@ -135,7 +135,7 @@ def _pressure(build: Build) -> Expression:
     return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
 
 
-def normal_motion(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
     mount = held(build, "n")
     if mount is None:

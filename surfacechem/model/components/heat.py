@@ -10,7 +10,7 @@ though one of the two alone may run uphill: into the hotter body, from an interf
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import symengine
@@ -20,29 +20,26 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
 from surfacechem.model.build import BOTH, Build
+from surfacechem.model.parts import HeatPath
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import NOTHING
 
-Conductances = dict[tuple[str, str], list[Expression]]
-"""Conductances in parallel between two ends [W/(m^2 K)]."""
 
-
-def heat_paths(build: Build) -> Generator[Power, None, Conductances]:
-    """Fluxes between nodes and external heat; returns the conductances."""
+def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
+    """Fluxes between nodes and external heat."""
     groups = _by_ends(build)
-    found = {ends: list(channels.values()) for ends, channels in groups}
+    for ends, channels in groups:
+        yield from (HeatPath(ends, h) for h in channels.values())
     for ends, channels in groups:
         yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
     for law in (law for law in build.scene.heat if _made_across(law)):
-        for ends, h in (yield from _through_film(build, law)).items():
-            found.setdefault(ends, []).append(h)
+        yield from _through_film(build, law)
     yield from _external_heat(build)
     if build.interface.temperature is None and build.interface.loss:
         rest = build.shares()[build.scene.bodies[1].name]
         reason = "the fractions of the interface's heat add up to more than 1"
-        build.margins.append(Margin("partition <= 1", rest + NOTHING, reason))
-    return found
+        yield Margin("partition <= 1", rest + NOTHING, reason)
 
 
 def _by_ends(build: Build) -> list[tuple[tuple[str, str], dict[str, Expression]]]:
@@ -123,7 +120,7 @@ def _made_across(law: HeatTransfer) -> bool:
     return law.closure == "medium" and law.resistances is not None
 
 
-def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dict[tuple[str, str], Expression]]:
+def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]:
     r"""Heat that a film at the mean temperature T_c gives its walls.
 
     Across the film the temperature is a parabola on a line. With the resistances r of the film and :math:`r_k` of its
@@ -141,20 +138,18 @@ def _through_film(build: Build, law: HeatTransfer) -> Generator[Power, None, dic
     build.law_margins(law, {})
     scale = r**2 + 4 * r * (r_1 + r_2) + 12 * r_1 * r_2
     beside = -2 * r / scale * (ends[1].T - ends[0].T)
-    flows, produced, walls = [], symengine.Integer(0), {}
+    flows, produced = [], symengine.Integer(0)
     for end, node, wall, sign in zip(law.between, ends, (r_2, r_1), (1, -1), strict=True):
         h = 6 * (r + 2 * wall) / scale
-        walls[INTERFACE, end] = h
+        yield HeatPath((INTERFACE, end), h)
         text = f"heat flux from the film into {end}"
         flux = Quantity(_path_name(build, "interface", end), "W/m^2", text, tag="e:qc_k1")
         q = build.name(flux, build.stretch * (h * (centre.T - node.T) + sign * beside))
         flows.append(Power(HEAT, INTERFACE, end, q, channels={law.channel: q}))
         produced += q * (centre.T - node.T) / (centre.T * node.T)
     # Booked as one: heat that a wall takes from a film colder than itself has come through it from the other wall.
-    first = replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
-    yield first
+    yield replace(flows[0], label=build.unique("film"), text="heat flow through the film", entropy=produced)
     yield from flows[1:]
-    return walls
 
 
 def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], dict[str, Expression]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,10 +13,11 @@ from surfacechem.contracts.terms import Load, Potential, Spec, UnderPressure
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, positive, where
 from surfacechem.model.automaton import Edge
+from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import initial_bonding
 from surfacechem.model.components.mounting import held, law_reads
-from surfacechem.model.parts import Bond, Energy
+from surfacechem.model.parts import Bond, Energy, Thermal
 from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
@@ -54,8 +55,8 @@ TRACTIONS = (
 """Gap, traction that is its derivative of the free energy, and its long name."""
 
 
-def prescribed_variables(build: Build) -> None:
-    """Histories under ``loading``; each comes to life when something reads it."""
+def variables(build: Build) -> Iterator[Bond]:
+    """Histories under ``loading``, each of which comes to life when something reads it, and the bonding states."""
     for name, load in build.scene.loading.items():
         if name in build.thermal.nodes:
             continue
@@ -63,6 +64,7 @@ def prescribed_variables(build: Build) -> None:
             known = [*LOADABLE, *build.thermal.nodes]
             raise InputError(f"nothing is called '{name}'.{suggestion(name, known)}", path="loading")
         build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
+    yield from _bonding_variables(build)
 
 
 def _prescribed(build: Build, name: str, load: Load) -> Expression:
@@ -74,9 +76,9 @@ def _prescribed(build: Build, name: str, load: Load) -> Expression:
     return symbol
 
 
-def bonding_variables(build: Build) -> dict[str, Bond]:
+def _bonding_variables(build: Build) -> Iterator[Bond]:
     """Bonding states, site densities and their bounds."""
-    sites, found = build.interface.sites, {}
+    sites = build.interface.sites
     if sites is not None:
         spec = Spec("1/m^2", "nominal density of reference bonding sites", above=0)
         nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
@@ -88,19 +90,18 @@ def bonding_variables(build: Build) -> dict[str, Bond]:
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
         density = build.variables.get("N_c", "the bonding state", "interface")
-        found["phi"] = _bonding_state(build, VARIABLES["phi"], density, limit)
+        yield _bonding_state(build, VARIABLES["phi"], density, limit)
     for variable in build.interface.variables:
         spec = Spec("1/m^2", "site density", above=0)
         amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
         quantity = Quantity(variable.name, "1", variable.long_name)
-        found[variable.name] = _bonding_state(build, quantity, amount, 1.0)
+        yield _bonding_state(build, quantity, amount, 1.0)
         # What it amounts to where it is one: N_x per reference area, n_x per current area.
         by, current = f"interface.{variable.name}", partial(_per_current_area, build, amount)
         build.variables.define(f"N_{variable.name}", partial(symengine.sympify, amount), "constant", by)
         build.variables.define(f"n_{variable.name}", current, "derived", by)
     if build.interface.bonds:
         build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
-    return found
 
 
 def _current_density(build: Build) -> Expression:
@@ -157,16 +158,16 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
 
 
-def free_energy(build: Build) -> Energy:
+def energies(build: Build) -> Iterator[Energy | Thermal]:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
     gaps = _gaps(build)
-    energies, energy = _energies(build, bounds, gaps)
+    stored, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
     # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
     centre = build.thermal.members.get("interface")
     known = {symengine.Symbol(x) for x in ("phi", "g_n", "g_t", "u_t", "u_t2", "J_c", centre, *build.bonding) if x}
-    for law, F in energies.items():
+    for law, F in stored.items():
         build.refuse_foreign(F, known, law)
         psi += F
         build.law_ranges(law)
@@ -183,7 +184,7 @@ def free_energy(build: Build) -> Energy:
     if depends(psi, symengine.Symbol("g_n")):
         # A potential that may pull bodies that touch says what part of it the contact bears.
         borne = [
-            energies[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
+            stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
             for law, b in bounds.items()
         ]
         sides = {} if build.find_mode("side") is None else _by_side(symengine.Symbol("g_n"))
@@ -192,7 +193,9 @@ def free_energy(build: Build) -> Energy:
         _warn_of_net_pressure(build)
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
-    return replace(energy, psi=psi)
+    yield replace(energy, psi=psi)
+    if build.interface.temperature is not None:
+        yield build.thermal.with_energy(INTERFACE, psi)
 
 
 def _gaps(build: Build) -> dict[Potential, Mapping[str, Expression]]:

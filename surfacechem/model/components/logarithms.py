@@ -29,7 +29,7 @@ def initial_bonding(build: Build, name: str) -> float:
     return math.exp(initial[LOGARITHM])
 
 
-def logarithmic_state(build: Build) -> None:
+def outputs(build: Build) -> None:
     """Replace the state phi by ln phi: d ln phi / dt is the balance of the bonds per bond."""
     if "phi" not in build.bonding or LOGARITHM not in build.scene.initial:
         return
@@ -43,4 +43,4 @@ def logarithmic_state(build: Build) -> None:
     build.named[:0] = [phi, change]
     build.rows.logarithm("phi", symbol, LOGARITHM, build.expanded(build.rows["phi"]))
     state = State(VARIABLES[LOGARITHM], symbol, dot, build.scene.initial[LOGARITHM], 1.0, algebraic=False)
-    build.states = [state if item.symbol == bond.symbol else item for item in build.states]
+    build.states[:] = [state if item.symbol == bond.symbol else item for item in build.states]

@@ -34,11 +34,11 @@ KEYS = {"k_m": "conductivity", "eta_m": "viscosity", "rho_m": "density", "cp_m":
 FITTED = (*KEYS, "gamma_m")
 
 
-def medium(build: Build) -> Callable[[], Fit | None]:
-    """Properties of the medium; each comes to life when something reads it. Returns what has the fit of its fluid."""
+def variables(build: Build) -> None:
+    """Properties of the medium; each comes to life when something reads it."""
     found = build.interface.medium
     if found is None:
-        return lambda: None
+        return
     _film(build, found)
     for name, value in found.properties.items():
         build.variables.define(name, partial(_given, build, name, value), "derived", f"{PATH}.{KEYS[name]}")
@@ -48,7 +48,6 @@ def medium(build: Build) -> Callable[[], Fit | None]:
             if name not in found.properties:
                 build.variables.define(name, partial(_property, fluid, name), "derived", f"{PATH}.fluid")
     build.variables.define("f_m", partial(_free_energy, build, found, fluid), "derived", PATH)
-    return lambda: fluid().fit() if fluid is not None and fluid.cache_info().currsize else None
 
 
 def _property(fluid: Callable[[], FluidFit], name: str) -> Expression:
@@ -188,11 +187,8 @@ class FluidFit:
         for end, sign in zip(self.ends, (1, -1), strict=True):
             reason = f"{fluid.name} has no properties beyond its range"
             build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
-
-    def fit(self) -> Fit:
-        """How a run goes on where it leaves the range."""
-        ends = (f"{FLUID_PATH}.low", f"{FLUID_PATH}.high")
-        return Fit(self.coefficients.fluid, str(self.T), self.held, self.states, self.coefficients, ends)
+        low, high = limits
+        build.notes.append(Fit(fluid, str(self.T), self.held, self.states, self.coefficients, (low, high)))
 
     def property(self, name: str) -> Expression:
         """A property as a named quantity, constant beyond its range."""

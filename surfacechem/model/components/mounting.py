@@ -46,6 +46,9 @@ class Direction:
 ALONG = Direction("t", "v", "direction", "t", "t_t", "tangential traction")
 ACROSS = Direction("t2", "v_2", "direction_2", "t_2", "t_t2", "transverse traction")
 
+TRACTIONS = (ALONG.total, ACROSS.total)
+"""Tractions along the interface, which a stage may wait for though no law reads them."""
+
 
 @dataclass(frozen=True)
 class Held:

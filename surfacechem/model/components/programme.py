@@ -13,19 +13,17 @@ from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOADABLE
-from surfacechem.model.components.mounting import ACROSS, ALONG, LENGTH
+from surfacechem.model.components.mounting import LENGTH, TRACTIONS
 from surfacechem.model.system import State
 from surfacechem.model.variables import unit_of
 from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
 from surfacechem.units import quotient
 
-TRACTIONS = (ALONG.total, ACROSS.total)
-"""Tractions along the interface, which a stage may wait for though no law reads them."""
 SCALES = {"m": LENGTH, "m/s": LENGTH}
 
 
-def programme(build: Build) -> None:
+def variables(build: Build) -> None:
     """The stage as a mode, and a state for each variable that the stages move."""
     stages = build.scene.programme
     if not stages:
@@ -73,7 +71,7 @@ def _during(stage: Expression, i: int) -> Expression:
     return symengine.Lt((stage - i) ** 2, symengine.RealDouble(0.25))
 
 
-def stage_ends(build: Build) -> None:
+def stages(build: Build) -> None:
     """The transition at the end of each stage: after a time, at a value of a variable, or at another transition."""
     stages = build.scene.programme
     if not stages:

@@ -12,7 +12,7 @@ from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, depends, derivative
 from surfacechem.model import balances
-from surfacechem.model.balances import HEAT, INTERFACE, MECHANICS, OUTSIDE, SURROUNDINGS, WORK, Node, Power
+from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, SURROUNDINGS, Node, Power
 from surfacechem.model.build import Build
 from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.parts import Thermal
@@ -29,12 +29,14 @@ CAPACITY_REMEDY = (
     "below 1, with kappa_2 = K_2 / (T_0 C) and C the capacities that share this temperature."
 )
 
-GAPS = ("g_n", "g_t", "u_t", "u_t2")
-GEOMETRY = (*GAPS, "J_c")
-"""Variables of the free energy that move the surfaces rather than their bonds."""
+
+def variables(build: Build) -> Iterator[Thermal]:
+    """The nodes, then with the free energies of the bodies."""
+    yield _temperatures(build)
+    yield _body_energies(build)
 
 
-def temperatures(build: Build) -> Thermal:
+def _temperatures(build: Build) -> Thermal:
     """Nodes: who carries which temperature, and which are prescribed."""
     scene = build.scene
     if scene.T_0 is not None:
@@ -92,8 +94,7 @@ def _mean_temperature(build: Build) -> Expression:
     return build.name(VARIABLES["T_c"], 1 / inverse)
 
 
-def body_energies(build: Build) -> Thermal:
-    """The nodes with the free energies of the bodies."""
+def _body_energies(build: Build) -> Thermal:
     thermal = build.thermal
     for k, body in enumerate(build.scene.bodies, start=1):
         if body.energy is None:
@@ -106,44 +107,20 @@ def body_energies(build: Build) -> Thermal:
     return thermal
 
 
-def surface_rates(build: Build) -> dict[symengine.Symbol, Expression]:
-    """Time derivatives of what the interface's free energy depends on beside temperature."""
-    rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
-    for name in (*GEOMETRY, "phi"):
-        x = symengine.Symbol(name)
-        if x not in rates and depends(build.psi, x):
-            moved = build.motion.gap_rates.get(name)
-            rates[x] = build.rate_of(name) if moved is None else moved
-    return rates
-
-
-def surface_work(build: Build) -> Iterator[Power]:
-    """Work that tractions do on the interface: from outside where the gap is prescribed, else from the bodies."""
-    for name in GEOMETRY:
-        x = symengine.Symbol(name)
-        power = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
-        if power != 0:
-            stretches = name == "J_c"
-            label = "W_J" if stretches else f"W_{name}"
-            text = "work done in stretching the surface" if stretches else f"work done on the gap {name}"
-            yield Power(WORK, MECHANICS if name in build.motion.gap_rates else OUTSIDE, INTERFACE, power, label, text)
-
-
-def equations(build: Build) -> Iterator[Power]:
+def rows(build: Build) -> Iterator[Power | State | Margin]:
     """Energy balances, states and margins of the temperatures; the heat that keeps prescribed ones is recovered."""
     thermal = build.thermal
-    for node in thermal.free:
-        _temperature_state(build, node)
+    yield from (_temperature_state(build, node) for node in thermal.free)
     own_rows = {node.name: build.energy_row(node) for node in thermal.free}
     for node in thermal.free:
-        _temperature_margins(build, node, own_rows[node.name])
+        yield from _temperature_margins(build, node, own_rows[node.name])
     # The row of the interface's node is the sum of all; where it has none that is free, that of the first.
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
     for node in thermal.nodes.values():
         if not node.prescribed:
             continue
-        build.margins.append(_warm(node))
+        yield _warm(node)
         if node.energies:
             build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
         supply = build.energy_row(node)
@@ -156,7 +133,7 @@ def equations(build: Build) -> Iterator[Power]:
         raise InputError(message, Place(path="bodies"))
 
 
-def _temperature_state(build: Build, node: Node) -> None:
+def _temperature_state(build: Build, node: Node) -> State:
     algebraic = balances.second(node.free_energy, node.T) == 0
     members = [body for body in build.scene.bodies if build.thermal.members[body.name] == node.name]
     if algebraic and members:
@@ -172,7 +149,7 @@ def _temperature_state(build: Build, node: Node) -> None:
             path=f"initial.{node.name}",
         )
     quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
-    build.states.append(State(quantity, node.T, node.T_dot, initial, initial, algebraic, is_temperature=True))
+    return State(quantity, node.T, node.T_dot, initial, initial, algebraic, is_temperature=True)
 
 
 def _initial(build: Build, node: Node) -> float:
@@ -213,19 +190,19 @@ def _warm(node: Node) -> Margin:
     return Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
 
 
-def _temperature_margins(build: Build, node: Node, row: Expression) -> None:
-    build.margins.append(_warm(node))
+def _temperature_margins(build: Build, node: Node, row: Expression) -> Iterator[Margin]:
+    yield _warm(node)
     if balances.second(node.free_energy, node.T) == 0:
-        _fold_margin(build, node, row)
+        yield _fold_margin(build, node, row)
     elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
         capacity = balances.conditioned(node.capacity(), build.about)
         quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
         symbol = build.name(quantity, capacity)
         reason = f"the heat capacity at {node.name} was lost"
-        build.margins.append(Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface"))
+        yield Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface")
 
 
-def _fold_margin(build: Build, node: Node, row: Expression) -> None:
+def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
     """An algebraic temperature is stable while heat leaves faster than it is produced as it rises."""
     explicit = {bond.dot: bond.dot - build.rows[name] for name, bond in build.bonding.items()}
     slope = _with_velocity(build, build.expanded(row.subs(explicit)), node.T)
@@ -242,7 +219,7 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> None:
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
         other = reason
-    build.margins.append(Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other)))
+    return Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other))
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:

@@ -98,7 +98,7 @@ def _read(build: Build, expression: Expression) -> set[str]:
     return found
 
 
-def released(build: Build) -> None:
+def jumps(build: Build) -> None:
     """Edges that break bonds at once free the bonding state from a bound that held it."""
     held = build.find_mode("held")
     for j, item in enumerate(build.edges):

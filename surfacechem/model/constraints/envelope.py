@@ -33,7 +33,7 @@ MATCH = 1e3 * NOTHING
 SAME = "Give `bond-stiffness` and this law the same E_b."
 
 
-def softening_mode(build: Build) -> None:
+def variables(build: Build) -> None:
     """The mode, for the laws that read it."""
     if not any(law.envelope is not None for law in build.interface.reactions):
         return
@@ -135,7 +135,7 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
     return [Edge("tear", guard, reason, lost, gone, equilibrates=True, heat="snap", when=when)]
 
 
-def apart_from_envelope(build: Build) -> None:
+def jumps(build: Build) -> None:
     """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
     mode = build.find_mode("debonding")
     for j, item in enumerate(build.edges):

@@ -29,7 +29,7 @@ Rise = Mapping[Any, Expression]
 Matrix = Sequence[Sequence[Expression]]
 
 
-def folds(build: Build) -> None:
+def jumps(build: Build) -> None:
     """The edge where the gaps in equilibrium lose it, and what tells which way they run."""
     if not build.equilibria:
         return

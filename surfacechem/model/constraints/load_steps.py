@@ -13,7 +13,7 @@ from surfacechem.model.automaton import Edge
 from surfacechem.model.build import Build
 
 
-def load_steps(build: Build) -> None:
+def jumps(build: Build) -> None:
     """The transition that loads make by their jumps, where a gap in equilibrium or a spring feels them."""
     springs = [far.stored(far.gap) for far in build.motion.far_fields.values() if far.works]
     felt = set().union(*(build.expanded(x).free_symbols for x in [*(e.residual for e in build.equilibria), *springs]))

@@ -29,7 +29,7 @@ Stoichiometry = Mapping[str, int | float]
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 
 
-def bonded_mode(build: Build) -> None:
+def variables(build: Build) -> None:
     """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
 
     def bonded() -> Expression:
@@ -53,7 +53,7 @@ def bonds_left(build: Build) -> Expression | None:
     return symengine.Add(*bonds) if bonds else None
 
 
-def limits(build: Build) -> None:
+def laws(build: Build) -> None:
     """Where a limit is reached bonds break; a rigid interface opens, and closes where the gap has closed."""
     closed = build.find_mode("closed")
     heals = [_limit(build, law, closed) for law in build.interface.limits]
@@ -130,7 +130,7 @@ def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
     )
 
 
-def relaxing(build: Build) -> None:
+def jumps(build: Build) -> None:
     """Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do."""
     local = [j for j, item in enumerate(build.edges) if item.name == "debond" and item.heat == "local"]
     if not (local and build.equilibria):

@@ -56,7 +56,7 @@ TOUCHING = PICOMETRE
 REMEDY = "Give a potential that does, such as `penalty`."
 
 
-def impacts(build: Build) -> None:
+def laws(build: Build) -> None:
     """How a gap that moves closes: where it has a mass by an impact, after which the bodies rebound or rest."""
     closed = build.find_mode("closed")
     if closed is None or "g_n" not in build.motion.gap_rates:
@@ -114,7 +114,7 @@ def _rests(
     return where(build.t > at_once, slow, 1), {fastest: swift}
 
 
-def missed(build: Build) -> None:
+def jumps(build: Build) -> None:
     """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
     if not any(register.name == "landed" for register in build.registers):
         return

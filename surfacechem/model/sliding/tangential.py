@@ -18,7 +18,7 @@ from surfacechem.model.sliding.formulation import Formulation, directions, displ
 from surfacechem.quantities import VARIABLES
 
 
-def tangential_gap(build: Build) -> None:
+def variables(build: Build) -> None:
     """States and modes of the tangential motion."""
     found = build.motion.slips = formulations(build)
     if not found:
@@ -60,7 +60,7 @@ def _along_displacement(build: Build) -> Expression:
     return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
 
 
-def tangential_motion(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power]:
     """Balance of the tangential tractions, and the edges between sticking and sliding."""
     if _in_the_plane(build.motion.slips):
         yield from plane.motion(build, build.motion.slips)
