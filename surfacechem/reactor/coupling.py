@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import cantera
 import symengine
@@ -102,13 +102,49 @@ def _multiplied(system: System, labels: Sequence[str]) -> System:
     return replace(system, named=named, parameters=(*system.parameters, *factors), origin=origin)
 
 
+REFUSED: list[Any] = []
+"""Connectors that were refused: Cantera's part of the reactors they join keeps pointing to them."""
+
+
+def refuse(connector: Any, message: str) -> NoReturn:
+    """InputError for a connector while Cantera makes it, which then carries nothing between the reactors it joins."""
+    REFUSED.append(connector)
+    if isinstance(connector, cantera.FlowDevice):
+        connector.device_coefficient = 0.0
+    else:
+        connector.area = 0.0
+    raise InputError(message)
+
+
+class StandIn(cantera.Reservoir):
+    """A reservoir that stands for a body: it takes heat through walls, and nothing else."""
+
+    def _add_wall(self, wall: Any) -> None:
+        if wall.velocity != 0.0 or wall.expansion_rate_coeff != 0.0:
+            refuse(wall, self.rigid())
+        super()._add_wall(wall)
+
+    def rigid(self) -> str:
+        """Why a wall on it does not move."""
+        return (
+            f"a wall on {self.name} moves, and its work would be lost: a body stores heat here, not volume. Leave out "
+            "`velocity` and `K`, or put the moving wall between two gases."
+        )
+
+    def _add_inlet(self, device: Any) -> None:
+        refuse(device, f"a flow into {self.name} would be lost: a body stores heat, not mass. Let it end in a reactor.")
+
+    def _add_outlet(self, device: Any) -> None:
+        refuse(device, f"a flow out of {self.name} has no source: a body stores heat, not mass. Begin it in a reactor.")
+
+
 class Port:
     """A body as a reservoir in the network, with its present temperature and the heat through its walls."""
 
     def __init__(self, name: str, node: str, heat_name: str) -> None:
         self.node, self.heat_name = node, heat_name
         self.name = name
-        self.reservoir = cantera.Reservoir(cantera.Solution(yaml=STAND_IN, name="body"), clone=False, name=name)
+        self.reservoir = StandIn(cantera.Solution(yaml=STAND_IN, name="body"), clone=False, name=name)
 
     def warm(self, temperature: float) -> None:
         """Show a temperature [K] to the walls."""
@@ -120,7 +156,14 @@ class Port:
         """Heat [W] that flows into the body through its walls."""
         return sum(self._through(wall) for wall in self.reservoir.walls)
 
+    def others(self) -> list[Any]:
+        """Reactors on the other sides of its walls."""
+        sides = ((wall.left_reactor, wall.right_reactor) for wall in self.reservoir.walls)
+        return [right if left is self.reservoir else left for left, right in sides]
+
     def _through(self, wall: Any) -> float:
+        if wall.expansion_rate != 0.0:
+            raise InputError(self.reservoir.rigid())
         if wall.heat_flux != 0.0:
             raise InputError(
                 f"a wall on {self.name} has a heat flux of its own, whose time is not known here. Give the wall U or "

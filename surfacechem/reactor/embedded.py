@@ -98,6 +98,11 @@ class EmbeddedScene:
         return any(depends(expression, system.t) for expression in (*named, *system.rows.values()))
 
     @property
+    def output_names(self) -> list[str]:
+        """Names of what is computed from the states."""
+        return [item.name for item in self.model.system.outputs]
+
+    @property
     def accounts(self) -> tuple[str, ...]:
         """Names of the ledger's lines."""
         return tuple(account.quantity.name for account in self.model.system.ledger)
@@ -147,7 +152,7 @@ class EmbeddedScene:
         found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
         if name in found:
             return float(found[name])
-        names = [item.name for item in system.outputs]
+        names = self.output_names
         if name not in names:
             raise InputError(f"the scene has no quantity '{name}'.{suggestion(name, [*found, *names])}")
         return float(self.model.output_function(evaluation.inputs)[names.index(name)])

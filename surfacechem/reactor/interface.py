@@ -15,7 +15,7 @@ from surfacechem import format as cases
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError
 from surfacechem.format import Case
-from surfacechem.reactor.coupling import Port, node_of, suffix_of
+from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
 from surfacechem.reactor.embedded import EmbeddedScene, EndError
 from surfacechem.reactor.history import History
 from surfacechem.runs.simulation import Simulation
@@ -82,7 +82,9 @@ class InterfaceReactor(HeldReactor):
         self._dated = True
         """Whether that is the time of the variables last put."""
         self._restarted = 0.0
-        """Time of the last jump, after which steps begin at the rounding of the time."""
+        """Time of the start or of the last jump, after which steps begin at the rounding of the time."""
+        self._connecting = False
+        """Whether a wall is made that carries heat between a body and the reactor in its place."""
         self.evaluations, self.seconds = 0, 0.0
         self._take_up(self.scene)
         for body, reactor in self.bodies.items():
@@ -108,7 +110,41 @@ class InterfaceReactor(HeldReactor):
 
     def _connect(self, reactor: Any, account: int) -> None:
         """What must be given to the body to keep the reactor's temperature, the reactor loses."""
+        self._connecting = True
         cantera.Wall(self, reactor, A=self.area, Q=lambda t: -float(self.attempt(lambda: self._rates(t))[account]))
+        self._connecting = False
+
+    def _add_wall(self, wall: Any) -> None:
+        """Called by Cantera where a wall is made on this reactor itself, which is two bodies and what is between."""
+        if self._connecting:
+            super()._add_wall(wall)
+            return
+        names = ", ".join(f"{self.name}.body({body.name!r})" for body in self.scene.case.scene.bodies)
+        refuse(wall, f"a wall on {self.name} does not say which body it touches. Put it on one of them: {names}.")
+
+    def _add_inlet(self, device: Any) -> None:
+        """Called by Cantera where a flow device ends here."""
+        refuse(device, f"{self.name} has no volume that a flow could fill. Let the flow end in a reactor beside it.")
+
+    def _add_outlet(self, device: Any) -> None:
+        """Called by Cantera where a flow device begins here."""
+        refuse(device, f"{self.name} has no volume from which a flow could come. Let it begin in a reactor beside it.")
+
+    def add_sensitivity_species_enthalpy(self, species: Any) -> None:
+        """Refused: the species' thermo is in the formulas of the scene, where Cantera does not change it."""
+        raise InputError(
+            f"sensitivities to the enthalpy of {species} are not known in a network. Change the species in the "
+            "mechanism, or use `add_sensitivity_reaction`."
+        )
+
+    @property
+    def T(self) -> float:
+        """Present temperature of the interface [K]; InputError where neither it nor the whole scene has one."""
+        named = ("T_c", "T")
+        own = [name for name in named if name in (*self.scene.states, *self.scene.output_names)]
+        if not own:
+            raise InputError(f"the interface of {self.name} has no temperature of its own. Ask for {self.name}['T_1'].")
+        return self[own[0]]
 
     def body(self, name: str) -> Any:
         """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat."""
@@ -126,6 +162,17 @@ class InterfaceReactor(HeldReactor):
         return self.ports[name].reservoir
 
     # -- the network's view -------------------------------------------------------------------------------------------
+
+    def replace_initialize(self, start: float) -> None:
+        super().replace_initialize(start)
+        if self.surfaces:
+            self.error = InputError(
+                f"a ReactorSurface on {self.name} has no gas to react with. Put it on the reactor of the gas."
+            )
+            raise self.error
+        self._restarted = start
+        if start != self.t:
+            self.begin_piece(start, 0.0)
 
     def start(self) -> Array:
         return np.asarray(self.x / self.unit)

@@ -13,10 +13,15 @@ import numpy as np
 from surfacechem.errors import InputError
 from surfacechem.reactor.interface import InterfaceReactor
 from surfacechem.reactor.watch import Watch
-from surfacechem.solve.contract import Counters
+from surfacechem.solve.adapters.cantera_network import last_step
+from surfacechem.solve.adapters.dense_step import Guards, first_crossing
+from surfacechem.solve.contract import Array, Counters, Margin
 
 GROWTH = 1e4
 """How much longer than the last a step of CVODE may be: after the first step this, later 10."""
+
+STEPS_OF_A_RESIDUAL = 10
+"""Steps between two looks at whether anything changes still, as in Cantera."""
 
 LONGEST = 1.0
 """Time that counts as what is integrated where no end is given [s]."""
@@ -42,39 +47,60 @@ class ReactorNet(cantera.ReactorNet):
         return Watch(self, self.interfaces)
 
     def advance(self, t: float, apply_limit: bool = True) -> float:
-        """Advance to time t [s]; returns the time reached."""
+        """Advance to time t [s], or to where a variable has changed by its advance limit; returns the time reached."""
         while True:
             goal = min([t, *self._breakpoints()])
             with self._guarded():
-                self._reach(goal, apply_limit)
-            self._arrive(goal)
-            if goal >= t or self.time < goal:
+                if self._watch.interfaces:
+                    self._reach(goal, apply_limit)
+                else:
+                    super().advance(goal, apply_limit)
+            self._arrive(float(self.time))
+            if self.time >= t or self.time < goal:
                 return float(self.time)
 
     def _reach(self, goal: float, apply_limit: bool) -> None:
         """Advance to a time, through the events of scenes on the way."""
         watch = self._watch
-        if not watch.interfaces:
-            super().advance(goal, apply_limit)
         for interface in watch.interfaces:
             interface.scene.moments.until(goal, self.rtol)  # type: ignore[union-attr]
+        start = np.array(self.get_state()) if apply_limit and np.any(self.advance_limits >= 0) else None
         while self.time < goal:
-            before = self.time
             if self.time >= watch.known:
-                self._look(goal, apply_limit)
-            event, now = watch.event, self.time
-            super().advance(min(goal, watch.known if event is None else max(event.t, now)), apply_limit)
+                self._look(goal)
+            event, now = watch.event, float(self.time)
+            end = min(goal, watch.known if event is None else max(event.t, now))
+            reached = end if start is None else self._limited(now, end, start)
+            super().advance(reached, False)
             watch.book(now, self.time)
+            if reached < end:
+                return
             if event is not None and self.time >= event.t:
                 event.interface.jump(self.time, event.index)
                 self._anew(f"the event at t = {self.time:g} s")
-            elif self.time <= before:
-                return  # a limit that the user has set has stopped it
 
-    def _look(self, goal: float, apply_limit: bool = True) -> None:
+    def _limited(self, now: float, end: float, start: Array) -> float:
+        """The time in a step at which a variable has first changed by its advance limit; the end where none has.
+
+        Cantera's own limit would count from the last event or step at which we look, not from where the user started.
+        """
+        limits = np.asarray(self.advance_limits)
+        limited = limits >= 0
+
+        def room(_: float, y: Array) -> Array:
+            return np.asarray((limits - np.abs(y - start))[limited])
+
+        if np.any(room(now, np.asarray(self.get_state())) < 0):  # an event has gone beyond it
+            return now
+        step = last_step(self, now, end, np.ones(len(limits)))
+        guards = Guards.of([Margin.stop()] * int(limited.sum()), room)
+        guards.start(room(now, step.y(now)))
+        return first_crossing(step, guards, np.ones(int(limited.sum()), dtype=bool), 0.0)[0]
+
+    def _look(self, goal: float) -> None:
         """Let the integrator take a step, and go a little way into it."""
         before = self.time
-        super().advance(self._watch.ahead(goal), apply_limit)
+        super().advance(self._watch.ahead(goal), False)
         self._watch.look()
         self._watch.book(before, self.time)
 
@@ -105,6 +131,37 @@ class ReactorNet(cantera.ReactorNet):
         self._arrive(self.time)
         return float(self.time)
 
+    def advance_to_steady_state(  # type: ignore[override] - the stub has overloads by `return_residuals`
+        self,
+        max_steps: int = 10000,
+        residual_threshold: float = 0.0,
+        atol: float = 0.0,
+        return_residuals: bool = False,
+    ) -> Array | None:
+        """Step until nothing changes any more, as Cantera's method of this name does, through the events on the way."""
+        threshold, floor = residual_threshold or 10 * self.rtol, atol or self.atol
+        self.step()  # initializes the network, which has no state before
+        before = np.asarray(self.get_state())
+        largest, residuals = np.abs(before), []
+        for _ in range(max_steps):
+            for _ in range(STEPS_OF_A_RESIDUAL):
+                self.step()
+            now = np.asarray(self.get_state())
+            largest = np.maximum(largest, np.abs(now))
+            residuals.append(float(np.linalg.norm((now - before) / (largest + floor))) / np.sqrt(len(now)))
+            if residuals[-1] < threshold:
+                return np.array(residuals) if return_residuals else None
+            before = now
+        raise cantera.CanteraError(f"no steady state was reached in {max_steps * STEPS_OF_A_RESIDUAL} steps.")
+
+    def solve_steady(self, loglevel: int = 0) -> None:
+        """Refused with interfaces: reactions on a surface keep its sites, so steady states are not isolated."""
+        if self.interfaces:
+            raise InputError(
+                "solve_steady does not know reacting surfaces, whose sites are conserved. Use advance_to_steady_state."
+            )
+        super().solve_steady(loglevel)
+
     def _watched_step(self, following: Sequence[float]) -> float:
         """To the end of the integrator's next step, or the event or breakpoint in it."""
         watch, ahead = self._watch, min(following, default=np.inf)
@@ -132,14 +189,16 @@ class ReactorNet(cantera.ReactorNet):
             self.reinitialize()
 
     def _refuse_strangers(self) -> None:
-        """A reactor that takes the place of a body changes only if it is in the network."""
+        """A reactor in the place of a body, or behind a wall on one, changes only if it is in the network."""
         for interface in self.interfaces:
-            for body, reactor in interface.bodies.items():
-                known = isinstance(reactor, cantera.Reservoir) or any(item is reactor for item in self.reactors)
-                if not known:
+            others = [(f"stands for the body {body}", reactor) for body, reactor in interface.bodies.items()]
+            for name, port in interface.ports.items():
+                others += [(f"has a wall to {name}", reactor) for reactor in port.others()]
+            for role, reactor in others:
+                if not isinstance(reactor, cantera.Reservoir) and all(item is not reactor for item in self.reactors):
                     raise InputError(
-                        f"the reactor that stands for the body {body} of {interface.name} is not in the network, so "
-                        "its temperature would never change: give it to ReactorNet too, or let it be a Reservoir."
+                        f"the reactor that {role} of {interface.name} is not in the network, so its "
+                        "temperature would never change: give it to ReactorNet too, or let it be a Reservoir."
                     )
 
     def _arrive(self, t: float) -> None:

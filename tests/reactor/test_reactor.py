@@ -328,8 +328,9 @@ def test_walls_come_before_the_network_runs(warm):
 
 
 def test_a_wall_with_a_history_of_its_own(warm):
-    interface, net = network(warm)
-    ct.Wall(interface.body("lower"), stirred(300.0), Q=lambda t: 5.0 + t)
+    gas = stirred(300.0)
+    interface, net = network(warm, others=[gas])
+    ct.Wall(interface.body("lower"), gas, Q=lambda t: 5.0 + t)
     with pytest.raises(InputError, match="a wall on lower has a heat flux of its own"):
         net.advance(1.0)
 
@@ -379,3 +380,98 @@ def test_what_cantera_holds_stays_alive():
         assert [interface.phase.multiplier(0) for interface in interfaces] == [1.0] * 3
     finally:
         gc.set_threshold(*threshold)
+
+
+# -- what Cantera's own reactors offer ---------------------------------------------------------------------------------
+
+
+def oven():
+    return ct.IdealGasReactor(ct.Solution("air.yaml"), clone=True, name="oven")
+
+
+@pytest.mark.parametrize(
+    ("connect", "message"),
+    [
+        (lambda gas, interface: ct.Wall(gas, interface, U=10.0), r"Put it on one of them: interface.body\('lower'\)"),
+        (lambda gas, interface: ct.MassFlowController(gas, interface, mdot=1e-3), "no volume that a flow could fill"),
+        (lambda gas, interface: ct.MassFlowController(interface, gas, mdot=1e-3), "from which a flow could come"),
+        (lambda gas, interface: ct.Wall(gas, interface.body("upper"), velocity=1e-3), "moves, and its work"),
+        (lambda gas, interface: ct.Wall(interface.body("upper"), gas, K=1e-3), "moves, and its work"),
+        (lambda gas, interface: ct.MassFlowController(gas, interface.body("upper"), mdot=1e-3), "not mass"),
+        (lambda gas, interface: ct.Valve(interface.body("upper"), gas, K=1.0), "not mass"),
+        (lambda gas, interface: interface.add_sensitivity_species_enthalpy(0), "add_sensitivity_reaction"),
+    ],
+)
+def test_connectors_that_would_lose_something_are_refused_and_carry_nothing(connect, message):
+    gas, interface = oven(), InterfaceReactor("dna-adhesive", area=0.01)
+    with pytest.raises(InputError, match=message):
+        connect(gas, interface)
+    before = gas.mass, gas.phase.int_energy_mass
+    ReactorNet([gas, interface]).advance(1.0)
+    assert (gas.mass, gas.phase.int_energy_mass) == pytest.approx(before, rel=1e-12)
+
+
+def test_a_wall_that_begins_to_move_is_an_error():
+    gas, interface = oven(), InterfaceReactor("dna-adhesive", area=0.01)
+    wall = ct.Wall(gas, interface.body("upper"), U=10.0)
+    wall.velocity = 1e-3
+    with pytest.raises(InputError, match="its work would be lost"):
+        ReactorNet([gas, interface]).advance(1.0)
+
+
+def test_a_reactor_behind_a_wall_has_to_be_in_the_network():
+    gas, interface = oven(), InterfaceReactor("dna-adhesive", area=0.01)
+    ct.Wall(gas, interface.body("upper"), U=10.0)
+    with pytest.raises(InputError, match="the reactor that has a wall to upper of interface is not in the network"):
+        ReactorNet([interface]).advance(1.0)
+
+
+def test_a_surface_on_an_interface_is_refused():
+    interface = InterfaceReactor("dna-adhesive")
+    ct.ReactorSurface(interface.phase, interface, clone=False)
+    with pytest.raises(InputError, match="Put it on the reactor of the gas"):
+        ReactorNet([interface]).advance(1.0)
+
+
+@pytest.mark.parametrize(("case", "name"), [("dna-adhesive", "T_c"), ("exothermic", "T")])
+def test_the_temperature_is_that_of_the_interface(case, name):
+    interface, net = network(case)
+    net.advance(0.5)
+    assert interface.T == interface[name] != 298.15
+
+
+@pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])
+@pytest.mark.parametrize(("case", "variable", "limit"), [("dna-adhesive", "T_2", 0.5), ("exothermic", "T", 0.5)])
+def test_advance_limits_count_from_where_the_user_starts(kind, case, variable, limit):
+    interface = InterfaceReactor(case)
+    net = kind([interface])
+    net.rtol = RTOL
+    interface.set_advance_limit(variable, limit)
+    values = [interface[variable]]
+    for _ in range(3):
+        assert net.advance(10.0) < 10.0
+        values.append(interface[variable])
+    changes = np.abs(np.diff(values))
+    assert np.all(changes <= limit * (1 + LOOSE))
+    assert np.all(changes > 0.4 * limit)
+
+
+@pytest.mark.parametrize("kind", [ReactorNet, ct.ReactorNet])
+def test_a_network_may_begin_at_any_time(kind):
+    later, at_once = (InterfaceReactor("exothermic") for _ in range(2))
+    for interface, start in ((later, 5.0), (at_once, 0.0)):
+        net = kind([interface])
+        net.rtol, net.initial_time = RTOL, start
+        net.advance(start + 0.8)
+    assert later.x == pytest.approx(at_once.x, rel=LOOSE)
+
+
+@pytest.mark.parametrize("case", ["dna-adhesive", "exothermic"])
+def test_steady_states(case):
+    interface, net = network(case)
+    residuals = net.advance_to_steady_state(return_residuals=True)
+    assert residuals[-1] < 10 * RTOL
+    end = surfacechem.run(case, ["run.until=1000"]).dataset.isel(time=-1)
+    assert interface["phi"] == pytest.approx(float(end["phi"]), rel=LOOSE)
+    with pytest.raises(InputError, match="Use advance_to_steady_state"):
+        net.solve_steady()
