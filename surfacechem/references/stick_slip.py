@@ -86,13 +86,13 @@ class StickSlip(Reference):
     t_s: float = parameter("Pa", "traction that sticking bears", above=0)
     t_k: float = parameter("Pa", "traction of sliding", at_least=0)
 
+    told = read(tangential="m k", ramp="V=w_t")
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        held = {name: scene.tangential(name) for name in ("m", "k")}
         mu, mu_s, p = scene.friction("mu"), scene.friction("mu_s"), scene.initial("p")
-        if mu is None or p is None:
-            return {**held, "V": scene.ramp("w_t")}
-        return {**held, "V": scene.ramp("w_t"), "t_k": mu * p, "t_s": max(mu, mu_s or 0.0) * p}
+        bears = {} if mu is None or p is None else {"t_k": mu * p, "t_s": max(mu, mu_s or 0.0) * p}
+        return {**super().from_scene(scene), **bears}
 
     def __post_init__(self) -> None:
         """Refuse a limit below the traction of sliding."""
@@ -171,14 +171,13 @@ class BondedSlider(Reference):
     mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
     mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
 
+    told = read(tangential="m k", ramp="V=w_t", initial="p", friction="mu_b mu_ub mu_k=mu")
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        held = {name: scene.tangential(name) for name in ("m", "k")}
-        T, T_0 = scene.temperature, scene.constant("T_0")
+        told, T, T_0 = super().from_scene(scene), scene.temperature, scene.constant("T_0")
         cooler = T_0 / T if T and T_0 else 1.0  # bonds bear mu_b p T_0 / T
-        limits = {name: scene.friction(name) for name in ("mu_b", "mu_ub")}
-        static = {name: None if mu is None else mu * cooler for name, mu in limits.items()}
-        return {**held, **static, "V": scene.ramp("w_t"), "p": scene.initial("p"), "mu_k": scene.friction("mu")}
+        return {name: x * cooler if x and name in ("mu_b", "mu_ub") else x for name, x in told.items()}
 
     def __post_init__(self) -> None:
         """Refuse what sticks less than it slides, and limits so far apart that the contact slips back."""

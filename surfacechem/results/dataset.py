@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -81,13 +82,17 @@ def profile_columns(trajectory: Trajectory) -> list[Column]:
     return found
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Results(ABC):
     """What a run and a sweep hand back: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
 
-    title: str
-    source: str
-    case: str
-    mechanism: str
+    title: str = ""
+    source: str = ""
+    case: str = ""
+    """Text of the case, from which the run can be made again."""
+    mechanism: str = ""
+    changes: Mapping[str, float] = field(default_factory=dict)
+    """Parameters and initial values that differ from the case, by path."""
 
     @property
     @abstractmethod

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -43,13 +42,7 @@ class Solution(Results):
     """What a run hands back. ``dataset`` is the xarray Dataset; ``write`` saves the same as netCDF."""
 
     trajectory: Trajectory
-    title: str = ""
-    source: str = ""
-    case: str = ""
-    mechanism: str = ""
     accuracy: Accuracy | None = None
-    changes: Mapping[str, float] = field(default_factory=dict)
-    """Parameters and initial values that differ from the case, by path."""
     notes: tuple[str, ...] = ()
     """What else a reader of the results has to know."""
     case_run: Run | None = None

@@ -18,7 +18,7 @@ from surfacechem.format.plans import recorded_plan
 from surfacechem.results.netcdf import reading
 from surfacechem.results.solution import Solution
 from surfacechem.runs.simulation import Simulation
-from surfacechem.runs.sweep_dataset import SweepSolution
+from surfacechem.runs.sweeps import SweepSolution
 
 A = TypeVar("A")
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache, cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from surfacechem.units import parse
 
 if TYPE_CHECKING:
     from surfacechem.format.plans import Plan
-    from surfacechem.runs.sweep_dataset import SweepSolution
+    from surfacechem.runs.sweeps import SweepSolution
 
 
 def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
@@ -109,16 +109,18 @@ class Simulation:
             found = replace(found, source=f"{found.source}; {unused}")
         return Solution(
             trajectory,
-            title=case.title,
-            source=case.source,
-            case=case.text,
-            mechanism=case.mechanism_text or "",
             accuracy=found,
-            changes=values,
             case_run=case.run,
             error_from=error,
             notes=spatial.missed(case.scene, (errors or [CellErrors()])[0], found),
+            **chosen._origin(values),
         )
+
+    def _origin(self, changes: Mapping[str, float]) -> dict[str, Any]:
+        """Where results are from."""
+        case = self.case
+        texts = {"title": case.title, "source": case.source, "case": case.text, "mechanism": case.mechanism_text or ""}
+        return {**texts, "changes": changes}
 
     def _unused(self, values: Mapping[str, float]) -> str:
         """Why the exact solution of the case does not count with these values; empty where it does."""
@@ -232,7 +234,6 @@ class Simulation:
     ) -> SweepSolution:
         """Run a plan whose values are in SI."""
         from surfacechem.runs import sweeps
-        from surfacechem.runs.sweep_dataset import SweepSolution
 
         constants = self.system.constants
         values = self._values(changes or {})
@@ -246,10 +247,10 @@ class Simulation:
             return freed.sweep_plan(plan, values, threads)
         values = {path: value for path, value in values.items() if path not in constants}
         chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
-        assert isinstance(done, sweeps.Sweep)
+        model = done[0].model
+        solution = sweeps.SweepSolution(model, plan, model.chosen(self.case.run), done, **chosen._origin(values))
         cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
-        case, found = chosen.case, sweeps.accuracy(chosen.case, done, threads, cells)
-        return SweepSolution(done, case.title, case.source, case.text, case.mechanism_text or "", found, values)
+        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
 
     def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
         from surfacechem.format.plans import plan_of, read_sweep, read_until

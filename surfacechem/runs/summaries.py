@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.solve.jumps import ADMISSIBLE
 
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
     from surfacechem.runs.check import Group
-    from surfacechem.runs.sweep_dataset import SweepSolution
+    from surfacechem.runs.sweeps import SweepSolution
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Run
 
@@ -117,27 +115,27 @@ def _balances(books: Audit) -> str:
 
 def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
     """What was swept, how the runs ended, how accurate and how fast they were, and where they are."""
-    sweep, lines = solution.sweep, [solution.title or "untitled"]
+    lines = [solution.title or "untitled"]
     spans = {
         name: f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis.values) > 1 else f"{axis.values[0]:g}"
         for name, axis in solution.axes.items()
     }
     axes = [f"{name} ({spans[name]}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
     lines.append(labelled("swept", " by ".join(axes)))
-    lines.append(labelled("solved", _solved(solution.system, sweep.run)))
-    lines.append(labelled("ended", f"{len(sweep)} runs: {solution.ends}"))
+    lines.append(labelled("solved", _solved(solution.system, solution.run)))
+    lines.append(labelled("ended", f"{len(solution.runs)} runs: {solution.reason}"))
     if accuracy := solution.accuracy:
-        known = accuracy.errors[np.isfinite(accuracy.errors)]
+        known = accuracy.known
         missing = len(accuracy.errors) - len(known)
         unknown = f"; unknown in {missing} runs" if missing else ""
         error = f"{known.max():.2g} ({accuracy.source}){unknown}" if len(known) else f"unknown ({accuracy.source})"
         lines.append(labelled("error", error))
-    speed = f"run {duration(sweep.seconds)}, compile {duration(sweep.model.compile_seconds)}"
-    lines.append(labelled("time", f"{speed}; {sweep.steps} steps"))
+    speed = f"run {duration(solution.seconds)}, compile {duration(solution.model.compile_seconds)}"
+    lines.append(labelled("time", f"{speed}; {solution.steps} steps"))
     if events := _sweep_events(solution):
         lines.append(labelled("events", events))
-    energy, entropy, sites = (f"{sweep.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
-    count = sum(books.destroys for books in sweep.audits)
+    energy, entropy, sites = (f"{solution.worst(balance):.1e}" for balance in ("energy", "entropy", "site"))
+    count = sum(books.destroys for books in solution.audits)
     verdict = f"ENTROPY DESTROYED in {count} runs" if count else "no law destroys entropy"
     lines.append(labelled("balances", f"energy {energy}, entropy {entropy}, sites {sites}; {verdict}"))
     if written:
@@ -147,8 +145,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
 
 def _sweep_events(solution: SweepSolution) -> str:
     """What jumped in all runs, and what the second law says to it."""
-    sweep = solution.sweep
-    runs = [run.jumps for run in sweep]
+    runs = [run.jumps for run in solution.runs]
     jumps = [jump for run in runs for jump in run]
     if not jumps:
         return ""

@@ -1,9 +1,10 @@
-"""Sweeps: a grid of parameter values, the runs over it, and how far each of them is from the truth."""
+"""Sweeps: a grid of parameter values, the runs over it, how far each is from the truth, and all of it as a dataset."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -15,77 +16,30 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.format import Case
-from surfacechem.format.plans import STATISTICS, Plan
+from surfacechem.format.plans import STATISTICS, Axis, Plan
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
 from surfacechem.results.audit import Audit, audit
+from surfacechem.results.dataset import Results, quantities, quantity_columns
 from surfacechem.results.error_estimates import against_exact, estimated, second_run, with_cells
-from surfacechem.results.event_table import event_times
+from surfacechem.results.event_table import entropy_destroyed, event_columns, event_times
 from surfacechem.results.matching import exact_values, match
+from surfacechem.results.netcdf import Column, versions
 from surfacechem.runs import spectrum
 from surfacechem.runs.spectrum import Statistics
-from surfacechem.scene import Scene
 from surfacechem.solve.run import Model, Run, Trajectory
 from surfacechem.tolerances import EPS
 
-
-@dataclass(frozen=True)
-class SweepAccuracy:
-    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
-
-    errors: NDArray[np.float64]
-    source: str
-    exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+BALANCES = {
+    "energy": "largest energy residual relative to the energy exchanged",
+    "entropy": "largest entropy residual relative to what was exchanged",
+    "site": "largest residual of the site balances",
+}
+"""Balances of a run, and what their errors are in words."""
 
 
-@dataclass(frozen=True)
-class Sweep(Sequence[Trajectory]):
-    """Runs over a grid, in the order of :attr:`Plan.points`."""
-
-    model: Model
-    plan: Plan
-    run: Run
-    """Settings of all runs; where a load ends them, each has output times of its own."""
-    runs: Sequence[Trajectory]
-
-    def __len__(self) -> int:
-        """Number of runs."""
-        return len(self.runs)
-
-    def __iter__(self) -> Iterator[Trajectory]:
-        """The runs in order."""
-        return iter(self.runs)
-
-    def __getitem__(self, i: Any) -> Any:
-        """One run."""
-        return self.runs[i]
-
-    @property
-    def seconds(self) -> float:
-        """Run time of all runs."""
-        return sum(run.seconds for run in self)
-
-    @property
-    def steps(self) -> int:
-        """Steps of all runs."""
-        return sum(run.result.counters.steps for run in self)
-
-    @cached_property
-    def audits(self) -> list[Audit]:
-        """The balances of each run."""
-        return [audit(run) for run in self]
-
-    def worst(self, balance: str) -> float:
-        """Largest error over all runs of the balance of energy, entropy or site."""
-        return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
-
-    @cached_property
-    def statistics(self) -> list[Statistics]:
-        """Mode, median and mean of the load at rupture of each run; empty where the sweep has none."""
-        if self.plan.until is None or not spectrum.breaks_bonds(self.model.system):
-            return []
-        return [spectrum.statistics(run, self.plan.until[0]) for run in self]
+# -- runs over a plan -------------------------------------------------------------------------------------------------
 
 
 def prepared(system: System, plan: Plan) -> System:
@@ -103,22 +57,12 @@ def prepared(system: System, plan: Plan) -> System:
 
 
 def solve(
-    model: Model,
-    plan: Plan,
-    run: Run,
-    changes: Mapping[str, float] | None = None,
-    threads: int | None = None,
-    *,
-    nudged: bool = False,
-) -> Sweep:
-    """Run the model of a :func:`prepared` system over the plan; how a run ends is its status, never an exception.
-
-    Where ``nudged``, loads differ in their last digit, as in the second run of an estimate.
-    """
-    run = model.chosen(run)
-    values = [model.values({**(changes or {}), **point}) for point in plan.points]
-    pairs = list(zip(settings(model.system, plan, run, values), values, strict=True))
-    return Sweep(model, plan, run, model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=nudged))
+    model: Model, plan: Plan, run: Run, changes: Mapping[str, float], threads: int | None = None
+) -> list[Trajectory]:
+    """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
+    values = [model.values({**changes, **point}) for point in plan.points]
+    pairs = list(zip(settings(model.system, plan, model.chosen(run), values), values, strict=True))
+    return model.solve_all(pairs, threads or os.cpu_count() or 1)
 
 
 def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str, float]]) -> list[Run]:
@@ -141,66 +85,260 @@ def settings(system: System, plan: Plan, run: Run, values: Sequence[Mapping[str,
     return runs
 
 
-def accuracy(case: Case, done: Sweep, threads: int | None, cells: Callable[[], Sequence[CellErrors]]) -> SweepAccuracy:
+# -- how far they are from the truth ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SweepAccuracy:
+    """Largest relative error of each run and where it is from; exact statistics by name where they are known."""
+
+    errors: NDArray[np.float64]
+    source: str
+    exact: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    @property
+    def known(self) -> NDArray[np.float64]:
+        """The errors that are known."""
+        return self.errors[np.isfinite(self.errors)]
+
+
+def accuracy(
+    case: Case, done: SweepSolution, threads: int | None, cells: Callable[[], Sequence[CellErrors]]
+) -> SweepAccuracy:
     """How far each run is from the truth: from the exact solution of the case, else from a second sweep; not a number
     where that is not known. ``cells`` finds the errors of the cells across bodies of each run.
     """
     unused, named = case.unused, case.reference
+    second = cache(lambda: _second(done, threads))
     if named is not None and not named.options:
         try:
-            return _against_exact(case.scene, done, named.name, threads)
+            return _against_exact(case, done, named.name, second)
         except InputError as error:
             unused = f"the exact solution {named.name} is not of this scene: {error.message}"
     elif named is not None:
         unused = named.fixed
-    second, left = _second(done, threads), cells()
+    left = cells()
     if done.statistics:
-        errors = [_of_statistics(done, i, second.statistics[i]) + found.largest for i, found in enumerate(left)]
+        pairs = zip(done.statistics, second().statistics, left, strict=True)
+        errors = [_of_statistics(ours, theirs) + found.largest for ours, theirs, found in pairs]
     else:
-        errors = [with_cells(estimated(*pair), found).error for *pair, found in zip(done, second, left, strict=True)]
-    source = ", ".join([second_run(second.run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
+        runs = zip(done.runs, second().runs, left, strict=True)
+        errors = [with_cells(estimated(ours, theirs), found).error for ours, theirs, found in runs]
+    source = ", ".join([second_run(second().run, "sweep"), *dict.fromkeys(f.source for f in left if f.variables)])
     if unknown := sum(not found.converged for found in left):
         source += f"; unknown in {unknown} of {len(left)} runs: {UNKNOWN}"
     return SweepAccuracy(np.array(errors), "; ".join(filter(None, (source, unused))))
 
 
-def _second(done: Sweep, threads: int | None) -> Sweep:
+def _second(done: SweepSolution, threads: int | None) -> SweepSolution:
     """The runs at another tolerance, as :meth:`Model.resolve` has each."""
     rtol = second_tolerance(done.run.rtol)
-    pairs = [(run.run.second(rtol), run.values) for run in done]
+    pairs = [(run.run.second(rtol), run.values) for run in done.runs]
     runs = done.model.solve_all(pairs, threads or os.cpu_count() or 1, nudged=True)
     return replace(done, run=done.run.second(rtol), runs=runs)
 
 
-def _against_exact(scene: Scene, done: Sweep, name: str, threads: int | None) -> SweepAccuracy:
+def _against_exact(case: Case, done: SweepSolution, name: str, second: Callable[[], SweepSolution]) -> SweepAccuracy:
     """Errors of the load at rupture, else of all; InputError where the solution is not that of every run.
 
     For the loads at rupture that is tested on the outermost runs. A run with one output has nothing to compare but its
     events, one without any has no error.
     """
-    begun = [i for i, run in enumerate(done) if len(run.result.times) > 1]
+    begun = [i for i, run in enumerate(done.runs) if len(run.result.times) > 1]
     if not begun:
         raise InputError("no run reached a second output.")
-    second = cache(lambda: _second(done, threads))
-    errors = np.full(len(done), np.nan)
-    exact = {which: np.full(len(done), np.nan) for which in STATISTICS if done.statistics}
-    for i, run in enumerate(done):
+    errors = np.full(len(done.runs), np.nan)
+    exact = {which: errors.copy() for which in STATISTICS if done.statistics}
+    for i, run in enumerate(done.runs):
         if len(run.result.times) < 2:
-            errors[i] = estimated(run, second()[i]).error if len(run.result.times) else np.nan
+            errors[i] = estimated(run, second().runs[i]).error if len(run.result.times) else np.nan
         elif exact:
             if i in (begun[0], begun[-1]):
-                exact_values(name, {}, scene, run)
-            reference = match(references.get(name), {}, SceneView(scene, run))
-            errors[i] = _of_statistics(done, i, reference)
+                exact_values(name, {}, case.scene, run)
+            reference = match(references.get(name), {}, SceneView(case.scene, run))
+            errors[i] = _of_statistics(done.statistics[i], reference)
             for which, values in exact.items():
                 values[i] = getattr(reference, which)
         else:
-            errors[i] = against_exact(run, scene, name, {}, second()[i] if event_times(run) else None).error
+            errors[i] = against_exact(run, case.scene, name, {}, second().runs[i] if event_times(run) else None).error
     return SweepAccuracy(errors, f"exact solution {name}", exact)
 
 
-def _of_statistics(done: Sweep, i: int, exact: references.Reference | Statistics) -> float:
+def _of_statistics(found: Statistics, exact: references.Reference | Statistics) -> float:
     """Largest error of the load at rupture; that of one which is exactly zero is absolute."""
-    pairs = [(getattr(done.statistics[i], which), getattr(exact, which)) for which in STATISTICS]
+    pairs = [(getattr(found, which), getattr(exact, which)) for which in STATISTICS]
     errors = [float(abs(ours - true) / abs(true) if true else abs(ours)) for ours, true in pairs]
     return max(max(errors), EPS)
+
+
+# -- the dataset ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, repr=False)
+class SweepSolution(Results):
+    """What a sweep hands back: its runs in the order of :attr:`Plan.points`, their error, and their dataset."""
+
+    model: Model
+    plan: Plan
+    run: Run
+    """Settings of all runs; where a load ends them, each has output times of its own."""
+    runs: Sequence[Trajectory]
+    accuracy: SweepAccuracy | None = None
+
+    def __repr__(self) -> str:
+        """Title, size and ends in a line."""
+        return f"<SweepSolution {self.title!r}: {len(self.runs)} runs, {self.reason}>"
+
+    @property
+    def system(self) -> System:
+        """The assembled equations."""
+        return self.model.system
+
+    @property
+    def seconds(self) -> float:
+        """Run time of all runs."""
+        return sum(run.seconds for run in self.runs)
+
+    @property
+    def steps(self) -> int:
+        """Steps of all runs."""
+        return sum(run.result.counters.steps for run in self.runs)
+
+    @cached_property
+    def audits(self) -> list[Audit]:
+        """The balances of each run."""
+        return [audit(run) for run in self.runs]
+
+    def worst(self, balance: str) -> float:
+        """Largest error over all runs of the balance of energy, entropy or site."""
+        return float(np.max([getattr(books, f"{balance}_error") for books in self.audits]))
+
+    @cached_property
+    def statistics(self) -> list[Statistics]:
+        """Mode, median and mean of the load at rupture of each run; empty where the sweep has none."""
+        if self.plan.until is None or not spectrum.breaks_bonds(self.system):
+            return []
+        return [spectrum.statistics(run, self.plan.until[0]) for run in self.runs]
+
+    @property
+    def reason(self) -> str:
+        """How many runs ended in which way, in words."""
+        every = [run.status for run in self.runs]
+        return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
+
+    @property
+    def status(self) -> str:
+        """'failed' if a run failed numerically, 'stopped' if physics stopped all of them, else 'finished'.
+
+        That physics stops some runs is a result of a sweep; that all bonds break is what a spectrum is made for.
+        """
+        every = {run.status for run in self.runs}
+        stopped = every == {"stopped"} and not self.statistics
+        return "failed" if "failed" in every else "stopped" if stopped else "finished"
+
+    @cached_property
+    def axes(self) -> dict[str, Axis]:
+        """The swept parameters by the names of their dimensions."""
+        taken = {*quantities(self.system), *self.system.inside, "time"}
+        axes: dict[str, Axis] = {}
+        for axis in self.plan.axes:
+            path = axis.path.removesuffix(".level").split(".")
+            parts = [p.replace("-", "_").replace("[", "_").strip("]") for p in path]
+            names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
+            axes[next((name for name in names if name not in taken | set(axes)), f"{names[-1]}_swept")] = axis
+        return axes
+
+    @property
+    def inner(self) -> str:
+        """The dimension along each run: time, or the load that all runs grow to."""
+        return self.plan.until[0] if self.plan.until else "time"
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """Every variable of the dataset, the coordinates first."""
+        shape = dict(zip(self.axes, self.plan.shape, strict=True))
+        along = {column.name: column for column in quantity_columns(self.runs, self.inner, shape)}
+        load = along.pop(self.inner, None)
+        columns = [*self._coordinates(load), *along.values(), *self._of_runs(), *event_columns(self.runs, shape)]
+        for which, word in STATISTICS.items() if self.statistics else ():
+            quantity = quantities(self.system)[self.inner]
+            name, text = f"{self.inner}_{which}", f"{word} {quantity.long_name} at rupture"
+            found = [getattr(statistics, which) for statistics in self.statistics]
+            columns.append(self._of_each(name, found, quantity.unit, text))
+            if self.accuracy and which in self.accuracy.exact:
+                exact = self.accuracy.exact[which]
+                columns.append(self._of_each(f"{name}_exact", exact, quantity.unit, f"exact {text}"))
+        return tuple(columns)
+
+    def _coordinates(self, load: Column | None) -> list[Column]:
+        """The swept parameters, and the times or, where a load ends the runs, the values of this."""
+        columns = []
+        for name, axis in self.axes.items():
+            state = next((s for s in self.system.states if s.path == axis.path), None)
+            if state is not None:
+                unit, text = state.at_start[0].unit, f"initial {state.at_start[0].long_name}"
+            else:
+                spec = next(p.spec for p in self.system.parameters if p.path == axis.path)
+                unit, text = spec.unit, f"{spec.text} ({axis.path})"
+            columns.append(Column(name, (name,), np.asarray(axis.values, dtype=float), unit, text))
+        times = np.array([run.result.problem.times for run in self.runs])
+        if self.plan.until is None or load is None:
+            return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]
+        start = float(load.values.flat[0])
+        values = start + (self.plan.until[1] - start) * times[0] / times[0, -1]
+        columns.append(Column(self.inner, (self.inner,), values, load.unit, load.long_name))
+        each = times.reshape(*self.plan.shape, -1)
+        return [*columns, Column("time", (*self.axes, self.inner), each, "s", "time since the start")]
+
+    def _of_runs(self) -> list[Column]:
+        """How each run ended, and what its balances, jumps and error are."""
+        runs, audits = self.runs, self.audits
+        destroyed = [entropy_destroyed(run.jumps) for run in runs]
+        destroys = [books.destroys or most > 0 for books, most in zip(audits, destroyed, strict=True)]
+        columns = [
+            self._of_each("status", [run.status for run in runs], "1", "how the run ended"),
+            self._of_each("reason", [run.reason for run in runs], "1", "why the run ended"),
+            self._of_each("time_reached", [run.result.t for run in runs], "s", "time that the run reached"),
+            self._of_each("steps", [run.result.counters.steps for run in runs], "1", "steps of the run"),
+        ]
+        for balance, text in BALANCES.items():
+            errors = [getattr(books, f"{balance}_error") for books in audits]
+            columns.append(self._of_each(f"{balance}_error", errors, "1", text))
+        columns.append(self._of_each("destroys_entropy", destroys, "1", "1 where a law or a jump does, else 0"))
+        if self.system.edges:
+            text = "most entropy that a jump has destroyed"
+            columns.append(self._of_each("entropy_destroyed", destroyed, "J/(m^2 K)", text))
+        if self.accuracy:
+            columns.append(self._of_each("error", self.accuracy.errors, "1", "largest relative error of the run"))
+        return columns
+
+    def _of_each(self, name: str, values: Sequence[Any] | NDArray[np.float64], unit: str, text: str) -> Column:
+        """A column of one value a run."""
+        shaped = np.array(values, object if isinstance(values[0], str) else float).reshape(self.plan.shape)
+        return Column(name, tuple(self.axes), shaped, unit, text)
+
+    @cached_property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Global attributes: scalars and strings only."""
+        error: dict[str, str | float] = {}
+        if self.accuracy:
+            worst = float(np.max(self.accuracy.known)) if len(self.accuracy.known) else np.nan
+            error = {"error": worst, "error_source": self.accuracy.source}
+        departures = {"departures": json.dumps({"changes": dict(self.changes)})} if self.changes else {}
+        return {
+            **self._origin(self.run),
+            "sweep": self.plan.record,
+            **departures,
+            "status": self.status,
+            "reason": self.reason,
+            "regime": self.system.regime,
+            "solver": self.run.solver,
+            "rtol": float(self.run.rtol),
+            "runs": len(self.runs),
+            "count_steps": self.steps,
+            "run_seconds": float(self.seconds),
+            "compile_seconds": float(self.model.compile_seconds),
+            **error,
+            **{f"{balance}_error": self.worst(balance) for balance in BALANCES},
+            "versions": versions(),
+        }

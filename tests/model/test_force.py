@@ -140,7 +140,7 @@ def test_a_static_limit_below_sliding_friction_is_told(name):
     T = 360.0 if name == "of the temperature" else 300.0
     (text,) = told_by_check(pulled(LESS[name], T))
     assert "is below its sliding friction" in text
-    assert text in Solution(solve(pulled(LESS[name], T)), None, "").warnings
+    assert text in Solution(solve(pulled(LESS[name], T))).warnings
 
 
 @pytest.mark.parametrize("name", MORE)
@@ -152,7 +152,7 @@ def test_a_limit_that_falls_as_the_interface_heats_is_told_by_the_run():
     made = pulled(BondedCoulomb(mu=0.3, mu_b=0.31, mu_ub=0.31))
     hot = replace(made, loading=made.loading | {"Q_1": Hold(level=1e5)})
     assert not told_by_check(hot)
-    assert "is below its sliding friction" in " ".join(Solution(solve(hot), None, "").warnings)
+    assert "is below its sliding friction" in " ".join(Solution(solve(hot)).warnings)
 
 
 # -- bonds across an open gap --------------------------------------------------------------------------------------

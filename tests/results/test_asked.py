@@ -101,4 +101,4 @@ def test_the_choice_explains_itself():
 def test_a_sweep_takes_the_tolerance_of_the_accuracy():
     case = surfacechem.load("exothermic", {"run": {"until": 1, "accuracy": 1e-6}})
     swept = case.sweep({"initial.T": [300, 310]})
-    assert (swept.sweep.run.solver, swept.sweep.run.rtol) == ("radau", pytest.approx(1e-8))
+    assert (swept.run.solver, swept.run.rtol) == ("radau", pytest.approx(1e-8))
