@@ -184,17 +184,8 @@ def gap_table(rng: np.random.Generator) -> NarrowScene:
     return plates("gap-table", law, f"g_n: {gap.text}", exponent, end, f"{width:.1e} of the gap")
 
 
-def pressure_table(rng: np.random.Generator) -> NarrowScene:
-    """The same over a given pressure."""
-    end, width = duration(rng), narrow(rng)
-    at, p = layer(rng, 1e6, width), history(rng, 0.0, 1e6, end)
-    values, exponent = tabulated(rng, at, p, end, at, lambda x: x)
-    law = f"pressure-table: {{between: [lower, upper], pressures: {at!r}, {values}}}"
-    return plates("pressure-table", law, f"p: {p.text}", exponent, end, f"{width:.1e} of the pressure")
-
-
 def elastic_pressure_table(rng: np.random.Generator) -> NarrowScene:
-    """The pressure follows from a given gap and the elasticity of the contact."""
+    """The same over a pressure, which follows from a given gap and the elasticity of the contact."""
     end, width = duration(rng), narrow(rng)
     at, gap = layer(rng, 1e6, width), history(rng, -1e-6, 1e-6, end)
     places = [0.0, *(-x / 1e12 for x in at)]
@@ -271,14 +262,6 @@ def film(rng: np.random.Generator) -> NarrowScene:
     factor, heat = scaled(rng, lambda t: 1 / gap.value(t), end, gap.marks)
     law = f"viscous: {{eta: {HEAT * factor!r}}}"
     return rubbed("film", law, f"v: 1 m/s, g_n: {gap.text}", heat, end, f"{width:.1e} of the travel")
-
-
-def rubbing_pulse(rng: np.random.Generator) -> NarrowScene:
-    """Dry friction at a velocity that is there for a while only."""
-    end = duration(rng)
-    v, p = pulse(rng, 0.0, 1.0, end), history(rng, 1e4, 1e5, end)
-    factor, heat = scaled(rng, lambda t: np.abs(v.value(t)) * p.value(t), end, [*v.marks, *p.marks])
-    return rubbed("pulse", f"coulomb: {{mu: {HEAT * factor!r}}}", f"p: {p.text}, v: {v.text}", heat, end, "a pulse")
 
 
 def bonded(family: str, bonding: str, loading: str, exponent: float, end: float, scale: str) -> NarrowScene:
@@ -394,16 +377,6 @@ def _swinging(scene: NarrowScene, motion: History) -> NarrowScene:
     return replace(scene, text=scene.text.replace("T_2: 400 K}", f"T_2: 400 K, {start}}}"))
 
 
-def turning_mass(rng: np.random.Generator) -> NarrowScene:
-    """A mass that comes close to touch where it turns."""
-    end, width = duration(rng), narrow(rng)
-    motion, loading, rest = _swing(rng, end, 1e-3 * width * float(rng.random()))
-    decay = 1e3 / width
-    factor, exponent = scaled(rng, lambda t: np.exp(-decay * motion.value(t)), end, motion.marks)
-    law, scale = spots(EXPOSURE * factor, decay), f"{width:.1e} of the travel"
-    return _swinging(plates("turning mass", law, loading, exponent, end, scale, rest), motion)
-
-
 def swinging_mass(rng: np.random.Generator) -> NarrowScene:
     """A mass that swings through a layer."""
     end, width = duration(rng), narrow(rng)
@@ -415,8 +388,8 @@ def swinging_mass(rng: np.random.Generator) -> NarrowScene:
 
 
 FAMILIES = [
-    *(gap_table, pressure_table, elastic_pressure_table, tapping, gas_gap, stribeck, film, rubbing_pulse),
-    *(attachment, bell, zone, lennard_jones, activated, turning_mass, swinging_mass),
+    *(gap_table, elastic_pressure_table, tapping, gas_gap, stribeck, film),
+    *(attachment, bell, zone, lennard_jones, activated, swinging_mass),
 ]
 
 

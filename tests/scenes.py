@@ -46,13 +46,7 @@ def path(a, b, h):
 
 def perfect_contact(potentials, reactions=(), phi=0.0, T=300.0, C_1=1.0, C_2=1.0, energy=Quadratic, T_0=300.0, **rest):
     """Both bodies and the interface at one temperature."""
-    interface = Interface(
-        "T",
-        potentials,
-        reactions=reactions,
-        sites=SITES,
-        frictions=rest.pop("frictions", ()),
-    )
+    interface = Interface("T", potentials, reactions=reactions, sites=SITES, frictions=rest.pop("frictions", ()))
     initial = {"T": T} | ({"phi": phi} if reactions else {})
     return Scene(bodies("T", "T", energy, C_1, C_2), interface, T_0=T_0, initial=initial, **rest)
 
@@ -246,11 +240,7 @@ def adhesive() -> Scene:
     ]
     interface = Interface("T_c", potentials, [MohrCoulomb(mu=0.3, t_n_max=1e7)], [AdhesionLoss(b=2.0)], SITES)
     heat = [path("interface", "lower", 900.0), path("upper", "interface", 300.0)]
-    loading = {
-        "g_n": Ramp(start=1e-6, rate=5e-7),
-        "g_t": Ramp(start=1e-7, rate=1e-6),
-        "v": Hold(level=0.2),
-    }
+    loading = {"g_n": Ramp(start=1e-6, rate=5e-7), "g_t": Ramp(start=1e-7, rate=1e-6), "v": Hold(level=0.2)}
     initial = {"T_1": 300.0, "T_2": 310.0, "T_c": 320.0, "phi": 0.4}
     return Scene(bodies(), interface, heat, loading, None, 300.0, initial)
 

@@ -327,9 +327,7 @@ def elastic_prescribed() -> Scene:
 def both_directions() -> Scene:
     """Normal and tangential gap move; the normal traction is the pressure of friction."""
     interface = Interface(
-        "T",
-        [NormalStiffness(E_n=varying(1e14, LinearInTemperature(slope=-1e-3)))],
-        [Coulomb(mu=0.4, mu_s=0.6)],
+        "T", [NormalStiffness(E_n=varying(1e14, LinearInTemperature(slope=-1e-3)))], [Coulomb(mu=0.4, mu_s=0.6)]
     )
     return Scene(
         bodies("T", "T"),

@@ -15,7 +15,6 @@ from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import CompliantDebonding, ExponentialCohesiveZone, TensileStrength
 from surfacechem.laws.contact import BondStiffness, ConstantInterfaceCapacity
 from surfacechem.laws.factors import Linear
-from surfacechem.laws.films import FilmCapacity
 from surfacechem.laws.heat import Conductance
 from surfacechem.laws.kinetics import Bimolecular
 from surfacechem.laws.loading import Hold, Ramp, Table
@@ -217,14 +216,6 @@ def test_stretching_a_surface_takes_the_change_of_its_energy(name):
     assert booked(trajectory, "W_J") == pytest.approx(per_area - per_area[0], rel=1e-9)
     assert values["t_n_nominal"] == pytest.approx(areas * values["t_n"], rel=1e-12)
     assert audit(trajectory).energy_error < 1e-9
-
-
-def test_a_surface_that_stretches_and_opens_closes_its_books():
-    moves = {"g_n": Ramp(start=3e-10, rate=2e-10), "phi": Ramp(start=0.2, rate=0.1)}
-    potentials = [*STRETCHED.values(), FilmCapacity(), LatticeGas(epsilon=4e-21)]
-    books = audit(Model(assemble(stretching(potentials, loading=moves))).solve(Run(times=(0.0, 1.0, 2.0))))
-    assert books.energy_error < 1e-9
-    assert books.entropy_error < 1e-9
 
 
 def test_an_energy_may_depend_on_the_stretch_of_the_surface_but_not_jump_with_it():

@@ -77,47 +77,12 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
     assert balances.violations == ()
 
 
-def test_held_bonds_are_said_in_the_dataset_and_dissipate_nothing():
-    trajectory = solve(damage())
-    values = trajectory.everywhere
-    held = values["held"] != 0
-    assert held.any()
-    assert np.all(values["phi"][held] == 0.0)
-    assert np.all(values["R_linear_affinity"][held] == 0.0)
-    assert np.all(values["sigma_linear_affinity"][held] == 0.0)
-
-
 def test_no_bond_at_the_start_under_a_load_that_allows_none():
     trajectory = solve(damage(phi=0.0, gaps=(TOP, TOP)), until=1.0)
     assert [jump.edge.name for jump in trajectory.jumps] == ["unbonded"]
     assert trajectory.jumps[0].t == 0.0
     assert trajectory.status == "finished"
     assert np.all(trajectory.everywhere["phi"] == 0.0)
-
-
-def test_a_bound_is_touched_again_and_again():
-    gaps = (0.0, *(TOP, 0.0) * 20)
-    trajectory = solve(damage(gaps=gaps, until=40.0), until=40.0, outputs=11)
-    names = [jump.edge.name for jump in trajectory.jumps]
-    assert names == ["unbonded", "rebond"] * 20
-    assert audit(trajectory).energy_error < 1e-9
-
-
-@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-13])
-def test_bounds_at_any_tolerance(rtol):
-    trajectory = solve(damage(), rtol=rtol)
-    assert [jump.edge.name for jump in trajectory.jumps] == ["unbonded", "rebond"]
-
-
-def test_constant_affinity_bonds_all_sites():
-    interface = Interface("T", [LinearEnthalpy(H_r=2.0)], reactions=[LinearAffinity(c_r=SITES.density)], sites=SITES)
-    scene = Scene(bodies("T", "T"), interface, T_0=300.0, initial={"phi": 0.25, "T": 300.0})
-    trajectory = solve(scene, until=1.0)
-    (complete,) = trajectory.jumps
-    assert complete.t == pytest.approx(0.375, rel=1e-12)
-    heat = trajectory.outputs[-1, [o.name for o in trajectory.model.system.outputs].index("U_c")]
-    assert heat == pytest.approx(0.0, abs=1e-12)
-    assert trajectory.result.y[0] == 1.0
 
 
 def test_a_limit_frees_complete_bonding():
@@ -220,19 +185,6 @@ def test_mixing_entropy_yields_to_stretched_springs(law):
 
 
 PHI_EQ = "interface.potential.bond-energy.phi_eq"
-
-
-def completed(phi_eq: float, phi: float = 0.05) -> float:
-    """Time at which phi' = 1.1 (phi_eq - phi) reaches one."""
-    return math.log((phi_eq - phi) / (phi_eq - 1)) / 1.1
-
-
-def test_changed_parameters_reach_a_bound():
-    simulation = surfacechem.load("two-way-linear")
-    beyond = simulation.run({PHI_EQ: 1.5})
-    (complete,) = beyond.trajectory.jumps
-    assert complete.t == pytest.approx(completed(1.5), rel=1e-11)
-    assert simulation.run().trajectory.jumps == ()
 
 
 def test_a_sweep_across_the_need_of_a_bound():

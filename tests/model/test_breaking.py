@@ -151,13 +151,3 @@ def test_a_limit_names_its_bonds_or_is_refused(two_bonds):
     bare = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=initial, normal=Mounting(k=K))
     with pytest.raises(InputError, match="the bonds are not species of a mechanism"):
         assemble(bare)
-
-
-def test_an_open_interface_without_bonds_starts_unbonded(two_bonds):
-    limits = [TensileStrength(t_max=1e6)]
-    whole = scene(
-        two_bonds, ["weak(s)"], {"free(s)": 1.0}, {"w_n": Hold(level=1e-6)}, limits=limits, normal=Mounting(k=K)
-    )
-    trajectory = solve(whole, 1.0)
-    assert trajectory.jumps == ()
-    assert trajectory.everywhere["closed"].max() == 0.0

@@ -2,7 +2,6 @@
 
 import math
 import re
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,9 +9,7 @@ import symengine
 from tables_bonds import SITES, isothermal
 
 import surfacechem
-from surfacechem.compile.printing import python
 from surfacechem.errors import InputError
-from surfacechem.format import load_text
 from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, ReversibleBell, TwoPathway
 from surfacechem.laws.contact import NormalStiffness
@@ -66,15 +63,6 @@ def test_elastic_bonds_carry_what_stretches_them_and_the_contact_the_rest():
     assert role_of(scene, "f") == "bond elasticity"
 
 
-def test_what_nobody_reads_is_not_there():
-    scene = isothermal(
-        Bimolecular(k_f=1e-16, k_r=1.0), {"g_n": Hold(level=1e-9)}, 0.1, potentials=[BondSprings(k_b=1e-3)]
-    )
-    system = assemble(scene)
-    assert "f" not in {item.name for item in system.named} | {role.variable for role in system.roles}
-    assert not any(margin.name == "bonds left" for margin in system.margins)
-
-
 @pytest.mark.parametrize(
     ("loading", "potentials", "message"),
     [
@@ -121,11 +109,6 @@ def test_a_sudden_load_breaks_bonds_when_it_comes(jump):
     assert jump < 30 or trajectory.result.t == pytest.approx(1.0, abs=1e-9)
 
 
-def test_bonds_form_without_load_and_none_form_under_one():
-    free = solved(isothermal(Bell(k_off=1.0, x_off=X, k_on=1.0), {"t_n": Hold(level=0.0)}, 0.0), 20.0)
-    assert free.result.outputs[-1, 0] == pytest.approx(0.5, rel=1e-9)
-
-
 def test_a_load_beyond_reason_is_refused_at_the_start():
     with pytest.raises(InputError, match=r"at the start the bonds ruptured .*lower `t_n`, or let it grow from zero"):
         solved(isothermal(SLIP, {"t_n": Hold(level=1e5 * UNIT * SITES)}), 1.0)
@@ -167,14 +150,6 @@ def test_logarithms_change_nothing_else():
         np.testing.assert_allclose(values, theirs[name], rtol=1e-8, atol=1e-8 * abs(theirs[name]).max(), err_msg=name)
     assert audit(logarithmic).energy_error < 1e-9
     assert audit(logarithmic).violations == ()
-
-
-def test_printed_equations_of_a_logarithmic_state_run():
-    system = assemble(in_logarithms(isothermal(SLIP, {"f": Hold(level=UNIT)}), math.log(0.5)))
-    space: dict = {}
-    exec(python(system, "logarithmic"), space)
-    assert space["residual"](0.0, [math.log(0.5)], [-math.e]) == pytest.approx([0.0], abs=1e-12)
-    assert space["ledger"](0.0, [math.log(0.5)], [-math.e])[0] == pytest.approx(-math.e / 2)
 
 
 @pytest.mark.parametrize(
@@ -221,75 +196,6 @@ def test_no_force_makes_a_number_that_is_none(law, f):
         for phi in (0.0, 1e-12, 0.5, 1.0):
             point = {"phi": phi, "n_c": SITES, "f": sign * f, "T_c": 300.0, "mu": -1e-20}
             assert np.isfinite(function([point[name] for name in symbols])).all(), (sign, phi)
-
-
-def test_dembo_springs_slip_hold_or_catch_by_their_transition_state():
-    rates = [
-        -DemboSpring(k_off=1.0, stiffness=2e-3, transition_stiffness=ts).rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0)
-        for ts in (1e-3, 2e-3, 3e-3)
-    ]
-    assert rates[0] > 1.0 == rates[1] > rates[2]
-
-
-def test_two_pathways_live_longest_at_the_stated_force():
-    law = TwoPathway(k_slip=0.1, x_slip=2e-10, k_catch=10.0, x_catch=2e-9)
-    best = THERMAL / 2.2e-9 * math.log(10.0 / 0.1 * 2e-9 / 2e-10)
-    life = [-law.rate(phi=1.0, n_c=1.0, f=best * factor, T_c=300.0) for factor in (0.99, 1.0, 1.01)]
-    assert min(life) == life[1]
-
-
-def test_dudko_tends_to_bell_and_ends_at_its_largest_rate():
-    bell = SLIP.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0)
-    linear = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=1.0)
-    high = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-16, nu=0.5)
-    assert linear.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0) == pytest.approx(bell, rel=1e-12)
-    assert high.rate(phi=1.0, n_c=1.0, f=5e-12, T_c=300.0) == pytest.approx(bell, rel=1e-4)
-    cusp = DudkoHummerSzabo(k_off=1.0, x_off=X, barrier=6e-20, nu=0.5)
-    rates = [-cusp.rate(phi=1.0, n_c=1.0, f=f, T_c=300.0) for f in np.linspace(0.0, 2e-9, 400).tolist()]
-    assert all(b >= a for a, b in pairwise(rates))
-    assert cusp.ranges == {"f": (-math.inf, 6e-20 / (0.5 * X))}
-
-
-def test_dembo_s_rates_balance_with_springs_and_mixing():
-    """k_on / k_off at any gap is what the potential says: the affinity vanishes where the net rate does."""
-    epsilon = THERMAL * math.log(50.0)
-    potentials = [LatticeGas(epsilon=epsilon), BondSprings(k_b=2e-3)]
-    law = DemboSpring(k_off=0.1, k_on=5.0, stiffness=2e-3, transition_stiffness=0.5e-3)
-    for gap in (0.0, 2e-9, 4e-9):
-        scene = isothermal(law, {"g_n": Hold(level=gap)}, 0.5, potentials=potentials)
-        trajectory = solved(scene, 1e4)
-        assert abs(named(trajectory)["mu"][-1]) < 1e-9 * THERMAL
-        assert audit(trajectory).violations == ()
-
-
-def test_attachment_falls_with_the_gap():
-    law = GapAttachment(k_on=2.0, stiffness=1e-3, rest_length=1e-8)
-    values = [
-        solved(isothermal(law, {"g_n": Hold(level=gap)}, 0.0, potentials=[]), 0.1).result.outputs[-1, 0]
-        for gap in (1e-8, 1.4e-8)
-    ]
-    rates = [2.0, 2.0 * math.exp(-1e-3 * (4e-9) ** 2 / 2 / THERMAL)]
-    assert values == pytest.approx([-math.expm1(-0.1 * rate) for rate in rates], rel=1e-9)
-
-
-CASE = """
-bodies: {lower: {temperature: 300 K}, upper: {temperature: 300 K}}
-interface:
-  temperature: 300 K
-  sites: 1e16 1/m^2
-  bonding:
-    - bell: {k_off: 0.1 1/s, x_off: 0.4 nm}
-loading: {f: {ramp: {rate: 100 pN/s}}}
-initial: {ln_phi: 0}
-run: {until: 1 s}
-"""
-
-
-def test_force_spectroscopy_needs_no_gap():
-    case = load_text(CASE)
-    trajectory = Model(case.system()).solve(Run(times=[0.0, 1.0]))
-    grown = math.expm1(100e-12 * X / THERMAL)
-    assert trajectory.result.outputs[-1, 0] == pytest.approx(-0.1 * THERMAL / (X * 100e-12) * grown, rel=1e-10)
 
 
 @pytest.mark.parametrize("rtol", [3e-5, 1e-6, 1e-8, 1e-11])
@@ -382,9 +288,3 @@ def test_at_constant_traction_the_fall_of_the_enthalpy_is_the_heat_that_leaves(a
     t_n = data["t_n_nominal"] if area == 2 else data["t_n"]
     np.testing.assert_allclose(1e16 * data["e_c"], data["U_c"] - t_n * data["g_n"], rtol=1e-12)
     np.testing.assert_allclose(t_n, 2e4, rtol=1e-9)
-
-
-def test_where_nothing_bonds_there_is_no_enthalpy_of_bonds(tmp_path):
-    data = surfacechem.run("sliding-dry")
-    assert "e_c" not in data.dataset
-    assert "reaction" not in data.attributes

@@ -139,14 +139,6 @@ def test_a_pole_is_no_zero(power):
     assert zero_ahead(lambda g: np.asarray(g) ** power, 1.0, -1.0, 1.0) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_jump_without_a_value_is_a_zero():
-    def jump(gaps):
-        away = np.asarray(gaps) - 0.25
-        return np.where(away == 0, np.nan, np.sign(away) * 0.5)
-
-    assert zero_ahead(jump, 1.0, -1.0, 1.0) == pytest.approx(0.25)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("rounding", [1e-9, -1e-9])
 @pytest.mark.parametrize("beside", [1e-12, -1e-12])
@@ -163,23 +155,6 @@ def test_a_zero_is_found_where_a_value_alone_rounds_otherwise_than_among_others(
 # -- masses and dampers that meet ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("mount", "start", "t", "names"),
-    [
-        (Mounting(m=4.0), {"v_n": 0.02}, (0.02 + math.sqrt(0.02**2 + 2 * 9.75e-3)) / 9.75, ["impact", "rest"]),
-        (Mounting(c_g=1e4), {}, 1e4 * 1e-3 / 39.0, ["touch"]),
-    ],
-)
-def test_bodies_do_not_pass_through_each_other(mount, start, t, names):
-    """From 1 mm under a dead load of -39 Pa: the time of fall, and that of a damper."""
-    given = scene((), {"F_n": Hold(level=-39.0)}, mount, {"g_n": 1e-3} | start)
-    assert assemble(given).warnings == ()
-    trajectory = solve(given, 30.0)
-    assert [jump.edge.name for jump in trajectory.jumps] == names
-    assert [jump.t for jump in trajectory.jumps] == pytest.approx(len(names) * [t], rel=1e-12)
-    assert (trajectory.status, gap(trajectory)) == ("finished", 0.0)
-
-
 @pytest.mark.parametrize("mount", [Mounting(m=4.0), Mounting(c_g=1e4)])
 def test_a_law_of_an_open_gap_ends_the_run(mount):
     given = scene(
@@ -189,23 +164,6 @@ def test_a_law_of_an_open_gap_ends_the_run(mount):
     trajectory = solve(given, 30.0)
     assert trajectory.status == "stopped"
     assert "g_n reached zero, where the law viscous ends" in trajectory.reason
-
-
-@pytest.mark.parametrize("E_n", [1.0, 0.01])
-@pytest.mark.parametrize("law", [Penalty, NormalStiffness])
-def test_a_soft_contact_bears_the_bodies_as_well(law, E_n):
-    """The overlap w k / (k + E_n), with far more than a picometre of it."""
-    given = scene([law(E_n=E_n)], {"w_n": Ramp(rate=-1e-8)}, Mounting(k=1e12), {"g_n": 0.0})
-    assert assemble(given).warnings == ()
-    trajectory = solve(given, 1.0)
-    assert trajectory.status == "finished"
-    assert gap(trajectory) == pytest.approx(-1e-8 * 1e12 / (1e12 + E_n), rel=1e-9)
-
-
-def test_a_gap_that_only_opens_is_no_mistake():
-    trajectory = solve(scene((), {"F_n": Hold(level=8.0)}, Mounting(m=4.0), {"g_n": 0.0}), 2.0)
-    assert trajectory.status == "finished"
-    assert gap(trajectory) == pytest.approx(4.0, rel=1e-12)
 
 
 def test_a_gap_given_closed_is_refused_with_the_remedy():
@@ -228,14 +186,6 @@ def test_springs_bear_contact_only_while_there_are_bonds(phi, status):
 
 
 # -- bonds, and what limits them ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("g_n", "bonded"), [(1e-3, 0.0), (0.0, 1.0), (-1e-6, 1.0)])
-def test_contact_without_bonds_is_bonded_where_it_starts_closed(g_n, bonded):
-    model = Model(assemble(scene([BondedContact(E_n=5e9)], {"F_n": Hold(level=-39.0)}, Mounting(m=4.0), {"g_n": g_n})))
-    problem = model.problem(Run([0.0, 1e-3]), model.values())
-    paths = [parameter.path for parameter in model.system.parameters]
-    assert problem.parameters[0, paths.index("mode.bonded")] == bonded
 
 
 def test_a_body_bounces_on_a_contact_that_is_not_bonded():
@@ -305,14 +255,6 @@ def test_two_stiffnesses_of_the_same_bonds_are_refused(changes, borne):
     """They bear E_b g_n where the law says t_max."""
     with pytest.raises(InputError, match=f"the bonds of the potential bear {borne} Pa, not the t_max of 5e.07 Pa"):
         assemble(softened(**changes))
-
-
-def test_no_bonds_in_the_potential_are_no_bonds_to_break():
-    law = CompliantDebonding(t_max=5e7, E_b=4e13, g_f=6e-6)
-    potentials = [NormalStiffness(E_n=4e13), LinearEnthalpy(H_r=3.0)]
-    given = scene(potentials, {"w_n": Ramp(rate=1e-6)}, Mounting(k=5e13), {"phi": 1.0}, reactions=[law], sites=SITES)
-    with pytest.raises(InputError, match="the bonds of the potential bear 0 Pa, not the t_max of"):
-        assemble(given)
 
 
 @pytest.mark.parametrize(

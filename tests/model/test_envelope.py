@@ -46,7 +46,6 @@ MOUNTS = {
     "damped": "mechanics: {{normal: {{k: {k!r} MPa/um, c_g: {c!r} MPa s/um}}}}",
     "inertial": "mechanics: {{normal: {{k: {k!r} MPa/um, m: {m!r}}}}}",
 }
-OUTPUTS = np.linspace(0.0, 10.0, 41)
 
 
 def drawn(seed):
@@ -193,35 +192,12 @@ def names(solution):
     return [jump.edge.name for jump in solution.trajectory.jumps]
 
 
-def test_bonds_that_form_stay_on_the_envelope():
-    solution = given_gap([0, 1, 3], [0, 2e-6, 2.0001e-6], ", mass-action: {k_on: 3, k_off: 0}")
-    np.testing.assert_allclose(solution.dataset.phi[4:], envelope(solution.dataset.g_n.values[4:]), rtol=1e-9)
-    assert solution.dataset.t_n.values.max() <= 1e6 * (1 + 1e-9)
-    assert names(solution) == ["soften"]
-
-
-def test_bonds_that_break_faster_leave_the_envelope():
-    solution = given_gap([0, 0.01, 3], [0, 2e-6, 4e-6], ", mass-action: {k_on: 0, k_off: 1}")
-    assert names(solution) == ["soften", "unload"]
-    leaves = solution.trajectory.jumps[1].t
-    t = solution.dataset.time.values[1:]
-    phi = envelope(np.interp(leaves, [0, 0.01, 3], [0, 2e-6, 4e-6])) * np.exp(-(t - leaves))
-    np.testing.assert_allclose(solution.dataset.phi[1:], phi, rtol=1e-8)
-
-
 def test_what_has_no_bonds_loses_none():
     times, gaps = [0, 1, 2, 3], [0, 6e-6, 1e-6, 6e-6]
     assert names(given_gap(times, gaps)) == ["soften", "part"]
     assert names(given_gap(times, gaps, ", mass-action: {k_on: 0, k_off: 1}")) == ["soften", "part"]
     again = ["soften", "part", "rejoin", "soften", "unload", "soften", "part"]
     assert names(given_gap(times, gaps, ", mass-action: {k_on: 1, k_off: 0}")) == again
-
-
-def test_no_bonds_form_beyond_reach_and_those_that_do_are_bounded():
-    """Where bonds form at once they are as many as the envelope leaves, on the way back too."""
-    solution = given_gap([0, 1, 3], [0, 6e-6, 1.5e-6], ", mass-action: {k_on: 1e6, k_off: 0}")
-    g, phi = solution.dataset.g_n.values, solution.dataset.phi.values
-    np.testing.assert_allclose(phi, np.clip(envelope(np.maximum(g, 1e-6)), 0, 1), atol=1e-6)
 
 
 def test_more_bonds_than_the_gap_leaves_are_refused():

@@ -11,15 +11,13 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import lambertw
 
 from surfacechem.format import load_text
-from surfacechem.laws.cohesive import AdhesionIntensity, AdhesionLoss, ExponentialCohesiveZone, XuNeedleman
+from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
-from surfacechem.laws.friction import Coulomb, MohrCoulomb
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.branches import come_to_rest
 from surfacechem.solve.run import Model, Run
 
 PHI, G_N, G_T = 0.1, 1e-8, 2e-8
@@ -158,33 +156,6 @@ def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes(ratio):
     assert np.all(np.abs(r) < 1e-6 * k * G_T)
 
 
-def test_shear_snaps_back_as_often_as_it_is_driven():
-    loading = {"g_n": Hold(level=0.0), "w_t": Harmonic(amplitude=4e-7, frequency=0.1)}
-    trajectory = solve(loading, 100.0, tangential=Mounting(k=0.05 * STIFF))
-    found = snaps(trajectory)
-    assert len(found) == 40
-    released = [snap.released for snap in found]
-    assert released[2::4] == pytest.approx([released[2]] * 10, rel=1e-8)
-    assert trajectory.status == "finished"
-
-
-@pytest.mark.parametrize("friction", [Coulomb(mu=0.3), MohrCoulomb(mu=0.3, c=1e7)])
-def test_a_zone_in_shear_beside_friction(friction):
-    loading = {"w_n": Hold(level=-1e-9), "w_t": Ramp(rate=1e-8)}
-    mounts = {"normal": Mounting(k=1e15), "tangential": Mounting(k=0.05 * STIFF)}
-    trajectory = solve(loading, frictions=[friction], **mounts)
-    assert trajectory.status == "finished", trajectory.reason
-
-
-@pytest.mark.parametrize("k", [1e13, 1e14, 1e16])
-def test_adhesion_intensity_in_shear_on_a_spring(k):
-    zone = AdhesionIntensity(C_N=1e15, C_T=1e15, w=0.1, E_n=1e16)
-    loading = {"g_n": Hold(level=0.0), "w_t": Ramp(rate=1e-8)}
-    settings = {"potentials": [zone], "reactions": [AdhesionLoss(b=1e-3)], "initial": {"phi": 1.0}}
-    trajectory = solve(loading, tangential=Mounting(k=k), **settings)
-    assert trajectory.status == "finished", trajectory.reason
-
-
 def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
     strength = PHI * math.sqrt(2 / math.e) / G_T
     trajectory = solve({"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)})
@@ -317,14 +288,6 @@ def work(begin, end, zone):
     return -sum(weights[j] / 2 * (np.array(tractions(*way, **zone)) @ (end - begin)) for j, way in enumerate(ways))
 
 
-def test_contact_that_shear_has_softened_finds_its_equilibrium():
-    """Pressed together by 1 MPa, the sheared zone bears nothing until the spring is let go by 17 um."""
-    data = run(5e10, 1e11, (-20e-6, 0.0), (0.0, 2e-6))
-    assert data.event_time[0] == pytest.approx(1.8885748, rel=1e-7)
-    assert data.g_n_after[0] == pytest.approx(-17.45e-6, abs=5e-9)
-    assert data.u_t_after[0] == pytest.approx(9.46e-6, abs=5e-9)
-
-
 def test_a_zone_without_an_equilibrium_still_stops():
     """With more work in shear than in opening the sheared zone pulls the bodies through each other."""
     data = run(5.6e10, 1.5e12, (-20e-6, 0.0), (0.0, 6.6e-6), finishes=False, q=1.38, r=-0.12, g_t0=1.78e-6)
@@ -343,16 +306,3 @@ def test_a_symmetric_balance_is_left_as_the_loads_go_on(rate):
     expected = damped(np.array([k_n, k_t]), np.array([-6e-6, 0.0]), begin, tractions)
     assert data.g_n_after[0] == pytest.approx(expected[0], rel=1e-8)
     assert data.u_t_after[0] == pytest.approx(np.sign(rate) * abs(expected[1]), rel=1e-8)
-
-
-def test_motion_that_nothing_bears_is_given_up_soon():
-    """One gap has a spring, the other is pushed on for ever."""
-    seen = 0
-
-    def driving(ways):
-        nonlocal seen
-        seen += len(ways)
-        return np.column_stack([1.0 - 1e10 * ways[:, 0], np.full(len(ways), -1.4)])
-
-    assert come_to_rest(driving, np.full(2, 1e-9), np.zeros(2), np.zeros(2)) is None
-    assert 0 < seen < 10_000

@@ -197,24 +197,6 @@ def p_of(trajectory):
     return np.maximum(series(trajectory, "p"), 0)
 
 
-def test_the_work_of_separation_and_of_friction():
-    """Far beyond the zone all its work has been done, and what is left is the plateau of friction."""
-    end = 40.0
-    found = solve(scene([ZONE], loading={"g_t": Ramp(rate=RATE)}, mount=None), times=np.linspace(0, end, 101))
-    work = account(found, "W_g_t") + account(found, "W_coulomb")
-    assert work == pytest.approx(math.e * 1e6 * 1e-6 + MU * P * RATE * end, rel=1e-10)
-    assert series(found, "t_t")[-1] == pytest.approx(MU * P, rel=1e-9)
-
-
-def test_a_dead_load_rests_on_the_zone_beside_friction():
-    """Friction and zone bear the load together; beyond their peak nothing does."""
-    found = solve(scene([ZONE], loading={"F_t": Ramp(rate=0.3e6)}, mount=None), times=np.linspace(0, 3, 31))
-    load = 0.3e6 * found.result.times
-    slid = load > 1.001 * MU * P
-    np.testing.assert_allclose(shear_of_zone(series(found, "u_t")[slid]), load[slid] - MU * P, rtol=1e-8)
-    assert np.all(series(found, "u_t")[load < MU * P] == 0)
-
-
 # -- the arrangement and its name ----------------------------------------------------------------------------------
 
 
@@ -318,11 +300,6 @@ def test_adhesion_is_the_same_in_all_directions(potential, mount):
     for axis, part in (("t", math.cos(ANGLE)), ("t2", math.sin(ANGLE))):
         np.testing.assert_allclose(series(turned, f"u_{axis}"), part * series(straight, "u_t"), rtol=1e-6, atol=1e-15)
         np.testing.assert_allclose(series(turned, f"t_{axis}"), part * series(straight, "t_t"), rtol=1e-6, atol=1e-1)
-
-
-def test_a_zone_without_friction_moves_in_two_directions():
-    straight, turned = solve(scene([ZONE], (), mount=HEAVY)), solve(at_an_angle([ZONE], (), HEAVY))
-    np.testing.assert_allclose(series(turned, "u_t2"), math.sin(ANGLE) * series(straight, "u_t"), rtol=1e-6, atol=1e-15)
 
 
 def test_what_two_directions_do_not_know_is_refused():

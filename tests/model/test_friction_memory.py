@@ -8,14 +8,8 @@ import surfacechem
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import CompliantDebonding
 from surfacechem.laws.contact import BondStiffness
-from surfacechem.laws.friction import (
-    AnisotropicCoulomb,
-    AnisotropicViscous,
-    Coulomb,
-    RateAndStateAging,
-    RateAndStateSlip,
-)
-from surfacechem.laws.loading import Hold, Ramp, Table
+from surfacechem.laws.friction import AnisotropicCoulomb, AnisotropicViscous, Coulomb, RateAndStateAging
+from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.runs.check import consistent_start, rates
@@ -23,34 +17,11 @@ from surfacechem.scene import Body, Interface, Mounting, Scene
 from surfacechem.solve.run import Model, Run
 
 PARAMETERS = {"mu_0": 0.6, "a": 0.01, "b": 0.015, "L": 1e-5, "v_0": 1e-6}
-STEP = {"times": [0.0, 10.0, 10.0, 100.0], "values": [1e-6, 1e-6, 1e-4, 1e-4]}
 ISOTHERMAL = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
 
 def outputs(trajectory, name):
     return trajectory.outputs[:, [item.name for item in trajectory.model.system.outputs].index(name)]
-
-
-def velocity_step(law):
-    loading = {"p": Hold(level=5e6), "v": Table(**STEP)}
-    interface = Interface(Hold(level=300.0), frictions=[law(**PARAMETERS)])
-    scene = Scene(ISOTHERMAL, interface, loading=loading, T_0=300.0, initial={"theta": 10.0})
-    times = (0.0, 10.0, *np.linspace(10.0001, 12.0, 40))
-    return np.array(times), Model(assemble(scene)).solve(Run(times=times))
-
-
-def exact_age(law, t, V_1=1e-6, V_2=1e-4, L=1e-5):
-    """After a step from the steady state of V_1 to V_2."""
-    decay = np.exp(-V_2 * np.maximum(t - 10.0, 0.0) / L)
-    if law is RateAndStateAging:
-        return L / V_2 + (L / V_1 - L / V_2) * decay
-    return L / V_2 * (V_2 / V_1) ** decay
-
-
-@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
-def test_velocity_step_follows_the_exact_age(law):
-    t, trajectory = velocity_step(law)
-    np.testing.assert_allclose(outputs(trajectory, "theta"), exact_age(law, t), rtol=1e-9)
 
 
 def test_the_age_at_the_start_is_changed_in_seconds():
@@ -68,34 +39,6 @@ def test_the_age_at_the_start_is_changed_in_seconds():
             simulation.run({"initial.theta": value})
     with pytest.raises(InputError, match=r"no parameter 'initial\.ln_theta'"):
         simulation.run({"initial.ln_theta": 1.0})
-
-
-@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
-def test_friction_jumps_with_a_and_settles_with_a_minus_b(law):
-    _, trajectory = velocity_step(law)
-    traction = outputs(trajectory, f"t_{law.name().replace('-', '_')}") / 5e6
-    before, after = 0.6, 0.6 + 0.01 * np.log(1e2)
-    assert traction[0] == pytest.approx(before, abs=1e-9)
-    assert np.max(traction) == pytest.approx(after, rel=2e-2)
-    assert traction[-1] == pytest.approx(0.6 - 0.005 * np.log(1e2), rel=1e-6)
-
-
-@pytest.mark.parametrize(("stiffness", "slips"), [(0.5, True), (2.0, False)])
-def test_sliding_is_unstable_below_the_critical_stiffness(stiffness, slips):
-    """k_c = (b - a) p / L; above it a disturbance dies out, below it the slider sticks and slips."""
-    p, V = 5e6, 1e-6
-    k = stiffness * 0.005 * p / 1e-5
-    loading = {"p": Hold(level=p), "w_t": Ramp(start=0.6 * p / k, rate=V)}
-    interface = Interface(Hold(level=300.0), frictions=[RateAndStateAging(**PARAMETERS)])
-    initial = {"theta": 9.0, "v": V}
-    mount = Mounting(k=k, c_b=1e3)
-    scene = Scene(ISOTHERMAL, interface, loading=loading, T_0=300.0, initial=initial, tangential=mount)
-    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 600.0, 601)))
-    assert trajectory.status == "finished"
-    assert audit(trajectory).findings == ()
-    v = outputs(trajectory, "v")[300:]
-    assert (trajectory.everywhere["v"].max() > 10 * V) == slips
-    assert bool(np.all(np.abs(v - V) < 1e-2 * V)) != slips
 
 
 @pytest.mark.parametrize("ratio", [0.9, 1.0, 1.1])
@@ -125,13 +68,6 @@ def test_sticking_needs_no_pressure():
     assert trajectory.status == "stopped", trajectory.reason
     assert trajectory.reason.startswith("no steady sliding velocity: nothing resists it")
     assert trajectory.result.t == pytest.approx(2.0, rel=1e-9)
-
-
-def test_an_extreme_direct_effect_does_not_overflow():
-    law = RateAndStateAging(mu_0=0.6, a=1e-4, b=1.5e-4, L=1e-5, v_0=1e-6)
-    assert law.traction(p=1e6, v=1e-6, ln_theta=np.log(10.0)) == pytest.approx(6e5, rel=1e-12)
-    assert law.traction(p=1e6, v=-1e-6, ln_theta=np.log(10.0)) == pytest.approx(-6e5, rel=1e-12)
-    assert law.traction(p=1e6, v=0.0, ln_theta=np.log(10.0)) == 0.0
 
 
 def two_components(law, **more):
@@ -170,16 +106,6 @@ def debonded(trajectory):
 
 def names(trajectory):
     return [jump.edge.name for jump in debonded(trajectory)]
-
-
-def test_a_stiff_mounting_follows_the_falling_line_and_unloads_to_the_origin():
-    trajectory = debonding(1e14, [0.0, 3e-8, 0.0, 0.0, 1.4e-7])
-    assert names(trajectory) == ["soften", "unload", "soften", "part"]
-    work = trajectory.result.ledger[[a.quantity.name for a in trajectory.model.system.ledger].index("W_n")]
-    assert work == pytest.approx(0.5 * 1e6 * 5e-8, rel=1e-9), "the work of separation is dissipated"
-    assert audit(trajectory).energy_error < 1e-9
-    unloaded = debonded(trajectory)[1].before.y
-    assert debonded(trajectory)[2].t == pytest.approx(3 + (unloaded[1] * (1 + unloaded[0])) / 1.4e-7, rel=1e-9)
 
 
 def test_a_soft_mounting_tears_the_interface_open():

@@ -9,18 +9,12 @@ import scenes
 import tables
 from scenes import bodies, path, varying
 
-from surfacechem.compile.printing import python
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.contact import ConstantInterfaceCapacity, InterfaceCapacity
-from surfacechem.laws.contact_conductance import (
-    BondedPressureConductance,
-    CooperMikicYovanovich,
-    PressureConductance,
-    PressureTable,
-)
+from surfacechem.laws.contact_conductance import CooperMikicYovanovich, PressureConductance, PressureTable
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.heat import Conductance, GapConductance, GapTable, GasGap, Radiation
@@ -58,23 +52,6 @@ def history(values) -> Table:
 # -- exact tables -----------------------------------------------------------------------------------------------------
 
 
-def test_conductance_in_contact():
-    p, columns = tables.read("j_conductance_contact")
-    rows = len(columns["h"])
-    parameters = {
-        "h_0_b": p["h0b"],
-        "h_0_ub": p["h0u"],
-        "h_c_b": p["hcb"],
-        "h_c_ub": p["hcu"],
-        "H": p["H"],
-        "q": p["q"],
-    }
-    law = BondedPressureConductance(between=ENDS, **parameters)
-    loading = {"p": history(columns["p_c"]), "phi": history(columns["phi"])}
-    values = computed(solved(direct([law], loading), *range(rows)))
-    assert values["q_t"] / 150.0 == pytest.approx(columns["h"], rel=1e-12)
-
-
 def test_conductance_out_of_contact_and_what_carries_it():
     p, columns = tables.read("j_conductance_out_of_contact")
     rows = len(columns["h"])
@@ -85,13 +62,6 @@ def test_conductance_out_of_contact_and_what_carries_it():
     taken_over = -np.expm1(-p["C_trans"] * columns["g_n"])
     assert values["q_12_gas"] == pytest.approx(-150 * columns["h_gas"] * taken_over, rel=1e-9)
     assert values["q_12_radiation"] == pytest.approx(-150 * columns["h_rad"] * taken_over, rel=1e-9)
-
-
-def test_radiation_is_exact_in_the_fourth_power():
-    law = Radiation(between=ENDS, epsilon_1=0.8, epsilon_2=0.6)
-    values = computed(solved(direct([law], {}), 0.0, 1.0))
-    exact = STEFAN_BOLTZMANN * (350.0**4 - 500.0**4) / (1 / 0.8 + 1 / 0.6 - 1)
-    assert values["q_12"] == pytest.approx(exact, rel=1e-14)
 
 
 # -- the ledger of fluxes ---------------------------------------------------------------------------------------------
@@ -163,18 +133,6 @@ def test_what_is_exchanged_completes_the_sources():
     assert values["q_2_exchange"] == pytest.approx(-out / 2, rel=1e-9)
 
 
-def test_a_flux_of_one_channel_has_one_name():
-    names = computed(solved(scenes.algebraic(), 0.0, 0.1))
-    assert {"q_c1", "q_c2", "q_1", "q_2"} <= set(names)
-    assert not [name for name in names if name.startswith(("q_1_", "q_c1_"))]
-
-
-def test_no_radiation_in_the_source_of_a_scene_without_it():
-    without, having = ([Conductance(between=ENDS, h=10.0)], [GapConductance(between=ENDS, **GAP)])
-    assert "radiation" not in python(assemble(direct(without, {})))
-    assert "radiation" in python(assemble(direct(having, {"g_n": Hold(level=1e-6)})))
-
-
 # -- closures ---------------------------------------------------------------------------------------------------------
 
 
@@ -194,12 +152,6 @@ def test_one_conductance_through_a_medium_is_twice_that_on_each_side():
     values = computed(first)
     T_1, T_2 = values["T_1"], values["T_2"]
     assert values["q_t"] == pytest.approx(h * (T_2 - T_1), rel=1e-9)
-
-
-def test_a_medium_is_between_the_bodies():
-    law = Conductance(between=("lower", "surroundings"), h=1.0, closure="medium")
-    with pytest.raises(InputError, match="belongs to a path between the two bodies"):
-        assemble(dataclasses.replace(through_medium([law]), surroundings=Hold(level=300.0)))
 
 
 def test_mean_influx_against_its_exact_solution():
@@ -359,12 +311,6 @@ run: {until: 1 s}
 """
     system = load_text(text.replace("GAP", gap)).system()
     assert (system.warnings, list(conductance_warnings(system))) == ((), [])
-
-
-def test_a_gas_layer_without_roughness_ends_at_touch():
-    trajectory = solved(direct([GasGap(between=ENDS, k=0.026)], {"g_n": Ramp(start=1e-6, rate=-1e-7)}), 0.0, 20.0)
-    assert trajectory.status == "stopped"
-    assert "g_n reached zero" in trajectory.reason
 
 
 def test_reservoirs_exchange_by_radiation_with_the_surroundings():

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import thermodynamics as laws
 
 import surfacechem
 from surfacechem.expressions import log_sum
@@ -133,14 +132,6 @@ def test_one_way_alone_is_audited_by_itself(tmp_path):
     assert solution.audit.violations == ("R1",)
 
 
-def test_both_laws_hold(pair):
-    system = pair(7.0).system
-    for seed in range(3):
-        point = laws.consistent_point(system, seed)
-        assert laws.first_law_holds(system, point, digits=13)
-        assert laws.second_law_holds(system, point, digits=13)
-
-
 def test_a_direction_that_is_switched_off_is_said(pair):
     solution = pair(0.0).run()
     assert "one of the two never runs" in str(solution.verdicts[0])
@@ -195,11 +186,6 @@ def test_springs_in_the_rates_and_in_the_potential_agree(tmp_path):
     solution = with_springs(tmp_path, DEMBO)
     assert np.max(np.abs(solution.dataset.departure_dembo_spring)) < 1e-12
     assert solution.warnings == ()
-
-
-@pytest.mark.parametrize("law", ["reversible-bell: {k_off: 1 1/s}", "bell: {k_off: 1 1/s}"])
-def test_laws_without_a_backward_rate_of_their_own_have_no_departure(law, tmp_path):
-    assert with_springs(tmp_path, law).verdicts == ()
 
 
 def test_a_potential_that_knows_nothing_of_bonds_is_no_equilibrium(tmp_path):

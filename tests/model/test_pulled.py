@@ -75,22 +75,6 @@ def test_the_force_works_along_the_distances():
     assert float(data["W_f"][-1] - data["W_f"][0]) == pytest.approx(float(work), rel=1e-4)
 
 
-def test_a_ramp_that_jumps_needs_no_work_of_its_own(tmp_path):
-    force = "{table: {times: [0 s, 0.5 s, 0.5 s, 1 s], values: [0 pN, 5 pN, 20 pN, 20 pN]}}"
-    solution = pairs(tmp_path, *both("a", "b", 0.3, -0.7), force=force).run()
-    assert solution.audit.energy_error < 1e-10
-    assert solution.audit.violations == ()
-    assert float(np.abs(solution.dataset["departure_R1_R2"]).max()) < 1e-12
-
-
-def test_an_inconsistent_pair_is_found_with_the_size_of_its_error(tmp_path):
-    solution = pairs(tmp_path, *both("a", "b", 0.3, -0.7, k_f=10.0)).run()
-    (verdict,) = solution.verdicts
-    assert verdict.low == pytest.approx(math.log(10.0), abs=1e-12)
-    assert verdict.high == pytest.approx(math.log(10.0), abs=1e-12)
-    assert "by a factor exp(2.3) at most" in str(verdict)
-
-
 def test_around_a_cycle_distances_have_to_close(tmp_path):
     """Three pairs of 1, 1 and -2 nm close; of 1, 1 and 1 nm they do not, by 3 nm that the three share."""
     closed = [*both("a", "b", 0.4, -0.6), *both("b", "c", 0.5, -0.5), *both("c", "a", -1.0, 1.0)]
@@ -108,11 +92,6 @@ def test_a_reaction_whose_reverse_knows_no_force_keeps_its_equilibrium(tmp_path)
     np.testing.assert_allclose(data["departure_R1_R2"], 1e-9 * 10e-12 / KT, atol=1e-10)
 
 
-def test_ruptures_that_nothing_undoes_take_no_work(tmp_path):
-    data = pairs(tmp_path, ("a", "free", 1.0, 0.5)).run().dataset
-    assert "W_f" not in data
-
-
 def test_the_sheet_of_a_mechanism_says_the_same():
     curves = Curves(load_mechanism("vinculin.yaml"))
     (pair,) = curves.pairs
@@ -126,7 +105,6 @@ def test_the_sheet_of_a_mechanism_says_the_same():
 
 # -- laws of one kind of bond -----------------------------------------------------------------------------------------
 
-SITES = 1e16
 EPSILON = 4e-21
 HELD = """
 title: bonds under a prescribed load
@@ -184,12 +162,6 @@ def test_bells_rates_depart_from_no_equilibrium_under_a_force(tmp_path):
     rate, force = data["R_bell"], data["f"]
     work = np.trapezoid(rate * force * ELL, data["time"])
     assert float(data["W_f"][-1]) == pytest.approx(float(work), rel=1e-3)
-
-
-def test_both_ways_of_bell_run_alike(tmp_path):
-    """The reverse that follows from the potential and the force is that of the distance of formation."""
-    both = [held(tmp_path, law, "loading: {f: 8 pN}", "1 s").run().dataset["phi"] for law in (BELL, REVERSIBLE)]
-    np.testing.assert_allclose(both[0], both[1], rtol=1e-9)
 
 
 def test_without_a_length_a_prescribed_force_is_refused(tmp_path):

@@ -5,9 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import surfacechem
-from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
-from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
@@ -130,26 +128,6 @@ def test_a_block_swings_through_its_turning_points(law):
     assert happened(trajectory) == []
 
 
-@pytest.mark.parametrize("m", [1e-2, 1e2, 1e6])
-@pytest.mark.parametrize("law", LAWS)
-def test_a_light_block_slides_as_one_without_mass(law, m):
-    load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
-    trajectory, without = (solved(scene(law, Mounting(k=K, m=mass), load), 40.0) for mass in (m, 0.0))
-    assert happened(trajectory) == []
-    assert trajectory.result.counters.steps < 2000
-    np.testing.assert_allclose(state(trajectory, "u_t"), state(without, "u_t"), rtol=0, atol=1e-10 * (1 + m))
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_creep_of_a_mass_reverses_a_hundred_times(law):
-    """Below what it takes to slide: velocities from 1e-17 m/s through zero and back, in a few steps each."""
-    load = {"w_t": Harmonic(amplitude=1e-3, frequency=0.05)}
-    trajectory = solved(scene(law, Mounting(k=K, m=M), load, WEAKENING), 1000.0)
-    assert happened(trajectory) == []
-    assert trajectory.result.counters.steps < 100 * 150
-    np.testing.assert_allclose(state(trajectory, "u_t"), 0.0, atol=1e-12)
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_pressure_that_vanishes_frees_what_creeps(law):
     """Pressed again it comes to rest, where the spring has swung to."""
@@ -170,28 +148,6 @@ def test_friction_that_sticks_beside_it():
     np.testing.assert_allclose(state(trajectory, "u_t"), state(without, "u_t"), rtol=0, atol=1e-7)
 
 
-def test_parameters_that_vary_with_temperature():
-    """The rate of temperature has no part in that of the velocity."""
-    warm = Body("lower", Hold(level=300.0)), Body("upper", Ramp(start=300.0, rate=1.0))
-    vary = Varying(0.014, (LinearInTemperature(of="T_2", slope=1e-3),))
-    load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05), "p": Hold(level=P)}
-    found = []
-    for m in (0.0, 1.0):
-        interface = Interface(Hold(level=300.0), (), [RateAndStateAging(**{**STEADIED, "a": vary})])
-        item = Scene(warm, interface, (), load, None, 300.0, {"theta": 1.0}, tangential=Mounting(k=K, m=m))
-        found.append(state(solved(item, 40.0), "u_t"))
-    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("a", [1e-3, 1e-4])
-def test_an_extreme_direct_effect_neither_overflows_nor_stalls(a):
-    """Exponents of 600 and 6000; a creep that no number can tell from none."""
-    load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
-    trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M), load, {**STEADIED, "a": a, "b": a / 2}), 40.0)
-    assert np.all(np.isfinite(trajectory.everywhere["v"]))
-    assert trajectory.result.counters.steps < 20_000
-
-
 def test_the_velocity_at_the_start_is_given_as_such():
     """What is solved for is no part of a case; a velocity given is met to its last digits, creeping or sliding."""
     changes = {"mechanics.tangential.c_b": 0.0, "mechanics.tangential.m": "1e4 kg/m^2", "run.until": "1 s"}
@@ -202,20 +158,3 @@ def test_the_velocity_at_the_start_is_given_as_such():
     np.testing.assert_allclose(data["v"].values[:, 0], given, rtol=1e-13)
     with pytest.raises(InputError, match=r"no parameter 'initial\.drive'"):
         simulation.run({"initial.drive": 1.0})
-
-
-def test_dampers_beside_it_do_their_work():
-    load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
-    trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M, c_b=1e6, c_g=1e6), load), 40.0)
-    assert happened(trajectory) == []
-    assert np.all(trajectory.everywhere["D_contact_damper_t"] >= 0)
-
-
-def test_an_impact_on_it_is_refused():
-    """What it takes from sliding varies with the velocity."""
-    interface = Interface(Hold(level=300.0), (), [RateAndStateAging(**STEADIED)])
-    loading = {"w_t": Hold(level=0.0), "F_n": Hold(level=-1e5)}
-    mounts = {"normal": Mounting(m=1.0), "tangential": Mounting(k=K, m=1.0)}
-    item = Scene(COLD, interface, (), loading, None, 300.0, {"theta": 1.0, "g_n": 1e-3}, **mounts)
-    with pytest.raises(InputError, match="varies with the sliding velocity"):
-        assemble(item)

@@ -6,7 +6,6 @@ friction and damper turn into heat what the spring lets go, until friction at th
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from surfacechem.format import load_text
@@ -141,66 +140,6 @@ def test_a_slip_ends_where_its_own_heat_lets_friction_hold_the_spring(regime, wa
     assert way * slid == pytest.approx(stretched - left, rel=1e-9)
     assert data.event_released[0] == pytest.approx(k * (stretched**2 - left**2) / 2, rel=1e-9)
     assert data.event_entropy[0] > 0
-
-
-def damped_slider(c, k, C, p, V, h, until, mu=0.7, exponent=-4.0):
-    """Times at which a slider with a small damper c begins to slide, each with the temperature there."""
-
-    def friction(T):
-        return p * falling(T, mu, exponent)
-
-    def cooled(T, t):
-        return 300 + (T - 300) * np.exp(-h * t / C)
-
-    def slides(_, y):
-        stretch, T = y
-        v = (k * stretch - friction(T)) / c
-        return [V - v, (k * stretch * v - h * (T - 300)) / C]
-
-    def stops(_, y):
-        return k * y[0] - friction(y[1])
-
-    stops.terminal, stops.direction = True, -1
-    t, stretch, T, begins = 0.0, 0.0, 300.0, []
-    while True:
-
-        def left(time, stretch=stretch, T=T):
-            return k * (stretch + V * time) - friction(cooled(T, time))
-
-        waits = np.linspace(0, until, 4001)[1:]
-        later = int(np.argmax([left(x) > 0 for x in waits]))
-        sticks = brentq(left, waits[later - 1], waits[later], xtol=1e-15, rtol=1e-15) if later else np.inf
-        if t + sticks > until:
-            return np.array(begins)
-        t, stretch, T = t + sticks, stretch + V * sticks, cooled(T, sticks)
-        begins.append((t, T))
-        start = [stretch * (1 + 1e-12), T]
-        found = solve_ivp(slides, (t, until), start, "Radau", events=stops, rtol=1e-10, atol=1e-14)
-        if found.status == 0:
-            return np.array(begins)
-        t, (stretch, T) = found.t[-1], found.y[:, -1]
-
-
-def test_slips_are_regular_and_those_of_a_small_damper():
-    """A damper of c delays each slip in proportion to c."""
-    k, C, p, V, h, until = 1.2e8, 30.0, 2e6, 1e-3, 60.0, 60.0
-    heat = "conductance: {between: [slider, surroundings], h: 60}"
-    data = run(mechanics=f"k: {k}", heat=heat, until=until)
-    fine, coarse = (damped_slider(c, k, C, p, V, h, until) for c in (1e3, 2e3))
-    expected = 2 * fine - coarse
-    assert len(expected) > 4
-    np.testing.assert_allclose(slips(data), expected[:, 0], rtol=2e-6)
-    begun = [name in SLIPS for name in data.event_name.values]
-    np.testing.assert_allclose(data.T_before[begun], expected[:, 1], rtol=1e-5)
-    periods = np.diff(slips(data))
-    np.testing.assert_allclose(periods[2:], periods[-1], rtol=1e-9)
-
-
-def test_slips_do_not_depend_on_how_long_the_run_is():
-    heat = "conductance: {between: [slider, surroundings], h: 60}"
-    short, long = (slips(run(heat=heat, until=until)) for until in (50, 400))
-    assert len(short) >= 3
-    np.testing.assert_allclose(short, long[: len(short)], rtol=1e-11)
 
 
 def test_a_stiff_spring_slides_steadily():

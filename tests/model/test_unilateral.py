@@ -19,11 +19,8 @@ from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, 
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
-from surfacechem.references import get
 from surfacechem.results.audit import audit
-from surfacechem.results.error_estimates import EVENTS, apart
-from surfacechem.results.event_table import event_times
-from surfacechem.scene import Body, Interface, Mounting, Scene
+from surfacechem.scene import Interface, Mounting, Scene
 from surfacechem.solve.run import Model, Run
 
 M, F, FELL = 4.0, 40.0, 0.2
@@ -54,27 +51,11 @@ def made(trajectory, name):
     return [jump for jump in trajectory.jumps if jump.edge.name == name]
 
 
-def state(trajectory, name):
-    return trajectory.everywhere[name]
-
-
 def end(trajectory, name):
     return float(trajectory.result.y[[s.name for s in trajectory.model.system.states].index(name)])
 
 
 # -- rebounds ----------------------------------------------------------------------------------------------------------
-
-
-def test_a_body_that_does_not_rebound_rests():
-    trajectory = solve(scene(Mounting(m=M)), 1.0)
-    assert names(trajectory) == ["impact", "rest"]
-    impact, rest = trajectory.jumps
-    assert (impact.t, rest.t) == (pytest.approx(T_0, rel=1e-14), impact.t)
-    assert impact.released == pytest.approx(F * FELL, rel=1e-14)
-    assert rest.released == 0.0
-    assert (end(trajectory, "g_n"), end(trajectory, "v_n")) == (0.0, 0.0)
-    assert trajectory.everywhere["t_n"][-1] == -F
-    assert audit(trajectory).energy_error < 1e-12
 
 
 @pytest.mark.parametrize("e", [0.3, 0.5, 0.9])
@@ -93,57 +74,6 @@ def test_all_rebounds_under_a_dead_load(e):
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
     assert (end(trajectory, "g_n"), end(trajectory, "v_n")) == (0.0, 0.0)
     assert audit(trajectory).energy_error < 1e-12
-
-
-@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
-def test_the_tolerance_says_when_rebounds_are_nothing(rtol):
-    trajectory = solve(scene(Mounting(m=M, e=0.5)), 5.0, rtol)
-    (rest,) = made(trajectory, "rest")
-    assert rest.t == pytest.approx(T_0 + 2 * V_0 * M / F, rel=rtol)
-    assert len(made(trajectory, "impact")) <= math.ceil(math.log(0.1 * rtol) / math.log(0.5))
-
-
-def test_rebounds_that_hardly_lose_anything_end_too():
-    trajectory = solve(scene(Mounting(m=M, e=0.99)), 80.0)
-    assert len(made(trajectory, "impact")) < 2600
-    assert made(trajectory, "rest")[0].t == pytest.approx(T_0 + 2 * V_0 * M / F * 99, rel=1e-10)
-
-
-def test_a_thousand_rebounds_without_loss():
-    trajectory = solve(scene(Mounting(m=M, e=1.0)), T_0 + 2 * T_0 * 999.5)
-    speeds = np.array([-jump.before.y[1] for jump in trajectory.jumps])
-    assert len(speeds) == 1000
-    assert speeds == pytest.approx(V_0, rel=1e-12)
-    assert trajectory.jumps[-1].t == pytest.approx(T_0 + 2 * T_0 * 999, rel=1e-11)
-    assert sum(abs(jump.released) for jump in trajectory.jumps) < 1e-12 * F * FELL * 1000
-    assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
-
-
-@pytest.mark.parametrize("w", [0.0, -0.5, 0.3])
-def test_rebounds_on_a_spring(w):
-    """The way between two impacts is an arc of the swing about w, half of one where w is at touch."""
-    k, g_0, e = 100.0, 1.0, 0.8
-    omega = math.sqrt(k / M)
-    trajectory = solve(scene(Mounting(m=M, k=k, e=e), {"w_n": Hold(level=w)}, {"g_n": g_0}), 3.0)
-    t, g, v = 0.0, g_0, 0.0
-    for jump in made(trajectory, "impact")[:8]:
-        swing = math.hypot(g - w, v / omega)
-        angle = math.acos(-w / swing) - math.copysign(math.acos((g - w) / swing), -v)
-        t += angle / omega
-        assert jump.t == pytest.approx(t, rel=1e-11)
-        assert jump.before.y[1] == pytest.approx(-omega * math.sqrt(swing**2 - w**2), rel=1e-10)
-        g, v = 0.0, -e * jump.before.y[1]
-    if w == 0:
-        gaps = np.diff([jump.t for jump in made(trajectory, "impact")])
-        assert gaps == pytest.approx(math.pi / omega, rel=1e-11)
-
-
-def test_a_spring_that_conserves_energy():
-    k = 100.0
-    trajectory = solve(scene(Mounting(m=M, k=k, e=1.0), {"w_n": Hold(level=-0.5)}, {"g_n": 1.0}), 500.0, points=2001)
-    assert len(trajectory.jumps) > 1000
-    energy = trajectory.everywhere["E_total"]
-    assert np.ptp(energy) < 1e-9 * 0.5 * k * 1.5**2
 
 
 @pytest.mark.parametrize("e", [0.0, 0.6])
@@ -203,21 +133,6 @@ def test_a_pull_that_only_reaches_the_pressure_lets_nothing_go():
 # -- rest and release --------------------------------------------------------------------------------------------------
 
 
-def test_a_ramped_pull_releases_what_rests():
-    """From the moment without pressure on, g = r tau - r / omega sin(omega tau)."""
-    k, rate = 100.0, 0.1
-    omega, tau = math.sqrt(k / M), 3.0
-    loading = {"w_n": Ramp(start=-0.5, rate=rate)}
-    trajectory = solve(scene(Mounting(m=M, k=k), loading, {"g_n": 0.3, "v_n": -1.0}), 5.0 + tau)
-    assert names(trajectory) == ["impact", "rest", "open"]
-    assert made(trajectory, "open")[0].t == pytest.approx(5.0, rel=1e-14)
-    assert end(trajectory, "g_n") == pytest.approx(rate * (tau - math.sin(omega * tau) / omega), rel=1e-10)
-    assert end(trajectory, "v_n") == pytest.approx(rate * (1 - math.cos(omega * tau)), rel=1e-10)
-    rests = (trajectory.result.times > 1.0) & (trajectory.result.times < 5.0)
-    t_n = trajectory.everywhere["t_n"][: len(rests)]
-    assert t_n[rests] == pytest.approx(k * (rate * trajectory.result.times[rests] - 0.5), rel=1e-14)
-
-
 def test_a_load_that_jumps_lets_go_at_once():
     load = Table(times=[0, 3, 3, 4, 4, 9], values=[-10, -10, 20, 20, -30, -30])
     trajectory = solve(scene(Mounting(m=M), {"F_n": load}), 9.0)
@@ -246,13 +161,6 @@ def test_starts_at_touch(start, pull, expected):
     speed = start["v_n"] if start["v_n"] >= 0 else 0.5
     pulled = max(pull, 0.0)
     assert end(trajectory, "g_n") == pytest.approx(speed + pulled / 2, rel=1e-12)
-
-
-@pytest.mark.parametrize(("speed", "e"), [(1e-20, 0.5), (1e-15, 0.9), (1e-24, 0.99)])
-def test_rebounds_that_are_nothing_from_the_start(speed, e):
-    trajectory = solve(scene(Mounting(m=M, e=e), PRESSED, {"g_n": 0.0, "v_n": -speed}), 3.0)
-    assert names(trajectory)[-1] == "rest"
-    assert len(trajectory.jumps) < 200
 
 
 @pytest.mark.parametrize("until", [1e-6, 1.0, 1e6])
@@ -314,16 +222,6 @@ def test_the_heat_of_impacts_is_in_the_bodies():
         stored = capacity / 600.0 * (after**2 - before**2)
         assert stored == pytest.approx(share * released, rel=1e-10)
     assert impact.entropy > 0
-
-
-def test_reservoirs_take_the_heat_of_impacts():
-    pair = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=280.0))
-    given = Scene(pair, Interface(), (), PRESSED, None, 300.0, {"g_n": FELL}, normal=Mounting(m=M, e=0.5))
-    trajectory = solve(given, 2.0)
-    assert sum(jump.heat_out for jump in trajectory.jumps) == pytest.approx(F * FELL, rel=1e-12)
-    entropy = sum(jump.entropy for jump in trajectory.jumps)
-    assert entropy == pytest.approx(F * FELL / 2 * (1 / 300 + 1 / 280), rel=1e-12)
-    assert audit(trajectory).energy_error < 1e-12
 
 
 # -- friction ----------------------------------------------------------------------------------------------------------
@@ -455,26 +353,6 @@ def test_a_conductance_that_keeps_up_with_the_pressure_misses_the_instant(q):
 # -- the case, other methods, other codes ------------------------------------------------------------------------------
 
 
-def test_the_case_says_how_often_and_when():
-    solution = surfacechem.load("bouncing-plate").run()
-    assert (solution.accuracy.source, solution.accuracy.error < 1e-9) == ("exact solution bouncing-body", True)
-    found = event_times(solution.trajectory)
-    exact = get("bouncing-body")(m=5.0, e=0.7, F_n=-49.05, g_n_i=1.0, v_n_i=0.0, C=4e3, T_0=300.0, T_i=300.0)
-    assert found["rest"] == pytest.approx([exact.rest_time], rel=1e-11)
-    # Of the impacts those are told that any tolerance has.
-    assert len(found["impact"]) == math.floor(math.log(1e-3) / math.log(0.7)) + 1
-    assert solution.dataset.closed[-1] == 1
-
-
-def test_two_tolerances_have_the_same_events():
-    given = scene(Mounting(m=M, k=300.0, c_b=2.0, e=0.6), {"w_n": Hold(level=-0.1)})
-    first, second = (solve(given, 5.0, rtol) for rtol in (1e-7, 1e-11))
-    assert len(made(first, "impact")) < len(made(second, "impact"))
-    errors, note = apart(first, second)
-    assert note == ""
-    assert errors[EVENTS] < 1e-7
-
-
 @pytest.mark.parametrize("solver", ["lsoda", "scipy-radau", "cvode", "ida"])
 def test_other_methods_see_the_impacts(solver):
     case = surfacechem.load("bouncing-plate")
@@ -484,27 +362,6 @@ def test_other_methods_see_the_impacts(solver):
     assert names(trajectory) == 59 * ["impact"] + ["rest"]
     assert trajectory.jumps[-1].t == pytest.approx(2.5586339652845553, rel=1e-5)
     assert trajectory.result.outputs[:, 0].min() >= 0
-
-
-@pytest.mark.parametrize("e", [0.0, 0.4, 0.99, 1.0])
-@pytest.mark.parametrize("start", [0.0, 2.0, -3.0])
-def test_the_exact_solution_is_one(e, start):
-    """It falls freely between impacts, never below zero, and energy goes into heat."""
-    exact = get("bouncing-body")(m=2.0, e=e, F_n=-20.0, g_n_i=0.5, v_n_i=start, C=1e3, T_0=300.0, T_i=290.0)
-    t = np.linspace(0.0, 3.0, 4001)
-    values = exact.solution(t)
-    assert values["g_n"].min() > -1e-14
-    energy = values["v_n"] ** 2 + 20.0 * values["g_n"] + values["released"]
-    assert energy == pytest.approx(energy[0], rel=1e-12)
-    steps = np.diff(values["v_n"]) / np.diff(t)
-    assert np.all((np.abs(steps + 10.0) < 1e-6) | (steps > -10.0) | (t[1:] >= exact.rest_time))
-    assert exact.solution(exact.first)["v_n"] == pytest.approx(e * math.sqrt(start**2 + 10.0), rel=1e-12)
-
-
-def test_nothing_presses_what_leaves():
-    exact = get("bouncing-body")(m=2.0, e=0.5, F_n=0.0, g_n_i=0.5, v_n_i=-1.0, C=1e3, T_0=300.0, T_i=300.0)
-    assert exact.solution([0.25, 0.5, 1.5])["g_n"] == pytest.approx([0.25, 0.0, 0.5])
-    assert (exact.first, exact.rest_time) == (0.5, math.inf)
 
 
 def test_pressure_begins_at_once_under_a_damper_that_stands_still():

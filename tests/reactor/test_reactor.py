@@ -233,27 +233,6 @@ def test_a_stirred_gas_as_the_second_body(warm):
     assert dataset.attrs["case"] == ""
 
 
-def test_order_in_the_network_does_not_matter(warm):
-    ends = []
-    for order in (1, -1):
-        gas = stirred(350.0, volume=3.0)
-        interface = InterfaceReactor(warm, bodies={"upper": gas})
-        net = ReactorNet([gas, interface][::order])
-        net.rtol = RTOL
-        net.advance(1.0)
-        ends.append((gas.T, interface["T_1"], interface["phi"]))
-    assert ends[0] == pytest.approx(ends[1], rel=LOOSE)
-
-
-def test_a_large_gas_is_a_reservoir(warm):
-    gas = stirred(300.0, volume=1e12)
-    interface, net = network(warm, bodies={"upper": gas}, others=[gas])
-    net.advance(1.0)
-    solution = surfacechem.load(warm, {"run.until": "1 s"}).run()
-    for name, values in states(solution).items():
-        assert interface[name] == pytest.approx(values[-1], rel=LOOSE)
-
-
 def test_heat_through_a_wall(tmp_path):
     """A body and a gas of constant capacity behind a wall: the difference decays exponentially."""
     path = tmp_path / "body.yaml"

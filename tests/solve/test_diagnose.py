@@ -2,29 +2,27 @@
 
 import numpy as np
 import pytest
-import symengine
 from scenes import SITES, bodies, path, perfect_contact, varying
-from scenes_mechanics import TOGETHER, inertial_gap, overdamped_gap
+from scenes_mechanics import TOGETHER
 
 from surfacechem.errors import InputError
-from surfacechem.expressions import derivative
-from surfacechem.laws.bonding import BondSprings, LatticeGas, LinearEnthalpy
+from surfacechem.laws.bonding import LatticeGas, LinearEnthalpy
 from surfacechem.laws.bonds import DudkoHummerSzabo
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import AdhesionIntensity, ExponentialCohesiveZone
-from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
+from surfacechem.laws.contact import NormalStiffness, Penalty
 from surfacechem.laws.contact_conductance import PressureConductance
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.films import FilmCapacity
-from surfacechem.laws.friction import Coulomb, Viscous
+from surfacechem.laws.friction import Coulomb
 from surfacechem.laws.heat import GasGap
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.results.solution import Solution
-from surfacechem.scene import Interface, Medium, Mounting, Scene, Stage
+from surfacechem.scene import Interface, Medium, Mounting, Scene
 from surfacechem.solve.run import Model, Run
 
 APART = {"T_1": 300.0, "T_2": 310.0}
@@ -59,38 +57,12 @@ def test_a_parameter_called_C_T_is_not_the_capacity_of_a_node_T():
     assert column(trajectory, "t_e")[0] == pytest.approx(0.25 * 1e12 * 1e-6, rel=1e-12)
 
 
-def test_energy_and_traction_know_the_same_side_of_touch():
-    interface = Interface("T", [Penalty(E_n=1e14)])
-    loading = {"w_n": Ramp(start=1e-8, rate=-1e-7)}
-    mount = Mounting(k=1e13, m=0.01)
-    scene = Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER | {"g_n": 1e-8}, normal=mount)
-    system = assemble(scene)
-    g = symengine.Symbol("g_n")
-    for row in system.residual():
-        conditions = row.atoms(symengine.StrictLessThan, symengine.LessThan)
-        assert not any(g in condition.free_symbols for condition in conditions)
-
-
-@pytest.mark.parametrize("make", [overdamped_gap, inertial_gap], ids=lambda make: make.__name__)
-def test_equations_are_linear_in_the_rates(make):
-    system = assemble(make())
-    rates = [s.dot for s in system.states]
-    for row in system.residual():
-        assert all(derivative(derivative(row, a), b) == 0 for a in rates for b in rates)
-
-
 def test_work_on_a_state_at_rest_is_followed_without_transitions():
     loading = {"g_n": Harmonic(mean=2e-8, amplitude=1.8e-8, frequency=0.1, phase=1.0)}
     interface = Interface(None, [NormalStiffness(E_n=6e13)])
     heat = [path("lower", "upper", 100.0)]
     trajectory = run(Scene(bodies(energy=Constant), interface, heat, loading, None, 300.0, APART), 200.0)
     assert audit(trajectory).energy_error < 1e-9
-
-
-def test_reversals_are_events_under_a_periodic_load():
-    loading = {"v": Harmonic(amplitude=0.02, frequency=2.0), "p": Hold(level=1e5)}
-    trajectory = run(perfect_contact([], frictions=[Coulomb(mu=0.3)], loading=loading), 5.0)
-    assert len(trajectory.result.events.t) == 19
 
 
 def test_relaxation_needs_a_potential_that_curves():
@@ -112,16 +84,6 @@ def test_a_film_that_stores_heat_needs_a_temperature_of_its_own():
         assemble(Scene(bodies(), interface, [path("lower", "upper", 1.0)], {}, None, 300.0, APART))
 
 
-def test_a_slider_without_transitions_starts_in_equilibrium():
-    mount, loading = Mounting(k=1e12), {"w_t": Ramp(start=-4e-8, rate=1e-9), "g_n": Hold(level=1e-6)}
-    interface = Interface("T", [TangentialStiffness(E_t=1e12)], [Viscous(eta=1e3)])
-    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
-    trajectory = run(scene, 1.0)
-    assert state(trajectory, "u_t")[0] == pytest.approx(-2e-8, rel=1e-9)
-    balance = 1e12 * (column(trajectory, "w_t") - state(trajectory, "u_t")) - column(trajectory, "t_e")
-    assert np.max(np.abs(balance)) < 1e-9 * np.max(np.abs(column(trajectory, "t_e")))
-
-
 def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     law = PressureConductance(between=("lower", "upper"), h_c=1e3, H=varying(1e9, Linear(of="phi", slope=-1.5)))
     loading = {"phi": Ramp(start=0.1, rate=0.5), "p": Hold(level=1e6)}
@@ -129,14 +91,6 @@ def test_a_parameter_that_varies_out_of_its_range_stops_the_run():
     trajectory = run(scene, 1.5)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith("pressure conductance: H left its range (> 0) as it varies near t = 1.13333")
-
-
-def test_a_programme_moves_a_dead_load():
-    interface = Interface("T", [NormalStiffness(E_n=1e12)])
-    programme = (Stage("pull", {"F_n": 1e3}, duration=1.0), Stage("hold", {}))
-    trajectory = run(Scene(bodies("T", "T"), interface, T_0=300.0, initial=TOGETHER, programme=programme), 2.0)
-    assert trajectory.status == "finished"
-    assert state(trajectory, "g_n")[-1] == pytest.approx(1e-9, rel=1e-9)
 
 
 def test_an_overdamped_slider_starts_from_rest():
@@ -151,25 +105,6 @@ def test_an_overdamped_slider_starts_from_rest():
     assert state(trajectory, "u_t")[-1] == pytest.approx(
         1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8
     )
-
-
-def test_an_open_contact_does_not_stick_and_slide_without_end():
-    adhesion = AdhesionIntensity(C_N=1.8e9, C_T=1.8e7, w=1.5e-7, E_n=1.2e9)
-    pulse = Table(times=[0.0, 0.31, 0.310000002, 0.310000004], values=[0.0, 0.0, 3e-9, 0.0])
-    loading = {"w_t": pulse, "g_n": Hold(level=1e-9), "phi": Hold(level=0.12)}
-    interface = Interface("T", [adhesion, BondSprings(k_b=1e-9)], [Coulomb(mu=0.8, mu_s=0.3)], sites=SITES)
-    mount = Mounting(k=2.4e7, c_b=6e6, c_g=6e6, beta_1=1.0)
-    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
-    assert run(scene, 2.2).status == "finished"
-
-
-def test_a_film_that_closes_before_the_last_breakpoint_is_named():
-    loading = {"g_n": Ramp(start=1e-6, rate=-1e-6), "v": Harmonic(amplitude=1e-6, frequency=0.4, phase=1.0)}
-    interface = Interface("T", frictions=[Viscous(eta=1.0)])
-    trajectory = run(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER), 5.0)
-    assert trajectory.status == "stopped"
-    assert trajectory.reason.startswith("g_n reached zero, where the law viscous ends")
-    assert Solution(trajectory).audit.violations == ()
 
 
 def test_an_impossible_jump_says_what_is_in_the_way():

@@ -113,20 +113,6 @@ def test_a_bond_breaks_where_its_barrier_is_gone_however_cold(tmp_path, law):
     assert not any(CAPPED in text for text in solution.warnings)
 
 
-@pytest.mark.parametrize("A", ["1e-239, b: 0, Ea: 0", "1e13, b: 0, Ea: 18.3 kJ/mol"])
-def test_the_same_bond_in_a_mechanism(tmp_path, A):
-    text = mechanism(
-        {"free": 0, "bond": 0}, [f"equation: bond => free, type: Bell, rate-constant: {{A: {A}}}, x-beta: 0.3 nm"]
-    )
-    prefactor = mpmath.mpf(TINY) if "239" in A else mpmath.mpf(10) ** 13 * mpmath.exp(-mpmath.mpf(18300) / (GAS * COLD))
-    times = [0.0, *np.linspace(4.9, 5.3, 9)]
-    more = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {coverages: {bond: 1}}"
-    solution = solve(tmp_path, "mechanism: {file: mech.yaml, bonds: [bond]}", times, COLD, more=more, mechanism=text)
-    exact = [1.0, *pulled(lambda f: prefactor * mpmath.exp(work(f)), times[1:])]
-    assert min(exact) < 0.1
-    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
-
-
 def test_the_warning_is_of_the_rate_and_not_of_its_exponent(tmp_path):
     """At 16 s the exponent is 1739, but only 1189 of the rate; at 10 s 1087 and 537, at 5 s 543 and -7."""
     law, loading = next(iter(LOADED)), "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
@@ -137,10 +123,6 @@ def test_the_warning_is_of_the_rate_and_not_of_its_exponent(tmp_path):
         texts = [text for text in solution.warnings if CAPPED in text]
         assert bool(texts) == said
         assert all(f"reached {reached:.4g}" in text for text in texts)
-
-
-ACTIVATED = "times: [activated: {E_a: 20 kJ/mol}]"
-"""exp(+593.4) from the T_0 of 4 K to 300 K would be exp(+593); from 300 K to 4 K exp(-593)."""
 
 
 @pytest.mark.parametrize("law", ["mass-action: {k_on: 0 1/s,", "bell: {"])
@@ -159,27 +141,6 @@ def test_factors_of_a_rate_are_one_exponential(tmp_path, law, energies):
     assert 0.1 < exact[1] < 0.9
     np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
     assert not any(CAPPED in text for text in solution.warnings)
-
-
-def test_a_factor_and_a_load_that_undo_each_other(tmp_path):
-    """3e9 1/s at 300 K is e^-593 of that at 4 K, which a force of 109 pN makes good."""
-    law = f"bell: {{k_off: {{value: 3.2945e9 1/s, {ACTIVATED}}}, x_off: 0.3 nm}}"
-    times = [0.0, *np.linspace(5.2, 5.5, 7)]
-    loading = "loading: {f: {ramp: {rate: 20 pN/s}}}\ninitial: {phi: 1}"
-    solution = solve(tmp_path, f"sites: 1e14, bonding: [{law}]", times, T=COLD, T_0=300, more=loading)
-    k = mpmath.mpf("3.2945e9") * mpmath.exp(-20000 / GAS * (mpmath.mpf(1) / COLD - mpmath.mpf(1) / 300))
-    exact = [1.0, *pulled(lambda f: k * mpmath.exp(work(f)), times[1:])]
-    assert min(exact) < 0.5
-    np.testing.assert_allclose(bonded(solution), exact, rtol=0, atol=1e-9)
-
-
-def test_a_relaxation_time_of_the_cold_is_taken_to_room_temperature(tmp_path):
-    law = "relaxation: {tau: {value: 1e257 s, times: [activated: {E_a: -20 kJ/mol}]}}"
-    interface = f"sites: 1e14, potential: [bond-energy: {{K_0: 1}}], bonding: [{law}]"
-    times = [0.0, 0.5, 1.0]
-    solution = solve(tmp_path, interface, times, T=300, T_0=4, more="initial: {phi: 0}")
-    rate = mpmath.mpf("1e-257") * mpmath.exp(-20000 / GAS * (mpmath.mpf(1) / 300 - mpmath.mpf(1) / 4))
-    np.testing.assert_allclose(bonded(solution), [1 - float(mpmath.exp(-rate * t)) for t in times], atol=1e-10)
 
 
 def test_an_affinity_in_the_cold_drives_a_slow_reaction(tmp_path):
@@ -296,27 +257,6 @@ def test_orders_below_one_both_ways_end_in_their_balance(tmp_path, k, back):
     assert a[-1] == pytest.approx(float(exact), rel=1e-7, abs=2e-14)
 
 
-def test_several_species_are_used_up_one_after_the_other(tmp_path):
-    """a => b of order 0.3 and b => c of 0.5, and at once d => e of order 0.2."""
-    reactions = [
-        f"equation: a => b, orders: {{a: 0.3}}, {order(0.3)}",
-        f"equation: b => c, orders: {{b: 0.5}}, {order(0.5, 0.4)}",
-        f"equation: d => e, orders: {{d: 0.2}}, {order(0.2, 0.7)}",
-    ]
-    names = dict.fromkeys("abcde", 0.0)
-    times = np.linspace(0.0, 5.0, 11)
-    found = coverages(tmp_path, names, reactions, {"a": 0.6, "d": 0.4}, times)
-
-    def power_law(start, n, k):
-        return np.maximum(start ** (1 - n) - (1 - n) * k * times, 0.0) ** (1 / (1 - n))
-
-    np.testing.assert_allclose(found[0], power_law(0.6, 0.3, 1.0), rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found[3], power_law(0.4, 0.2, 0.7), rtol=0, atol=1e-9)
-    assert found[1].max() > 0.1
-    np.testing.assert_allclose(found[[0, 1, 2]].sum(axis=0), 0.6, rtol=0, atol=1e-12)
-    assert found[2, -1] == pytest.approx(0.6, abs=1e-12)
-
-
 # -- fast reactions that compete ---------------------------------------------------------------------------
 
 
@@ -367,16 +307,6 @@ def solved_network(folder, enthalpies, steps, times, loaded):
     return solution, np.array(exact).T
 
 
-@pytest.mark.parametrize("loaded", [(), (0,), (1,), (0, 1)])
-def test_a_loaded_reaction_behind_an_unstable_intermediate(tmp_path, loaded):
-    """What the intermediate turns into depends on both of its ways out, 1e12 1/s and 1e13 1/s."""
-    steps = [("a", "i", 0.01, True), ("i", "b", 1e13, True)]
-    times = [0.0, 1.0, 10.0, 100.0, 1000.0]
-    found, exact = network(tmp_path, {"a": 0.0, "i": 80.405, "b": -20.0}, steps, times, loaded)
-    assert exact[0, -1] == pytest.approx(4.4e-4, rel=0.01)
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("k", [1e6, 1e13, 1e20])
 @pytest.mark.parametrize("ratio", [1e-3, 1.0, 30.0])
 def test_yields_of_fast_ways_out_are_in_proportion_to_their_rates(tmp_path, k, ratio):
@@ -390,18 +320,6 @@ def test_yields_of_fast_ways_out_are_in_proportion_to_their_rates(tmp_path, k, r
     np.testing.assert_allclose(found[0], np.exp(-0.5 * np.array(times)), rtol=0, atol=1e-9)
     np.testing.assert_allclose(found[1, 1:], 0.5 * found[0, 1:] / (k * (1 + ratio)), rtol=1e-5, atol=1e-12)
     assert found[3, -1] / found[2, -1] == pytest.approx(ratio, rel=1e-9)
-
-
-@pytest.mark.parametrize("force", [0.0, 1e-12, 20e-12])
-@pytest.mark.parametrize("A", [1e3, 1e13])
-def test_two_fast_laws_hold_the_bonds_where_both_say(tmp_path, force, A):
-    law = f"{{bell: {{k_on: 1e10, k_off: 0.9e10, x_off: 1 nm, x_on: 0.5 nm}}}}, {{arrhenius: {{A: {A}}}}}"
-    interface = f"sites: 1e16, potential: [linear-enthalpy: {{H_r: 1}}], bonding: [{law}]"
-    more = f"loading: {{f: {force}}}\ninitial: {{phi: 0.2}}"
-    solution = solve(tmp_path, interface, [0.0, 1.0, 10.0, 1000.0], more=more)
-    on = mpmath.mpf(A) + 1e10 * mpmath.exp(force * mpmath.mpf("0.5e-9") / (BOLTZMANN * 300))
-    off = mpmath.mpf("0.9e10") * mpmath.exp(force * mpmath.mpf("1e-9") / (BOLTZMANN * 300))
-    np.testing.assert_allclose(bonded(solution)[1:], float(on / (on + off)), rtol=1e-12)
 
 
 def random_network(draw, decades):

@@ -12,12 +12,11 @@ from surfacechem.errors import InputError
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, TensileStrength, XuNeedleman
-from surfacechem.laws.contact import BondStiffness, Penalty, TangentialStiffness
+from surfacechem.laws.contact import BondStiffness, Penalty
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.films import Film
-from surfacechem.laws.friction import RateAndStateAging, RateAndStateSlip, Stribeck
 from surfacechem.laws.kinetics import LinearAffinity, Relaxation
-from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
+from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.laws.longrange import VanDerWaalsFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
@@ -55,21 +54,6 @@ def test_a_contact_under_a_swinging_load_touches_once_in_each_period(rtol):
     assert [jump.t for jump in trajectory.jumps] == pytest.approx(exact, rel=1e-12)
 
 
-def test_a_film_that_fades_never_stops():
-    """Without pressure the traction relaxes on c_v / E_t; its velocity falls to rounding of what it has been."""
-    friction = Stribeck(mu_s=0.3, mu_k=0.1, v_s=1e-9, delta=2.0, c_v=1e9)
-    loading = {"p": Hold(level=0.0), "w_t": Table(times=[0.0, 1.0, 100.0], values=[0.0, 1e-6, 1e-6])}
-    interface = Interface(Hold(level=300.0), [TangentialStiffness(E_t=1e10)], [friction])
-    scene = Scene(COLD, interface, (), loading, T_0=300.0, tangential=Mounting(k=1e10))
-    trajectory = solved(scene, 10.0)
-    assert names(trajectory) == ["slip forward"]
-    assert audit(trajectory).energy_error < 1e-9
-    rate = 5e9 / 1e9  # half of the stiffness, in series
-    u, g = trajectory.result.outputs[:, :2].T
-    exact = 1e-6 / rate * (1 - np.exp(-rate)) * np.exp(-rate * (trajectory.result.times[2:] - 1))
-    assert u[2:] - g[2:] == pytest.approx(1e-6 - exact, rel=1e-9)
-
-
 def test_what_a_start_settles_to_has_to_be_admissible():
     interface = Interface("T", [Penalty(E_n=1e14)], medium=Medium(None, {"k_m": 0.026}))
     film = Film(between=("lower", "upper"))
@@ -98,26 +82,6 @@ def test_a_jump_to_where_a_law_has_no_energy_is_impossible():
     trajectory = solved(scene, 10.0)
     assert trajectory.jumps[-1].verdict == IMPOSSIBLE
     assert "which is impossible: the energy of the interface is not finite after it" in trajectory.reason
-
-
-@pytest.mark.parametrize("mount", [Mounting(k=2e9, m=100.0), Mounting(k=2e9, m=100.0, c_b=1e3)])
-@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
-def test_a_block_that_friction_brings_to_rest_creeps_on(law, mount):
-    """From 1 um/s it stops in 40 ps, within 1e-20 of a run; then it creeps by 1e-39 m/s, as the spring makes it."""
-    a, b, L, v_0, mu_0, p = 0.008, 0.014, 5e-6, 1e-6, 0.6, 5e6
-    friction = law(mu_0=mu_0, a=a, b=b, L=L, v_0=v_0)
-    loading, initial = {"p": Hold(level=p), "w_t": Ramp(rate=2e-6)}, {"theta": 1.0, "v": 1e-6}
-    scene = Scene(
-        COLD, Interface(Hold(level=300.0), (), [friction]), (), loading, None, 300.0, initial, tangential=mount
-    )
-    trajectory = solved(scene, 20.0)
-    assert trajectory.status == "finished", trajectory.reason
-    u, _, ln_theta = trajectory.result.y
-    v = trajectory.everywhere["v"][-1]
-    assert np.exp(ln_theta) == pytest.approx(21.0 if law is RateAndStateAging else 1.0, rel=1e-9)
-    pull = mount.k * (4e-5 - u) + mount.c_b * 2e-6
-    at_rest = np.exp(-(mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a)
-    assert v == pytest.approx(2 * v_0 * at_rest * np.sinh(pull / (a * p)), rel=1e-9)
 
 
 class Reluctant(Friction):
@@ -151,11 +115,6 @@ def test_a_law_that_destroys_entropy_is_named_at_any_tolerance(v_1, rtol):
     assert books.destroyed["reluctant"] == pytest.approx(v_1**3 / 6 / whole, rel=0.5)
 
 
-def test_less_than_the_last_digits_of_the_total_is_no_destruction():
-    scene = perfect_contact([], frictions=[Reluctant(c=1e-30, v_1=2.0)], loading={"v": Ramp(rate=1.0)})
-    assert audit(solved(scene, 1.0)).violations == ()
-
-
 @pytest.mark.parametrize(("phi", "verdict"), [(1e-14, ADMISSIBLE), (-1e-14, ADMISSIBLE), (1e-3, VIOLATES)])
 def test_the_rounding_of_a_bound_destroys_no_entropy(phi, verdict):
     """Bodies and bonds cancel to a total of none, so that the last bonds are all there is to compare with."""
@@ -184,22 +143,3 @@ def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
         "the quasi-static equilibrium of the gap was lost (mechanical fold), but nothing"
     )
     assert names(trajectory) == ["snap"]
-
-
-@pytest.mark.parametrize("start", [0.0, 1.2e-3, -1.0e-3])
-@pytest.mark.parametrize("law", [RateAndStateAging, RateAndStateSlip])
-def test_creep_without_inertia_starts_from_any_pull(law, start):
-    """A slack spring leaves no velocity, a taut one tens of decades less than the first guess."""
-    a, b, L, v_0, mu_0, p, mount = 0.008, 0.014, 5e-6, 1e-6, 0.6, 5e6, Mounting(k=2e9, c_b=5e6)
-    friction = law(mu_0=mu_0, a=a, b=b, L=L, v_0=v_0)
-    loading, initial = {"p": Hold(level=p), "w_t": Ramp(start=start, rate=2e-6)}, {"theta": 1.0, "v": 1e-6}
-    scene = Scene(
-        COLD, Interface(Hold(level=300.0), (), [friction]), (), loading, None, 300.0, initial, tangential=mount
-    )
-    trajectory = solved(scene, 20.0)
-    assert trajectory.status == "finished", trajectory.reason
-    u, _, ln_theta = trajectory.result.y
-    v = trajectory.everywhere["v"][-1]
-    pull = mount.k * (start + 4e-5 - u) + mount.c_b * (2e-6 - v)
-    at_rest = np.exp(-(mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a)
-    assert v == pytest.approx(2 * v_0 * at_rest * np.sinh(pull / (a * p)), rel=1e-8)

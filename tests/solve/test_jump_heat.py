@@ -233,17 +233,6 @@ def test_friction_heats_by_the_conductances_of_each_moment_of_a_jump(thermal, sl
     same(found, limit, 1e-7 if load != "p" else 1e-9)
 
 
-@pytest.mark.parametrize("load", ["F_n", "w_n"])
-def test_friction_heats_by_what_touches_until_a_jump_has_opened_the_gap(load):
-    jumped = solved(pressing("spots", "pressed", load, 0.7, "", 0, low=-1))
-    limit = limit_of_ramps(lambda jump: pressing("spots", "pressed", load, 0.7, "", jump, low=-1))
-    found = temperatures(jumped)
-    excess = {"T_1": 1000 * (found["T_1"] - limit["T_1"]), "T_2": 700 * (found["T_2"] - limit["T_2"])}
-    # The spring of the normal gap lets go in the air, into the base; what conducts afterwards is less than a hundredth.
-    assert excess["T_2"] == pytest.approx(0.5, rel=0.02)
-    assert abs(excess["T_1"]) < 0.01
-
-
 def test_bonds_that_sliding_breaks_take_their_heat_as_it_begins():
     """They break where the falling pressure lets go of them, and what conducts then is not what does at its end."""
 
@@ -259,40 +248,6 @@ def test_bonds_that_sliding_breaks_take_their_heat_as_it_begins():
     assert [jump.edge.name for jump in jumped.trajectory.jumps] == ["slip forward"]
     found, limit = temperatures(jumped), limit_of_ramps(case)
     same({name: found[name] for name in ("T_1", "T_2")}, {name: limit[name] for name in ("T_1", "T_2")}, 1e-9)
-
-
-def weakening(case, of):
-    return case.replace("mu: 0.5", f"mu: {{value: 0.5, times: [power: {{of: {of}, exponent: -40}}]}}")
-
-
-@pytest.mark.parametrize("of", ["T_1", "T_2"])
-def test_friction_that_falls_with_its_own_heat_is_shared_along_a_jump(of):
-    """Where the slip ends follows from the temperatures that its way has given."""
-
-    def case(jump):
-        return weakening(pressing("warmer", "rigid", "p", 0.4, "", jump), of)
-
-    jumped = temperatures(solved(case(0)))
-    same(jumped, limit_of_ramps(case), 1e-9)
-
-
-def test_what_lets_go_along_a_jump_heats_as_it_is_then():
-    """A zone holds the slider until the gap has snapped open: it slips in the air, as nothing touches the slider."""
-
-    def case(jump):
-        zone = "exponential-cohesive-zone: {t_max: 1 MPa, g_0: 1 um, E_n: 1e15 Pa/m}"
-        loads = f"{table('w_n', [-1, -1, 3, 3], 'um', jump)}, w_t: {{ramp: {{rate: 1.1 mm/s}}}}"
-        mechanics = "normal: {k: 1e12, beta_1: 0}, tangential: {k: 1e9}"
-        given = text("spots", loads, mechanics, zone, initial="g_n: -1 nm").replace("h_0: 5, ", "")
-        given = given.replace("coulomb: {mu: 0.5}", "mohr-coulomb: {mu: 0.5, t_n_max: 3 MPa}")
-        return given.replace("until: 4 s, outputs: 5", "until: 2.5 s, rtol: 1e-8")
-
-    jumped = temperatures(solved(case(0)))
-    swift = temperatures(solved(case(1e-5)))
-    assert swift["T_2"] > 301
-    # The gap does some more work as it jumps, which its support takes.
-    assert 700 * (jumped["T_2"] - swift["T_2"]) == pytest.approx(4, abs=3)
-    assert 1000 * (jumped["T_1"] - swift["T_1"]) == pytest.approx(0, abs=0.5)
 
 
 @pytest.mark.parametrize("stiffness", ["", "tangential-stiffness: {E_t: 4e9}"])
@@ -357,11 +312,6 @@ def test_heat_is_shared_along_a_way_within_the_tolerance(feeds_back):
         one, other = shared(moments, 2, small, feeds_back=feeds_back)
         assert abs(one - exact) <= small
         assert one + other == pytest.approx(1, rel=1e-13)
-
-
-def test_where_a_way_has_no_numbers_nothing_is_shared():
-    found = shared(lambda ways, _: (ways, np.full((len(ways), 2), np.nan)), 2, 1e-9, feeds_back=False)
-    assert np.all(np.isnan(found))
 
 
 # -- what gives way by itself
@@ -462,27 +412,6 @@ def test_check_says_that_the_parts_of_a_support_matter_only_where_it_makes_heat(
     ]
     assert bool(idle) != jumps
     assert (abs(float(moved[0] - moved[1])) > 1e-6) == jumps
-
-
-def test_check_knows_that_a_snap_heats_by_the_partition():
-    case = CASE.format(
-        **APART,
-        cells="",
-        C_1=1000,
-        interface="  partition: {slider: 0, base: 1}\n"
-        "  potential: [exponential-cohesive-zone: {t_max: 10 MPa, g_0: 1 um, E_n: 1e15 Pa/m}]",
-        static="",
-        heat="",
-        mechanics="normal: {k: 1e12 Pa/m, beta_1: 1}",
-        loading="w_n: {ramp: {rate: 8 um/s}}",
-        initial="T_1: 300, T_2: 300, g_n: 0",
-    ).replace("  friction: [coulomb: {mu: 0.5}]\n", "")
-    simulation = Simulation(load_text(case))
-    (idle,) = warnings(simulation.model.system)
-    assert "normal.beta_1" in idle
-    end = simulation.run().dataset.isel(time=-1)
-    assert end.T_1 == 300
-    assert end.T_2 > 300.01
 
 
 @pytest.mark.parametrize("method", ["radau", "lsoda"])

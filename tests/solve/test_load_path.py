@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from scenes import bodies
-from scipy.optimize import brentq
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.laws.contact import NormalStiffness, Penalty, TangentialStiffness
-from surfacechem.laws.friction import Coulomb, RateAndStateAging
+from surfacechem.laws.contact import Penalty, TangentialStiffness
+from surfacechem.laws.friction import RateAndStateAging
 from surfacechem.laws.loading import Hold, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.reactor import InterfaceReactor, ReactorNet
@@ -112,18 +111,6 @@ def test_a_traction_that_jumps_moves_an_elastic_gap(k, solver):
     assert at(solution, "T", 4.0) == pytest.approx(300 + 8e12 / E / 20, rel=1e-12)
 
 
-def test_a_traction_that_jumps_opens_a_cohesive_zone():
-    zone = "exponential-cohesive-zone: {t_max: 9 MPa, g_0: 1 um, E_n: 3e13 Pa/m}"
-    solution = normal(f"w_n: 0, {STEP}", zone)
-
-    def gap(F):
-        return brentq(lambda g: F - 1e12 * g - 9e6 * g / 1e-6 * np.exp(1 - g / 1e-6), 0.0, 0.5e-6, xtol=1e-24)
-
-    for t, F in ((0.5, 0.5e6), (1.5, 5e6), (3.0, 2e6)):
-        assert at(solution, "g_n", t) == pytest.approx(gap(F), rel=1e-10)
-    assert at(solution, "g_n", 4.0) == pytest.approx(-1e6 / 3.1e13, rel=1e-10)
-
-
 def test_a_traction_beyond_the_strength_ends_the_run_where_it_jumps():
     zone = "exponential-cohesive-zone: {t_max: 3 MPa, g_0: 1 um, E_n: 3e13 Pa/m}"
     text = normal_text(STEP, zone, "k: 0").replace("mechanics: {normal: {k: 0}}\n", "")
@@ -178,11 +165,6 @@ def test_a_damper_bears_no_jump_of_the_displacement():
         normal(JUMPS, mount="k: 1e12, c_b: 1e12")
 
 
-def test_nothing_is_listed_where_nothing_moves():
-    solution = slider(f"{pressure([0, 1, 1, 6], [1, 1, 2, 2])}, w_t: {{ramp: {{rate: 0.01 mm/s}}}}")
-    assert events(solution) == []
-
-
 # -- friction
 
 RISES, FALLS = pressure([0, 3, 3, 10], [1, 1, 2, 2]), pressure([0, 5, 5, 10], [2, 2, 1, 1])
@@ -210,34 +192,12 @@ def test_what_slides_jumps_on_where_the_pressure_jumps_down(solver):
 
 
 @pytest.mark.parametrize("solver", [OWN, LIBRARY])
-def test_what_sticks_elastically_keeps_its_elastic_gap(solver):
-    solution = slider(f"{RISES}, {PULLED}", SPRING % "4e9", solver=solver)
-    slip = 2.5  # where 0.8 of k w reaches 0.5 MPa
-    assert [name for name, _ in events(solution)] == ["slip forward", "load", "slip forward"]
-    assert [t for _, t in events(solution)] == pytest.approx([slip, 3.0, 3.0 + 0.5e-3 / 0.8 / 0.25e-3], rel=1e-9)
-    assert at(solution, "u_t", 3.25) == pytest.approx(0.25e-3 + 0.2 * 0.0625e-3, rel=1e-9)
-    assert at(solution, "g_t", 3.25) == pytest.approx(0.125e-3 + 0.2 * 0.0625e-3, rel=1e-9)
-    assert at(solution, "g_t", 6.0) == pytest.approx(0.25e-3, rel=1e-9)
-    assert at(solution, "u_t", 6.0) == pytest.approx(0.5e-3, rel=1e-9)
-
-
-@pytest.mark.parametrize("solver", [OWN, LIBRARY])
 def test_a_shear_traction_that_jumps_moves_what_sticks_elastically(solver):
     shear = "p: 1 MPa, w_t: 0, F_t: {table: {times: [0, 3, 3, 10], values: [0, 0.1 MPa, 0.6 MPa, 0.6 MPa]}}"
     solution = slider(shear, SPRING % "1e9", outputs=7, solver=solver)
     assert at(solution, "u_t", 4.0) == pytest.approx(300e-6, rel=1e-11)
     assert at(solution, "t_t", 4.0) == pytest.approx(0.3e6, rel=1e-11)
     assert released(solution) == pytest.approx([62.5], rel=1e-11)
-
-
-def test_a_displacement_that_jumps_drags_a_slider():
-    drag = "w_t: {table: {times: [0, 1, 1, 3, 3, 6], values: [0, 0, 0.9 mm, 0.9 mm, 0.2 mm, 0.2 mm]}}"
-    solution = slider(f"p: 1 MPa, {drag}")
-    assert [name for name, _ in events(solution)] == ["load", "slip forward", "load"]
-    assert at(solution, "u_t", 2.0) == pytest.approx(0.4e-3, rel=1e-12)
-    assert at(solution, "u_t", 6.0) == pytest.approx(0.4e-3, rel=1e-12)
-    assert at(solution, "t_t", 6.0) == pytest.approx(-0.2e6, rel=1e-12)
-    assert at(solution, "work_t", 6.0) == pytest.approx(0.5e9 * (0.9e-3**2 + 0.2e-3**2 - 0.5e-3**2), rel=1e-11)
 
 
 def test_a_debonding_that_raises_the_limit_lets_what_slides_stick():
@@ -268,31 +228,6 @@ run: {until: 2 s}
     np.testing.assert_array_equal(jump.after.y[1], 0.0)
     assert solution.trajectory.jumps[2].t == pytest.approx(1.5, rel=1e-12)
     assert at(solution, "u_t", 2.0) == pytest.approx(0.5e-6, rel=1e-11)
-
-
-def test_a_gap_that_snaps_off_does_not_pull_back_what_is_dragged():
-    text = """
-T_0: 300 K
-bodies:
-  a: {temperature: T, capacity: constant, C: 10 J/m^2/K, stiffness: 4e16 Pa/m}
-  b: {temperature: T, capacity: constant, C: 10 J/m^2/K}
-interface:
-  temperature: T
-  potential:
-    - van-der-waals-flat-flat: {A_H: 1.2e-19 J}
-    - penalty: {E_n: 8e19 Pa/m}
-  friction:
-    - mohr-coulomb: {mu: 0.3, t_n_max: 50 MPa, c: 1 kPa}
-mechanics: {tangential: {k: 1e13 Pa/m}}
-loading: {w_n: {table: {times: [0, 5, 12], values: [10 nm, 0.5 nm, 80 nm]}}, w_t: {ramp: {rate: 1 um/s}}}
-initial: {T: 300 K, g_n: 10 nm}
-run: {until: 12 s}
-"""
-    solution = solved(text, exact=1e-8)
-    states = [state.name for state in solution.trajectory.model.system.states]
-    for jump in solution.trajectory.jumps:
-        assert jump.after.y[states.index("u_t")] >= jump.before.y[states.index("u_t")] * (1 - 1e-9)
-        assert jump.verdict == "admissible"
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -356,13 +291,6 @@ def test_loads_jump_in_a_reactor_network(loading):
     assert interface.dataset.attrs["energy_error"] < 1e-6
 
 
-def test_loads_jump_in_a_sweep():
-    case = load_text(SLIDER.format(loading=f"{RISES}, {PULLED}", potential="", static="", outputs=7, solver=OWN))
-    sweep = Simulation(case).sweep({"mechanics.tangential.k": [1e9, 2e9, 1e12]})
-    u = sweep.dataset["u_t"].isel(time=-1).values
-    np.testing.assert_allclose(u, 1.5e-3 - 1e6 / np.array([1e9, 2e9, 1e12]), rtol=1e-11)
-
-
 # -- far-field tractions that jump: what has no inertia or damper moves at once, and what is not stored is heat -------
 
 K, E, MU = 1e9, 1e10, 0.5
@@ -381,42 +309,6 @@ def stepped(interface, loading, mounts, initial=None, rtol=1e-11):
 def held(trajectory, name):
     """A quantity in the middle of each level of the load."""
     return trajectory.everywhere[name][1 : len(trajectory.result.times) : 2]
-
-
-def heats(trajectory, name):
-    return [jump.released for jump in trajectory.jumps if jump.edge.name == name]
-
-
-def test_an_elastic_gap_moves_at_once():
-    loading = {"w_n": Hold(level=0.0), "F_n": STEPS}
-    trajectory = stepped(Interface("T", [NormalStiffness(E_n=E)]), loading, {"normal": Mounting(k=K)})
-    np.testing.assert_allclose(held(trajectory, "g_n"), np.array(LEVELS) / (K + E), rtol=1e-14)
-    np.testing.assert_allclose(heats(trajectory, "load"), np.diff(LEVELS) ** 2 / (2 * (K + E)), rtol=1e-11)
-    assert audit(trajectory).findings == ()
-    assert audit(trajectory).energy_error < 1e-9
-
-
-def test_elastic_sticking_moves_with_the_body():
-    loading = {"p": Hold(level=1e6), "w_t": Hold(level=0.0), "F_t": STEPS}
-    interface = Interface("T", [TangentialStiffness(E_t=E)], [Coulomb(mu=MU)])
-    trajectory = stepped(interface, loading, {"tangential": Mounting(k=K)})
-    for name in ("u_t", "g_t"):
-        np.testing.assert_allclose(held(trajectory, name), np.array(LEVELS) / (K + E), rtol=1e-14)
-    assert audit(trajectory).energy_error < 1e-9
-
-
-@pytest.mark.parametrize("rtol", [1e-6, 1e-11])
-def test_what_slides_goes_on_or_sticks_and_turns_back(rtol):
-    p = 1e3
-    loading = {"p": Hold(level=p), "w_t": Hold(level=0.0), "F_t": STEPS}
-    trajectory = stepped(Interface("T", frictions=[Coulomb(mu=MU)]), loading, {"tangential": Mounting(k=K)}, rtol=rtol)
-    u = np.array([0.0, 1e3 - MU * p, 1.5e3 - MU * p, -2e3 + MU * p]) / K
-    np.testing.assert_allclose(held(trajectory, "u_t"), u, rtol=1e-13)
-    assert [jump.edge.name for jump in trajectory.jumps] == ["slip forward", "load", "load", "slip backward"]
-    moved = np.abs(np.diff(u))
-    heat = MU * p * moved + 0.5 * K * moved**2
-    np.testing.assert_allclose([jump.released for jump in trajectory.jumps], [*heat[:2], 0.0, heat[2]], rtol=1e-9)
-    assert audit(trajectory).energy_error < 1e-9
 
 
 def test_what_creeps_is_carried_along():

@@ -15,7 +15,6 @@ from solver_problems import problem
 from surfacechem.compile.program import compile_program
 from surfacechem.contracts.terms import HeatTransfer, parameter
 from surfacechem.format import load_text
-from surfacechem.laws.loading import Harmonic, Ramp
 from surfacechem.runs.simulation import Simulation
 from surfacechem.solve import names, solver
 from surfacechem.solve.segments import Passing
@@ -118,12 +117,6 @@ def test_a_layer_is_felt(name):
     assert found["T_2"] - found["T_1"] == pytest.approx(left, rel=2e-3 if name != "radau" else 1e-7)
 
 
-def test_an_accuracy_is_kept_where_something_is_brief():
-    found, solution = ends(Simulation(load_text(TAPPING.replace("until: 3 s", "until: 3 s, accuracy: 1e-8"))))
-    np.testing.assert_allclose([found["T_1"], found["T_2"]], tapped(), rtol=1e-8)
-    assert solution.accuracy.error <= 1e-8
-
-
 class Resonance(HeatTransfer):
     r"""A conductance that is high around one gap, of which it does not tell.
 
@@ -175,38 +168,6 @@ def test_a_sweep_ends_pieces_where_each_run_needs_it():
     np.testing.assert_array_equal([run.result.y for run in swept.sweep], singly)
 
 
-def test_gaps_that_touch_often_are_paid_for():
-    """The work on a gap that passes a zone 600 times is what its energy changes by."""
-    text = """title: often
-T_0: 300 K
-bodies:
-  lower: {temperature: T, C: 1 kJ/m^2/K, capacity: constant}
-  upper: {temperature: T}
-interface: {temperature: T, potential: [{exponential-cohesive-zone: {t_max: 1 MPa, g_0: 10 nm, E_n: 1e12 Pa/m}}]}
-loading: {g_n: {harmonic: {mean: 0.2 um, amplitude: 10 um, frequency: 3000 1/s, phase: 1}}}
-initial: {T: 300 K}
-run: {until: 0.1 s}
-"""
-    found, solution = ends(Simulation(load_text(text)))
-
-    def energy(t):
-        g = 2e-7 + 1e-5 * np.sin(2 * np.pi * 3000 * t + 1)
-        return -1e6 * (g + 1e-8) * np.exp(1 - g / 1e-8) if g > 0 else 0.5e12 * g**2 - np.e * 1e-2
-
-    exchanged = 0.5e12 * (1e-5 - 2e-7) ** 2
-    assert abs(found["W_g_n"] - (energy(0.1) - energy(0.0))) < 1e-7 * exchanged
-    assert sum(solution.trajectory.result.events.index == 0) == 600
-
-
-def test_the_second_run_is_looked_at_at_other_points():
-    simulation = Simulation(load_text(LAYER))
-    first = simulation.model.solve(simulation.case.run)
-    second = simulation.model.resolve(first, 1e-13)
-    ratio = first.result.problem.spacing / second.result.problem.spacing
-    assert ratio > 5
-    assert ratio != pytest.approx(round(ratio))
-
-
 @pytest.mark.parametrize("h", [0.02, 0.2])
 def test_a_step_is_held_against_the_equations_between_its_stages(h):
     """y' = a bell of time; without a look the first step is the whole run."""
@@ -233,11 +194,3 @@ def test_passages_are_found_in_any_number():
     expected = np.sort([(x - 1) / (2000 * np.pi) for x in (*turns, *touches)])
     expected = expected[(expected > 0) & (expected < 3)]
     np.testing.assert_allclose(pieces[1:-1], expected, rtol=1e-13)
-
-
-def test_histories_that_pass_nothing_are_left_whole():
-    assert Harmonic.cycle
-    assert Ramp(rate=1.0).breakpoints() == ()
-    text = LAYER.replace("start: 1 mm, rate: -10 um/s", "start: 2 mm, rate: 10 um/s")
-    simulation = Simulation(load_text(text))
-    assert len(simulation.model.solve(simulation.case.run).result.problem.segments) == 2

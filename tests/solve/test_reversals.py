@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.friction import RateAndStateAging, RateAndStateSlip
-from surfacechem.laws.loading import Harmonic, Hold, Table
+from surfacechem.laws.loading import Harmonic, Hold
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Mounting, Scene
@@ -90,8 +90,7 @@ def test_sliding_follows_a_load_that_swings(law, mount):
 
 
 @pytest.mark.parametrize(
-    ("mount", "elastic"),
-    [(Mounting(k=K, c_b=5e6), 0.0), (Mounting(k=K, c_g=5e6), 0.0), (Mounting(k=K, c_b=5e6), 1e13)],
+    ("mount", "elastic"), [(Mounting(k=K, c_b=5e6), 0.0), (Mounting(k=K, c_g=5e6), 0.0), (Mounting(k=K, c_b=5e6), 1e13)]
 )
 @pytest.mark.parametrize("law", LAWS)
 def test_creep_reverses_a_hundred_times(law, mount, elastic):
@@ -103,44 +102,3 @@ def test_creep_reverses_a_hundred_times(law, mount, elastic):
     assert trajectory.result.counters.steps < 100 * 60
     assert audit(trajectory).findings == ()
     assert audit(trajectory).energy_error < 1e-10
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_sliding_that_weakens_sticks_and_slips_both_ways(law):
-    load = Harmonic(amplitude=AMPLITUDE, frequency=FREQUENCY)
-    trajectory = solved(law, Mounting(k=K, c_b=5e7), {"w_t": load}, 40.0, 1e-9, parameters=WEAKENING)
-    assert trajectory.status == "finished", trajectory.reason
-    v = trajectory.everywhere["v"]
-    assert v.max() > 1e-3
-    assert v.min() < -1e-3
-    assert audit(trajectory).findings == ()
-    assert audit(trajectory).energy_error < 1e-9
-
-
-STEPS = {
-    "times": [0.0, 5.0, 5.0, 10.0, 10.0, 15.0, 15.0, 20.0],
-    "values": [0.0, 0.0, 3.2e6, 3.2e6, -3.3e6, -3.3e6, 0, 0],
-}
-
-
-@pytest.mark.parametrize(
-    ("law", "mount"),
-    [
-        (LAWS[0], Mounting(k=2e8, c_b=5e6)),
-        (LAWS[1], Mounting(k=2e8, c_g=5e6)),
-        *((law, Mounting(k=2e8)) for law in LAWS),
-    ],
-)
-def test_sliding_follows_a_force_that_steps(law, mount):
-    trajectory = solved(law, mount, {"w_t": Hold(level=0.0), "F_t": Table(**STEPS)}, 20.0)
-    assert trajectory.status == "finished", trajectory.reason
-    assert audit(trajectory).findings == ()
-    assert audit(trajectory).energy_error < 1e-10
-
-    def pull(t, u):
-        return mount.k * -u + (3.2e6 if 5 < t <= 10 else -3.3e6 if 10 < t <= 15 else 0.0)
-
-    times = trajectory.result.times
-    (u, ln_theta), _ = sliding(law, pull, mount.c_g + mount.c_b, times, (5.0, 10.0, 15.0))
-    np.testing.assert_allclose(trajectory.result.outputs[:, 0], u, rtol=0, atol=1e-8 * np.max(np.abs(u)))
-    np.testing.assert_allclose(trajectory.result.outputs[:, 2], ln_theta, rtol=0, atol=1e-6)

@@ -15,7 +15,6 @@ from solver_problems import (
     problem,
 )
 
-import surfacechem
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
@@ -89,21 +88,6 @@ def test_outputs_are_as_good_as_step_ends_where_a_variable_follows_another() -> 
     assert result.counters.factorizations > result.counters.steps
 
 
-def test_outputs_do_not_change_the_steps() -> None:
-    with_outputs, without = (radau.solve(follower(times)) for times in (np.linspace(0.0, 3.0, 61), ()))
-    assert with_outputs.counters.steps == without.counters.steps
-    np.testing.assert_array_equal(with_outputs.y, without.y)
-    np.testing.assert_array_equal(with_outputs.ledger, without.ledger)
-
-
-def test_van_der_pol() -> None:
-    """Reference: Hairer & Wanner II, IV.10, eps = 1e-6, t = 2."""
-    t, x, v, dx, dv = se.symbols("t x v dx dv")
-    program = compile_program(t, [x, v], [dx, dv], [], [dx - v, 1e-6 * dv - ((1 - x**2) * v - x)])
-    result = radau.solve(problem(program, [2.0, -0.66], [0.0, 2.0], 1e-9))
-    np.testing.assert_allclose(result.y, [1.706167732170483, -0.8928097010247975], rtol=1e-6)
-
-
 @pytest.mark.parametrize("conductance", CONDUCTANCE)
 def test_sum_row_keeps_the_mean_temperature(conductance: float) -> None:
     """Two nodes, capacities 1e-15 and 2, heated with 3 W: the total energy is exact whatever the conductance."""
@@ -133,16 +117,6 @@ def test_what_grows_from_below_the_tolerance_is_not_damped() -> None:
     grown = np.exp(1e30 * end - np.log(1e33))
     # Close to the absolute tolerance it is known to a few per cent, which last as it grows.
     np.testing.assert_allclose(result.outputs[:, 0], [grown / (1 + grown), 1.0], rtol=1e-2)
-
-
-def test_what_is_nothing_and_is_driven_by_nothing_does_not_grow() -> None:
-    """y' = 1e30 y (1 - y) from y = 0 rests there, in no more steps than anything at rest."""
-    t, y, dy = se.symbols("t y dy")
-    program = compile_program(t, [y], [dy], [], [dy - 1e30 * y * (1 - y)])
-    result = radau.solve(problem(program, [0.0], [0.0, 1.0], 1e-8, atol=1e-14, times=[1.0]))
-    assert result.status == Status.FINISHED
-    assert result.outputs[0, 0] == 0.0
-    assert result.counters.steps < 20
 
 
 def test_vanishing_capacity_ends_at_zero_temperature() -> None:
@@ -203,26 +177,6 @@ def oscillator(*margins):
     return compile_program(t, [x, v], [dx, dv], [], [dx - v, dv + x], margins=values)
 
 
-def test_double_crossing_between_steps_is_seen() -> None:
-    """cos t dips below -0.99 between 3.0 and 3.28 only."""
-    case = problem(oscillator(lambda t, x, v: x + 0.99), [1.0, 0.0], [0.0, 20.0], 1e-5, margins=(Margin.stop(),))
-    assert radau.solve(case).t == pytest.approx(np.arccos(-0.99), rel=1e-5)
-
-
-def test_coincident_events_are_both_reported() -> None:
-    case = problem(
-        oscillator(lambda t, x, v: x, lambda t, x, v: 3 * x),
-        [1.0, 0.0],
-        [0.0, 3.0],
-        1e-10,
-        margins=(Margin.restart(), Margin.stop()),
-    )
-    result = radau.solve(case)
-    assert result.status == Status.EVENT
-    assert sorted(result.events.index) == [0, 1]
-    assert result.t == pytest.approx(np.pi / 2, rel=1e-10)
-
-
 @pytest.mark.parametrize("name", names)
 def test_margin_zero_at_the_start_does_not_fire(name: str) -> None:
     case = problem(oscillator(lambda t, x, v: x), [0.0, 1.0], [0.0, 4.0], 1e-8, margins=(Margin.stop(),))
@@ -260,14 +214,6 @@ def test_no_consistent_state() -> None:
         assert not solver(name).solve(problem(program, [1.0, 1.0], [0.0, 1.0], 1e-6)).success, name
 
 
-def test_singular_capacity() -> None:
-    t, x, y, dx, dy = se.symbols("t x y dx dy")
-    program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
-    result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
-    assert result.status == Status.SINGULAR
-    assert "singular" in result.message
-
-
 def test_steps_and_seconds_are_limited() -> None:
     case = oscillator()
     assert radau.solve(problem(case, [1.0, 0.0], [0.0, 1e9], 1e-10, max_steps=50)).status == Status.MAX_STEPS
@@ -275,17 +221,6 @@ def test_steps_and_seconds_are_limited() -> None:
         radau.solve(problem(case, [1.0, 0.0], [0.0, 1e12], 1e-10, max_steps=10**12, max_seconds=0.05)).status
         == Status.STOPPED
     )
-
-
-def test_recorded_steps_are_consistent() -> None:
-    case = problem(
-        exothermic(), [300.0, 0.0], [0.0, 2.5], 1e-8, parameters=[2.0, 300.0, 300.0, 1.0, 0.5], record_steps=True
-    )
-    steps = radau.solve(case).steps
-    assert steps is not None
-    assert steps.t[0] == 0.0
-    assert steps.t[-1] == 2.5
-    np.testing.assert_allclose(steps.ydot[:, 1], 2.0 * np.exp(-2.0 * steps.t), rtol=1e-5)
 
 
 def test_batch_is_deterministic_and_equals_single_runs() -> None:
@@ -478,8 +413,3 @@ def test_a_rate_that_is_noise_does_not_hold_up_a_run():
     _, counters = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0)
     _, alone = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0, group=-1)
     assert counters.steps < 10 * alone.steps + 100
-
-
-@pytest.mark.parametrize("name", ["l-selectin-tether", "elastic-bonds-at-a-gap"])
-def test_bonds_that_start_at_full_coverage(name):
-    assert surfacechem.run(name).audit.entropy_error < 1e-8
