@@ -51,6 +51,14 @@ def perfect_contact(potentials, reactions=(), phi=0.0, T=300.0, C_1=1.0, C_2=1.0
     return Scene(bodies("T", "T", energy, C_1, C_2), interface, T_0=T_0, initial=initial, **rest)
 
 
+def together(potentials=(), frictions=(), loading=None, initial=None, reactions=(), limits=(), **more) -> Scene:
+    """Two bodies and an interface of one temperature; ``interface``, ``pair`` and ``sites`` may be given too."""
+    sites = more.pop("sites", SITES if reactions or limits else None)
+    interface = more.pop("interface", None) or Interface("T", potentials, frictions, reactions, sites, limits=limits)
+    pair, start = more.pop("pair", bodies("T", "T")), {"T": 300.0} | (initial or {})
+    return Scene(pair, interface, loading=loading or {}, T_0=300.0, initial=start, **more)
+
+
 def coupled() -> Scene:
     """Everything depends on everything: the interface has its own temperature, a moving gap, bonds and friction."""
     potentials = [

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from scenes import SITES, path, perfect_contact, varying
+from solved import Solved, solve
 
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant, Quadratic
@@ -17,10 +18,8 @@ from surfacechem.laws.kinetics import Arrhenius, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.laws.longrange import LennardJonesDerjaguin, LennardJonesFlatFlat, LennardJonesSpherePlane
 from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
-from surfacechem.solve.jumps import Jump
-from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.solve.run import Model
 
 FOLDER = Path(__file__).parent / "references"
 COLD_BODIES = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
@@ -53,50 +52,6 @@ def _entry(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
-
-
-class Solved:
-    """A trajectory by names."""
-
-    def __init__(self, trajectory: Trajectory) -> None:
-        self.trajectory = trajectory
-        self.system = trajectory.model.system
-        self.jumps = trajectory.jumps
-        self.status, self.reason = trajectory.status, trajectory.reason
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """A state, named quantity or account at the output times."""
-        trajectory, system = self.trajectory, self.system
-        result = trajectory.result
-        found = {state.name: result.outputs[:, j] for j, state in enumerate(system.states)}
-        found |= {item.name: trajectory.outputs[:, j] for j, item in enumerate(system.outputs)}
-        found |= {account.quantity.name: result.ledger_outputs[:, j] for j, account in enumerate(system.ledger)}
-        return found[name]
-
-    def account(self, name: str, when: int) -> float:
-        """A line of the ledger at an event."""
-        column = [account.quantity.name for account in self.system.ledger].index(name)
-        return float(self.trajectory.result.events.ledger[when, column])
-
-    def state(self, jump: Jump, name: str, side: str = "after") -> float:
-        return float(getattr(jump, side).y[[state.name for state in self.system.states].index(name)])
-
-    def of(self, name: str) -> list[Jump]:
-        """The jumps of a transition."""
-        return [jump for jump in self.jumps if jump.edge.name.startswith(name)]
-
-    @property
-    def energy_error(self) -> float:
-        return audit(self.trajectory).energy_error
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        return audit(self.trajectory).findings
-
-
-def solve(model: Model, times, changes=None, **settings) -> Solved:
-    times = [float(t) for t in times]
-    return Solved(model.solve(Run(times=times if times[0] == 0 else (0.0, *times), **settings), changes))
 
 
 # -- the normal gap -------------------------------------------------------------------------------------------------

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies, varying
+from scenes import SITES, together, varying
+from solved import solve
 
 from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.errors import InputError
@@ -24,8 +25,7 @@ from surfacechem.laws.longrange import (
     VanDerWaalsSpherePlane,
 )
 from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
-from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.scene import Mounting
 from surfacechem.solve.branches import steps_ahead, zero_ahead
 from surfacechem.solve.run import Model, Run
 
@@ -42,24 +42,13 @@ REPULSIVE = [
 ]
 
 
-def scene(potentials=(), loading=None, mount=None, initial=None, **interface):
-    start = {"T": 300.0} | (initial or {})
-    return Scene(
-        bodies("T", "T"), Interface("T", potentials, **interface), (), loading or {}, None, 300.0, start, normal=mount
-    )
-
-
-def solve(given, until):
-    return Model(assemble(given)).solve(Run(np.linspace(0.0, until, 11).tolist()))
+def scene(potentials=(), loading=None, mount=None, initial=None, **more):
+    return together(potentials, loading=loading, initial=initial, normal=mount, **more)
 
 
 def approach(law, k, far):
     loading = {"w_n": Table(times=[0.0, 5.0], values=[far, 1e-9])}
     return solve(scene([law], loading, Mounting(k=k), {"g_n": far}), 5.0)
-
-
-def gap(trajectory):
-    return trajectory.result.y[[s.name for s in trajectory.model.system.states].index("g_n")]
 
 
 # -- snaps into what has no end ----------------------------------------------------------------------------------------
@@ -75,8 +64,8 @@ def test_attraction_that_nothing_bears_snaps_to_no_equilibrium(law, k, far):
         f"which is impossible: no gap follows at which the tractions are in equilibrium and the laws hold: {CLOSED}"
         in (trajectory.reason)
     )
-    assert 0 < gap(trajectory) < far
-    assert audit(trajectory).energy_error < 1e-8
+    assert 0 < trajectory.end("g_n") < far
+    assert trajectory.energy_error < 1e-8
 
 
 @pytest.mark.parametrize(("law", "k", "far"), ATTRACTIVE)
@@ -87,14 +76,14 @@ def test_with_a_contact_the_same_snap_is_borne(law, k, far):
     assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
     contact = law.bind({}).energy
     pull = (contact(g_n=0.0) - contact(g_n=-1e-12)) / 1e-12
-    assert gap(trajectory) == pytest.approx((k * 1e-9 - pull) / (k + E_n), rel=1e-6)
+    assert trajectory.end("g_n") == pytest.approx((k * 1e-9 - pull) / (k + E_n), rel=1e-6)
 
 
 @pytest.mark.parametrize(("law", "k", "far"), REPULSIVE)
 def test_repulsion_ends_the_snap_before_the_pole(law, k, far):
     trajectory = approach(law, k, far)
     assert (trajectory.status, [jump.verdict for jump in trajectory.jumps]) == ("finished", ["admissible"])
-    assert 0.01 * law.g_0 < gap(trajectory) < law.g_0
+    assert 0.01 * law.g_0 < trajectory.end("g_n") < law.g_0
     assert assemble(scene([law], {"w_n": Hold(level=far)}, Mounting(k=k), {"g_n": far})).warnings == ()
 
 
@@ -127,7 +116,7 @@ def test_a_law_states_where_it_ends():
     trajectory = approach(OddPole(A=1e-20), 1e14, 1e-7)
     assert trajectory.status == "stopped"
     assert "is impossible: no gap follows" in trajectory.reason
-    assert gap(trajectory) > 0
+    assert trajectory.end("g_n") > 0
 
 
 @pytest.mark.parametrize("power", [1, 3])
@@ -196,17 +185,17 @@ def test_a_body_bounces_on_a_contact_that_is_not_bonded():
     speed, sag = F / m * fall, F / E_n
     contact = 2 * (math.pi - math.atan2(speed / omega, sag)) / omega
     trajectory = solve(given, 2 * fall + contact)
-    assert [jump.edge.name for jump in trajectory.jumps] == ["touch", "release"]
+    assert trajectory.events == ["touch", "release"]
     assert trajectory.jumps[0].t == pytest.approx(fall, rel=1e-10)
-    assert gap(trajectory) == pytest.approx(g_0, rel=1e-8)
+    assert trajectory.end("g_n") == pytest.approx(g_0, rel=1e-8)
 
 
 @pytest.mark.parametrize(("start", "carried"), [(1e-6, 0.0), (0.0, 1.0)])
 def test_a_prescribed_gap_is_bonded_where_it_starts_closed(start, carried):
     trajectory = solve(scene([BondedContact(E_n=1e12)], {"g_n": Ramp(start=start, rate=1e-6)}), 2.0)
-    names = [item.name for item in trajectory.model.system.outputs]
-    t_n = trajectory.outputs[:, names.index("t_n")]
-    assert t_n == pytest.approx(carried * 1e12 * (start + 1e-6 * trajectory.result.problem.times), rel=1e-12)
+    assert trajectory["t_n"] == pytest.approx(
+        carried * 1e12 * (start + 1e-6 * trajectory.result.problem.times), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("rest", [{"mount": Mounting(k=3e13)}, {}])
@@ -222,7 +211,7 @@ def test_a_limit_of_a_tension_that_bonds_do_not_carry_is_refused(rest):
         NormalStiffness(E_n=varying(2e14, Proportional(of="phi"))),
     ):
         trajectory = solve(scene([carries, potentials[1]], loading, **rest, **extra), 5.0)
-        (debond,) = [jump for jump in trajectory.jumps if jump.edge.name == "debond"]
+        (debond,) = trajectory.of("debond")
         assert debond.released > 0
 
 

@@ -4,21 +4,20 @@ import math
 
 import numpy as np
 import pytest
+import solved
 from mpmath import mp, mpf
-from scenes import SITES, bodies, perfect_contact, varying
+from scenes import perfect_contact, together, varying
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 from scipy.special import lambertw
+from solved import closed
 
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
 from surfacechem.laws.loading import Hold, Ramp, Table
-from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
-from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
+from surfacechem.scene import Mounting
 
 PHI, G_N, G_T = 0.1, 1e-8, 2e-8
 ZONE = XuNeedleman(Phi_n=PHI, g_0=G_N, g_t0=G_T)
@@ -27,18 +26,8 @@ STIFF = 2 * PHI / G_T**2
 NORMAL = 1e14
 
 
-def solve(loading, until=40.0, potentials=(ZONE,), frictions=(), reactions=(), initial=None, **mounts):
-    interface = Interface("T", potentials, frictions, reactions, SITES if reactions else None)
-    start = {"T": 300.0} | (initial or {})
-    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=start, **mounts)
-    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 41)))
-    assert audit(trajectory).energy_error < 1e-9
-    assert audit(trajectory).violations == ()
-    return trajectory
-
-
-def snaps(trajectory):
-    return [jump for jump in trajectory.jumps if jump.edge.name == "snap"]
+def solve(loading, until=40.0, potentials=(ZONE,), exact=1e-9, **more):
+    return closed(together(potentials, loading=loading, **more), until, exact=exact, outputs=41)
 
 
 def shear(x):
@@ -54,15 +43,14 @@ def test_a_soft_spring_on_a_zone_in_shear_snaps_where_the_tangent_is_lost(ratio)
     w = x * G_T + shear(x) / k
     top = brentq(lambda y: k * (w - y * G_T) - shear(y), 1.01 * x, w / G_T) if ratio < 0.4 else None
     trajectory = solve({"g_n": Hold(level=0.0), "w_t": Ramp(rate=rate)}, 1.2 * w / rate, tangential=Mounting(k=k))
-    (snap,) = snaps(trajectory)
+    (snap,) = trajectory.of("snap")
     assert snap.t == pytest.approx(w / rate, rel=1e-10)
     assert snap.verdict == "admissible"
-    names = [state.name for state in trajectory.model.system.states]
-    gaps = snap.after.y[[names.index("g_t"), names.index("u_t")]]
+    gaps = [trajectory.state(snap, name) for name in ("g_t", "u_t")]
     assert gaps[0] == pytest.approx(gaps[1], rel=np.finfo(float).eps)  # two states, each rounded
     if top is not None:
         energy = [0.5 * k * (w - y * G_T) ** 2 - PHI * math.exp(-(y**2)) for y in (x, top)]
-        assert snap.after.y[names.index("g_t")] == pytest.approx(top * G_T, rel=1e-8)
+        assert trajectory.state(snap, "g_t") == pytest.approx(top * G_T, rel=1e-8)
         assert snap.released == pytest.approx(energy[0] - energy[1], rel=1e-7)
 
 
@@ -70,7 +58,7 @@ def test_a_stiff_spring_follows_the_whole_zone_in_shear():
     """Nothing snaps above 2 exp(-3/2) of the stiffness."""
     loading = {"g_n": Hold(level=0.0), "w_t": Ramp(rate=1e-8)}
     trajectory = solve(loading, tangential=Mounting(k=0.45 * STIFF))
-    assert snaps(trajectory) == []
+    assert trajectory.of("snap") == []
     assert trajectory.status == "finished"
 
 
@@ -113,8 +101,8 @@ def test_moment_and_state_of_a_fold_are_those_of_the_fold_itself(k, C):
         w, g, T, apart, hot = opened(mpf(k), mpf(C))
     zone = ExponentialCohesiveZone(t_max=varying(1e6, Power(exponent=-1.0)), g_0=1e-7, E_n=1e16)
     scene = perfect_contact([zone], C_1=C / 2, C_2=C / 2, loading={"w_n": Ramp(rate=1e-6)}, normal=Mounting(k=k))
-    trajectory = Model(assemble(scene)).solve(Run(times=[0.0, 1.5 * w / 1e-6], rtol=1e-13))
-    (snap,) = snaps(trajectory)
+    trajectory = solved.solve(scene, [0.0, 1.5 * w / 1e-6], rtol=1e-13)
+    (snap,) = trajectory.of("snap")
     assert snap.t == pytest.approx(w / 1e-6, rel=5e-15)
     assert snap.before.y == pytest.approx([g, T], rel=5e-15)
     assert snap.after.y == pytest.approx([apart, hot], rel=1e-13)
@@ -142,23 +130,20 @@ def test_a_fold_of_both_gaps_is_where_the_determinant_vanishes(ratio):
 
     loading = {"w_n": Ramp(rate=v_n), "w_t": Ramp(rate=v_t)}
     trajectory = solve(loading, normal=Mounting(k=NORMAL), tangential=Mounting(k=k))
-    snap = snaps(trajectory)[0]
-    names = [state.name for state in trajectory.model.system.states]
-    start = (snap.before.y[names.index("g_n")] / G_N, snap.before.y[names.index("g_t")] / G_T, snap.t)
+    snap = trajectory.of("snap")[0]
+    start = (trajectory.state(snap, "g_n", "before") / G_N, trajectory.state(snap, "g_t", "before") / G_T, snap.t)
     u, x, t = fsolve(system, start, xtol=1e-13)
     assert snap.t == pytest.approx(t, rel=1e-9)
     e = math.exp(-u - x**2)
     assert k + 2 * PHI / G_T**2 * (1 + u) * (1 - 2 * x**2) * e > 1e-3 * k
-    r, det = gradient(
-        (snap.after.y[names.index("g_n")] / G_N, snap.after.y[names.index("g_t")] / G_T), v_n * t, v_t * t, k
-    )
+    r, det = gradient((trajectory.state(snap, "g_n") / G_N, trajectory.state(snap, "g_t") / G_T), v_n * t, v_t * t, k)
     assert det > 0
     assert np.all(np.abs(r) < 1e-6 * k * G_T)
 
 
 def test_a_dead_load_in_shear_beyond_the_strength_has_no_equilibrium():
     strength = PHI * math.sqrt(2 / math.e) / G_T
-    trajectory = solve({"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)})
+    trajectory = solved.solve(together([ZONE], (), {"g_n": Hold(level=0.0), "F_t": Ramp(rate=strength / 10)}), 40.0)
     assert trajectory.status == "stopped"
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-9)
 
@@ -170,17 +155,10 @@ def test_a_pull_off_snaps_at_any_tolerance(k, rtol):
     zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15)
     top = 1.2e6 / k + 5e-8
     history = Table(times=[0.0, 1.0, 2.0, 3.0, 4.0], values=[0.0, top, -1e-9, top, 0.0])
-    scene = Scene(
-        bodies("T", "T"),
-        Interface("T", [zone]),
-        loading={"w_n": history},
-        T_0=300.0,
-        initial={"T": 300.0},
-        normal=Mounting(k=k),
-    )
-    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 4.0, 11), rtol=rtol))
+    scene = together([zone], loading={"w_n": history}, normal=Mounting(k=k))
+    trajectory = solved.solve(scene, 4.0, rtol=rtol)
     assert trajectory.status == "finished", trajectory.reason
-    off, _, again, _ = snaps(trajectory)
+    off, _, again, _ = trajectory.of("snap")
     ratio = k * 1e-8 / 1e6
     g = 1e-8 * (1 - lambertw(-ratio).real)
     w = g + 1e6 * g / 1e-8 * math.exp(1 - g / 1e-8) / k

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies, path, varying
+from scenes import SITES, bodies, path, together, varying
 from scipy.integrate import solve_ivp
+from solved import Solved, closed, solve
 
 import surfacechem
 from surfacechem.errors import InputError
@@ -19,9 +20,7 @@ from surfacechem.laws.friction import AnisotropicCoulomb, Coulomb, MohrCoulomb, 
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
 
 M, F, FELL = 4.0, 40.0, 0.2
 PRESSED = {"F_n": Hold(level=-F)}
@@ -29,30 +28,8 @@ V_0, T_0 = math.sqrt(2 * F / M * FELL), math.sqrt(2 * FELL * M / F)
 """Speed and time of the first impact of what falls from rest."""
 
 
-def scene(mount, loading=PRESSED, initial=None, pair=None, interface=None, **more):
-    start = {"T": 300.0, "g_n": FELL} | (initial or {})
-    held = bodies("T", "T") if pair is None else pair
-    return Scene(held, interface or Interface("T"), (), loading, None, 300.0, start, normal=mount, **more)
-
-
-def solve(given, until, rtol=1e-11, points=11):
-    trajectory = Model(assemble(given)).solve(Run(np.linspace(0.0, until, points).tolist(), rtol=rtol))
-    books = audit(trajectory)
-    assert not books.violations
-    assert trajectory.status == "finished", trajectory.reason
-    return trajectory
-
-
-def names(trajectory):
-    return [jump.edge.name for jump in trajectory.jumps]
-
-
-def made(trajectory, name):
-    return [jump for jump in trajectory.jumps if jump.edge.name == name]
-
-
-def end(trajectory, name):
-    return float(trajectory.result.y[[s.name for s in trajectory.model.system.states].index(name)])
+def scene(mount, loading=PRESSED, initial=None, **more):
+    return together(loading=loading, initial={"g_n": FELL} | (initial or {}), normal=mount, **more)
 
 
 # -- rebounds ----------------------------------------------------------------------------------------------------------
@@ -61,19 +38,19 @@ def end(trajectory, name):
 @pytest.mark.parametrize("e", [0.3, 0.5, 0.9])
 def test_all_rebounds_under_a_dead_load(e):
     """Rebound k follows the one before after 2 v_0 e^k m / F, and all of them end in a finite time."""
-    trajectory = solve(scene(Mounting(m=M, e=e)), 5.0)
-    impacts = made(trajectory, "impact")
+    trajectory = closed(scene(Mounting(m=M, e=e)), 5.0)
+    impacts = trajectory.of("impact")
     k = np.arange(len(impacts))
     speeds = V_0 * e**k
     assert np.array([-jump.before.y[1] for jump in impacts]) == pytest.approx(speeds, rel=1e-12)
     assert np.array([jump.since for jump in impacts[1:]]) == pytest.approx(2 * M / F * speeds[1:], rel=1e-12)
     assert 0 <= math.ceil(math.log(1e-12) / math.log(e)) - len(impacts) <= 8
-    (rest,) = made(trajectory, "rest")
+    (rest,) = trajectory.of("rest")
     assert rest.t == pytest.approx(T_0 + 2 * V_0 * M / F * e / (1 - e), rel=1e-11)
     assert sum(jump.released for jump in impacts) == pytest.approx(F * FELL, rel=1e-12)
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
-    assert (end(trajectory, "g_n"), end(trajectory, "v_n")) == (0.0, 0.0)
-    assert audit(trajectory).energy_error < 1e-12
+    assert (trajectory.end("g_n"), trajectory.end("v_n")) == (0.0, 0.0)
+    assert trajectory.energy_error < 1e-12
 
 
 @pytest.mark.parametrize("e", [0.0, 0.6])
@@ -90,9 +67,9 @@ def test_dampers_against_another_integrator(e):
         return y[0]
 
     touch.terminal, touch.direction = True, -1
-    trajectory = solve(scene(Mounting(m=m, k=k, c_b=c_b, c_g=c_g, e=e), {"w_n": drive}, {"g_n": 0.3}), 3.0)
+    trajectory = closed(scene(Mounting(m=m, k=k, c_b=c_b, c_g=c_g, e=e), {"w_n": drive}, {"g_n": 0.3}), 3.0)
     y, t = [0.3, 0.0], 0.0
-    for jump in made(trajectory, "impact")[:6]:
+    for jump in trajectory.of("impact")[:6]:
         found = solve_ivp(motion, (t, t + 3.0), y, "DOP853", events=touch, rtol=1e-13, atol=1e-15)
         t, speed = found.t[-1], found.y[1, -1]
         assert jump.t == pytest.approx(t, abs=1e-10)
@@ -100,15 +77,17 @@ def test_dampers_against_another_integrator(e):
         if e == 0:
             break
         y = [0.0, -e * speed]
-    assert audit(trajectory).energy_error < 1e-9
+    assert trajectory.energy_error < 1e-9
 
 
 def test_a_shaken_body_leaves_and_lands_as_it_has_to():
     """Under F(t) = -a + b sin(w t) the body rests from each landing until the pull returns."""
     a, b, turn = 10.0, 30.0, math.pi
-    trajectory = solve(scene(Mounting(m=M), {"F_n": Harmonic(mean=-a, amplitude=b, frequency=0.5)}, {"g_n": 0.0}), 20.0)
-    leaves = [jump.t for jump in made(trajectory, "open")]
-    lands = [jump.t for jump in made(trajectory, "impact")]
+    trajectory = closed(
+        scene(Mounting(m=M), {"F_n": Harmonic(mean=-a, amplitude=b, frequency=0.5)}, {"g_n": 0.0}), 20.0
+    )
+    leaves = [jump.t for jump in trajectory.of("open")]
+    lands = [jump.t for jump in trajectory.of("impact")]
     assert len(leaves) > 2
     first = math.asin(a / b) / turn
     assert [math.remainder(t - first, 2 * math.pi / turn) for t in leaves] == pytest.approx(
@@ -126,8 +105,8 @@ def test_a_shaken_body_leaves_and_lands_as_it_has_to():
 
 def test_a_pull_that_only_reaches_the_pressure_lets_nothing_go():
     load = Harmonic(mean=-10.0, amplitude=10.0, frequency=0.5)
-    trajectory = solve(scene(Mounting(m=M), {"F_n": load}, {"g_n": 0.1}), 20.0)
-    assert names(trajectory) == ["impact", "rest"]
+    trajectory = closed(scene(Mounting(m=M), {"F_n": load}, {"g_n": 0.1}), 20.0)
+    assert trajectory.events == ["impact", "rest"]
 
 
 # -- rest and release --------------------------------------------------------------------------------------------------
@@ -135,13 +114,13 @@ def test_a_pull_that_only_reaches_the_pressure_lets_nothing_go():
 
 def test_a_load_that_jumps_lets_go_at_once():
     load = Table(times=[0, 3, 3, 4, 4, 9], values=[-10, -10, 20, 20, -30, -30])
-    trajectory = solve(scene(Mounting(m=M), {"F_n": load}), 9.0)
-    assert names(trajectory) == ["impact", "rest", "open", "impact", "rest"]
+    trajectory = closed(scene(Mounting(m=M), {"F_n": load}), 9.0)
+    assert trajectory.events == ["impact", "rest", "open", "impact", "rest"]
     # It rises for 1 s at 5 m/s^2 and falls at 7.5 m/s^2.
     height = 2.5
     speed = math.sqrt(5.0**2 + 2 * 7.5 * height)
     assert [jump.t for jump in trajectory.jumps[2:4]] == pytest.approx([3.0, 4.0 + (5.0 + speed) / 7.5], rel=1e-13)
-    assert made(trajectory, "impact")[1].released == pytest.approx(M * speed**2 / 2)
+    assert trajectory.of("impact")[1].released == pytest.approx(M * speed**2 / 2)
 
 
 @pytest.mark.parametrize(
@@ -156,20 +135,20 @@ def test_a_load_that_jumps_lets_go_at_once():
     ],
 )
 def test_starts_at_touch(start, pull, expected):
-    trajectory = solve(scene(Mounting(m=1.0, e=0.5), {"F_n": Hold(level=pull)}, start | {"g_n": 0.0}), 1.0)
-    assert names(trajectory) == expected
+    trajectory = closed(scene(Mounting(m=1.0, e=0.5), {"F_n": Hold(level=pull)}, start | {"g_n": 0.0}), 1.0)
+    assert trajectory.events == expected
     speed = start["v_n"] if start["v_n"] >= 0 else 0.5
     pulled = max(pull, 0.0)
-    assert end(trajectory, "g_n") == pytest.approx(speed + pulled / 2, rel=1e-12)
+    assert trajectory.end("g_n") == pytest.approx(speed + pulled / 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("until", [1e-6, 1.0, 1e6])
 def test_rebounds_far_faster_than_the_run(until):
     """Bodies of a micrometre: the first swing takes 10 ns, whatever the length of the run."""
     mount = Mounting(m=1e-3, k=1e13, e=0.5)
-    trajectory = solve(scene(mount, {"w_n": Hold(level=-1e-9)}, {"g_n": 1e-9}), until)
-    assert names(trajectory)[-1] == "rest"
-    impacts = made(trajectory, "impact")
+    trajectory = closed(scene(mount, {"w_n": Hold(level=-1e-9)}, {"g_n": 1e-9}), until)
+    assert trajectory.events[-1] == "rest"
+    impacts = trajectory.of("impact")
     assert len(impacts) == 40
     assert impacts[0].t == pytest.approx(math.pi / 3 * 1e-8, rel=1e-11)
 
@@ -179,21 +158,21 @@ def test_bonds_hold_once_the_bodies_rest():
     strength = TensileStrength(t_max=varying(50.0, Proportional(of="phi")), violation="accept")
     bonding = Interface("T", [BondEnergy(K_0=1e-9)], (), [LinearAffinity(c_r=1e26)], sites=SITES, limits=[strength])
     load = Table(times=[0, 1, 9], values=[-20, -20, 140])
-    trajectory = solve(scene(Mounting(m=M, e=0.5), {"F_n": load}, {"phi": 0.5}, interface=bonding), 5.0)
-    assert names(trajectory)[-2:] == ["rest", "debond"]
+    trajectory = closed(scene(Mounting(m=M, e=0.5), {"F_n": load}, {"phi": 0.5}, interface=bonding), 5.0)
+    assert trajectory.events[-2:] == ["rest", "debond"]
     debond = trajectory.jumps[-1]
     phi, g, v, _ = debond.before.y
     assert (g, v) == (0.0, 0.0)
     assert -20 + 20 * (debond.t - 1) == pytest.approx(50.0 * phi, rel=1e-9)
     assert debond.t > 2.0
-    assert all(jump.before.y[0] > 0.5 for jump in made(trajectory, "impact"))
+    assert all(jump.before.y[0] > 0.5 for jump in trajectory.of("impact"))
 
 
 def test_a_damper_closes_without_an_impact():
     c, a, b = 10.0, 10.0, 30.0
     load = Harmonic(mean=-a, amplitude=b, frequency=0.5)
-    trajectory = solve(scene(Mounting(c_g=c), {"F_n": load}, {"g_n": 0.1}), 3.0)
-    assert names(trajectory) == ["touch", "open"]
+    trajectory = closed(scene(Mounting(c_g=c), {"F_n": load}, {"g_n": 0.1}), 3.0)
+    assert trajectory.events == ["touch", "open"]
     touch, leaves = trajectory.jumps
 
     def gap(t):
@@ -201,7 +180,7 @@ def test_a_damper_closes_without_an_impact():
 
     assert gap(touch.t) == pytest.approx(0.0, abs=1e-11)
     assert leaves.t == pytest.approx(2 + math.asin(a / b) / math.pi, rel=1e-12)
-    assert end(trajectory, "g_n") == pytest.approx(gap(3.0) - gap(leaves.t), rel=1e-9)
+    assert trajectory.end("g_n") == pytest.approx(gap(3.0) - gap(leaves.t), rel=1e-9)
 
 
 # -- heat --------------------------------------------------------------------------------------------------------------
@@ -213,7 +192,7 @@ def test_the_heat_of_impacts_is_in_the_bodies():
         bodies(), Interface("T_1"), [path("lower", "upper", 1e-3)], PRESSED, None, 300.0,
         {"T_1": 300.0, "T_2": 300.0, "g_n": FELL}, normal=Mounting(m=M, e=0.5, beta_1=0.25),
     )  # fmt: skip
-    trajectory = solve(given, 0.3)
+    trajectory = closed(given, 0.3)
     (impact,) = trajectory.jumps
     released = (1 - 0.25) * F * FELL
     assert impact.released == pytest.approx(released, rel=1e-13)
@@ -239,8 +218,8 @@ def sliding(e, friction=None, tangential=None, **start):
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_friction_answers_impacts_by_impulses(e):
     """What slides loses mu (1 + e) m v / m_t at each impact and nothing between them."""
-    trajectory = solve(sliding(e), 4.0)
-    rubs, impacts = made(trajectory, "rub"), made(trajectory, "impact")
+    trajectory = closed(sliding(e), 4.0)
+    rubs, impacts = trajectory.of("rub"), trajectory.of("impact")
     v = SLIDING["v"]
     for impact, rub in zip(impacts, rubs, strict=False):
         assert rub.before.y[3] == pytest.approx(v, rel=1e-9)
@@ -248,13 +227,13 @@ def test_friction_answers_impacts_by_impulses(e):
         assert rub.after.y[3] == pytest.approx(left, rel=1e-9, abs=1e-14)
         assert rub.released == pytest.approx(M_T * (v**2 - left**2) / 2, rel=1e-4)
         v = left
-    assert audit(trajectory).energy_error < 1e-12
+    assert trajectory.energy_error < 1e-12
     assert all(jump.verdict == "admissible" for jump in trajectory.jumps)
     if e < 1:
         # The impulses of the pressure are those of the load: it stops where it would have under the load at rest.
-        assert made(trajectory, "stop")[0].t == pytest.approx(SLIDING["v"] * M_T / (MU * F), rel=1e-10)
+        assert trajectory.of("stop")[0].t == pytest.approx(SLIDING["v"] * M_T / (MU * F), rel=1e-10)
     else:
-        assert end(trajectory, "v") == 0.0
+        assert trajectory.end("v") == 0.0
         assert len(rubs) == 4
 
 
@@ -262,8 +241,8 @@ def test_friction_answers_impacts_by_impulses(e):
 def test_adhesion_and_cohesion_have_no_impulse(v):
     """Finite tractions act between impacts only; both signs of sliding are alike."""
     friction = MohrCoulomb(mu=MU, t_n_max=5.0, c=2.0)
-    trajectory = solve(sliding(0.5, friction, v=v), 0.25)
-    (rub,) = made(trajectory, "rub")
+    trajectory = closed(sliding(0.5, friction, v=v), 0.25)
+    (rub,) = trajectory.of("rub")
     assert abs(rub.before.y[3] - rub.after.y[3]) == pytest.approx(MU * 1.5 * M * V_0 / M_T, rel=1e-12)
     slowed = abs(v) - (MU * 5.0 + 2.0) / M_T * T_0
     assert abs(rub.before.y[3]) == pytest.approx(slowed, rel=1e-12)
@@ -273,11 +252,11 @@ def test_in_two_directions_the_direction_stays():
     interface = Interface("T", frictions=[Coulomb(mu=MU)])
     start = {"u_t": 0.0, "u_t2": 0.0, "v": 3.0, "v_2": 4.0}
     given = scene(Mounting(m=M, e=0.5), PRESSED, start, interface=interface, tangential=Mounting(m=M_T))
-    trajectory = solve(given, 3.0)
-    assert names(trajectory)[-1] == "stop"
+    trajectory = closed(given, 3.0)
+    assert trajectory.events[-1] == "stop"
     stop = trajectory.jumps[-1]
     assert stop.t == pytest.approx(5.0 * M_T / (MU * F), rel=1e-10)
-    assert end(trajectory, "u_t2") == pytest.approx(4 / 3 * end(trajectory, "u_t"), rel=1e-12)
+    assert trajectory.end("u_t2") == pytest.approx(4 / 3 * trajectory.end("u_t"), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -289,21 +268,21 @@ def test_what_slides_without_a_mass_or_behind_a_spring_sticks_for_an_instant(fri
     interface = Interface("T", potentials, frictions=[friction])
     start = {"u_t": 0.0} | ({"v_t": 1.0} if potentials else {})
     given = scene(Mounting(m=M, e=0.5), PRESSED | {"w_t": Ramp(rate=0.5)}, start, interface=interface, tangential=held)
-    trajectory = solve(given, 1.0)
-    assert made(trajectory, "impact")
-    assert not made(trajectory, "rub")
-    for jump in made(trajectory, "impact"):
+    trajectory = closed(given, 1.0)
+    assert trajectory.of("impact")
+    assert not trajectory.of("rub")
+    for jump in trajectory.of("impact"):
         assert jump.after.y[2:-1].tolist() == jump.before.y[2:-1].tolist()
 
 
 def test_the_work_of_a_drive_in_an_impact_is_left_out():
     interface = Interface("T", frictions=[Coulomb(mu=MU)])
-    trajectory = solve(scene(Mounting(m=M), PRESSED | {"v": Hold(level=-2.0)}, interface=interface), 3.0)
-    assert not made(trajectory, "rub")
+    trajectory = closed(scene(Mounting(m=M), PRESSED | {"v": Hold(level=-2.0)}, interface=interface), 3.0)
+    assert not trajectory.of("rub")
     assert trajectory.model.system.warnings == (
         "impacts take no time: what coulomb would do at their pressure is left out.",
     )
-    assert audit(trajectory).energy_error < 1e-11
+    assert trajectory.energy_error < 1e-11
 
 
 # -- what is refused, and what is said ---------------------------------------------------------------------------------
@@ -357,9 +336,9 @@ def test_a_conductance_that_keeps_up_with_the_pressure_misses_the_instant(q):
 def test_other_methods_see_the_impacts(solver):
     case = surfacechem.load("bouncing-plate")
     run = replace(case.case.run, solver=solver, rtol=1e-8)
-    trajectory = case.model.solve(run)
+    trajectory = Solved(case.model.solve(run))
     assert trajectory.status == "finished"
-    assert names(trajectory) == 59 * ["impact"] + ["rest"]
+    assert trajectory.events == 59 * ["impact"] + ["rest"]
     assert trajectory.jumps[-1].t == pytest.approx(2.5586339652845553, rel=1e-5)
     assert trajectory.result.outputs[:, 0].min() >= 0
 
@@ -372,15 +351,15 @@ def test_pressure_begins_at_once_under_a_damper_that_stands_still():
         Mounting(k=100.0, c_g=20.0), {"w_n": Hold(level=-0.1), "w_t": Ramp(rate=0.5)}, {"u_t": 0.0},
         interface=interface, tangential=Mounting(k=200.0),
     )  # fmt: skip
-    trajectory = solve(given, 2.0)
-    touch = made(trajectory, "touch")[0]
+    trajectory = closed(given, 2.0)
+    touch = trajectory.of("touch")[0]
     assert touch.t == pytest.approx(0.2 * math.log(3.0), rel=1e-9)
     g_t = [s.name for s in trajectory.model.system.states].index("g_t")
     assert 1e3 * touch.before.y[g_t] == pytest.approx(5.0, rel=1e-3)
     assert touch.after.y[g_t] == touch.before.y[g_t]
-    assert names(trajectory) == ["slip forward", "touch", "slip forward"]
+    assert trajectory.events == ["slip forward", "touch", "slip forward"]
     assert 1e3 * trajectory.jumps[-1].after.y[g_t] == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
-    assert audit(trajectory).energy_error < 1e-10
+    assert trajectory.energy_error < 1e-10
 
 
 def test_a_method_that_passes_an_impact_fails(monkeypatch):
@@ -394,6 +373,6 @@ def test_a_method_that_passes_an_impact_fails(monkeypatch):
 def test_rebounds_that_use_up_the_steps_are_named():
     """A damper makes those without loss slower and slower, and there is no end to them."""
     given = scene(Mounting(m=M, c_g=2.0, e=1.0))
-    trajectory = Model(assemble(given)).solve(Run([0.0, 1e3], max_steps=5000))
+    trajectory = solve(given, 1e3, max_steps=5000)
     assert trajectory.status == "failed"
     assert trajectory.reason.startswith("the number of steps allowed was used up by rebounds")

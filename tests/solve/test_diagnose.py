@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scenes import SITES, bodies, path, perfect_contact, varying
 from scenes_mechanics import TOGETHER
+from solved import solve
 
 from surfacechem.errors import InputError
 from surfacechem.laws.bonding import LatticeGas, LinearEnthalpy
@@ -23,21 +24,12 @@ from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.results.solution import Solution
 from surfacechem.scene import Interface, Medium, Mounting, Scene
-from surfacechem.solve.run import Model, Run
 
 APART = {"T_1": 300.0, "T_2": 310.0}
 
 
-def run(scene, end, points=11):
-    return Model(assemble(scene)).solve(Run(np.linspace(0.0, end, points).tolist(), max_steps=20_000))
-
-
-def column(trajectory, name):
-    return trajectory.outputs[:, [item.name for item in trajectory.model.system.outputs].index(name)]
-
-
-def state(trajectory, name):
-    return trajectory.result.outputs[:, [item.name for item in trajectory.model.system.states].index(name)]
+def run(scene, end):
+    return solve(scene, end, max_steps=20_000)
 
 
 def test_a_parameter_called_M_is_not_the_chemical_potential():
@@ -46,7 +38,7 @@ def test_a_parameter_called_M_is_not_the_chemical_potential():
     loading = {"g_n": Hold(level=1e-6)}
     scene = Scene(bodies(energy=Constant), interface, [gas], loading, None, 300.0, APART | {"phi": 0.1})
     trajectory = run(scene, 1e-3)
-    assert column(trajectory, "q_12")[0] == pytest.approx(0.026 / 1.37e-6 * -10, rel=1e-12)
+    assert trajectory["q_12"][0] == pytest.approx(0.026 / 1.37e-6 * -10, rel=1e-12)
 
 
 def test_a_parameter_called_C_T_is_not_the_capacity_of_a_node_T():
@@ -54,7 +46,7 @@ def test_a_parameter_called_C_T_is_not_the_capacity_of_a_node_T():
     loading = {"g_t": Hold(level=1e-6), "g_n": Hold(level=0.0), "phi": Hold(level=0.5)}
     scene = perfect_contact([adhesion], loading=loading)
     trajectory = run(scene, 1.0)
-    assert column(trajectory, "t_e")[0] == pytest.approx(0.25 * 1e12 * 1e-6, rel=1e-12)
+    assert trajectory["t_e"][0] == pytest.approx(0.25 * 1e12 * 1e-6, rel=1e-12)
 
 
 def test_work_on_a_state_at_rest_is_followed_without_transitions():
@@ -102,9 +94,7 @@ def test_an_overdamped_slider_starts_from_rest():
     assert trajectory.status == "finished"
     # The limit of sticking is at least what sliding resists with: 3.6e5 Pa at t = 2.9 s; then c v + k u = F - 3.6e5 Pa.
     tau, since = 1.8 / 1.4, 7.1
-    assert state(trajectory, "u_t")[-1] == pytest.approx(
-        1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8
-    )
+    assert trajectory["u_t"][-1] == pytest.approx(1e5 / 1.4e12 * (since - tau * -np.expm1(-since / tau)), rel=1e-8)
 
 
 def test_an_impossible_jump_says_what_is_in_the_way():
@@ -124,4 +114,4 @@ def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_s
     trajectory = run(scene, 10.0)
     # In contact the attraction is what it is at touch: A_H / (6 pi D_0^3).
     pull = 1e-19 / (6 * np.pi * 1.65e-10**3)
-    assert state(trajectory, "g_n")[0] == pytest.approx((5e-9 - pull / 1e13) / 2, rel=1e-9)
+    assert trajectory["g_n"][0] == pytest.approx((5e-9 - pull / 1e13) / 2, rel=1e-9)

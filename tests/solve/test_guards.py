@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 import symengine as se
-from scenes import bodies
+from scenes import bodies, together
+from solved import solve
 from solver_problems import problem
 
 from surfacechem.compile.program import compile_program
 from surfacechem.laws.contact import Penalty, TangentialStiffness
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.model.assemble import assemble
-from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.scene import Interface, Mounting
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Margin, Status
 from surfacechem.solve.radau.solver import Radau
-from surfacechem.solve.run import Model, Run
 
 MU, P = 0.3, 100.0
 LIMIT = MU * P
@@ -24,12 +23,8 @@ RTOLS = [1e-6, 1e-9, 1e-11, 1e-13]
 
 
 def solved(interface, loading, end, rtol=1e-11, initial=None, **mounts):
-    scene = Scene(BODIES, interface, (), loading, None, 300.0, {"T": 300.0, **(initial or {})}, **mounts)
-    return Model(assemble(scene)).solve(Run(np.linspace(0.0, end, 101).tolist(), rtol))
-
-
-def names(trajectory):
-    return [jump.edge.name for jump in trajectory.jumps]
+    given = together(loading=loading, initial=initial, interface=interface, pair=BODIES, **mounts)
+    return solve(given, end, outputs=101, rtol=rtol)
 
 
 def block(amplitude, frequency, end, rtol, mean=0.0, initial=None):
@@ -51,7 +46,7 @@ def elastic(amplitude, rtol, end=3.0):
 def test_a_traction_that_touches_the_limit_moves_nothing(amplitude, mean, frequency, rtol):
     trajectory = block(amplitude, frequency, 3.0, rtol, mean)
     assert trajectory.status == "finished"
-    assert names(trajectory) == []
+    assert trajectory.events == []
     assert np.all(trajectory.everywhere["v"] == 0)
     assert np.all(trajectory.everywhere["u_t"] == 0)
 
@@ -61,7 +56,7 @@ def test_a_traction_that_touches_the_limit_moves_nothing(amplitude, mean, freque
 def test_elastic_sticking_that_touches_its_limit_sticks(amplitude, rtol):
     trajectory = elastic(amplitude, rtol)
     assert trajectory.status == "finished"
-    assert names(trajectory) == []
+    assert trajectory.events == []
     times = trajectory.result.times
     gap = 0.5 * amplitude * np.sin(6 * np.pi * times)
     np.testing.assert_allclose(trajectory.result.outputs[:, 1], gap, rtol=0, atol=max(10 * rtol, 1e-10) * amplitude)
@@ -77,7 +72,7 @@ def test_a_limit_that_is_just_passed_slides_from_there_to_the_peak(amplitude, rt
     half = np.arange(18)
     begins = np.where(half == 0, first, half * np.pi + again) / (6 * np.pi)
     ends = (half + 0.5) / 3.0 / 2.0
-    assert names(trajectory) == [x for j in half for x in (("slip forward", "slip backward")[j % 2], "stop")]
+    assert trajectory.events == [x for j in half for x in (("slip forward", "slip backward")[j % 2], "stop")]
     found = np.array([jump.t for jump in trajectory.jumps])
     np.testing.assert_allclose(found[::2], begins, rtol=0, atol=max(10 * rtol, 1e-9))
     np.testing.assert_allclose(found[1::2], ends, rtol=0, atol=max(10 * rtol, 1e-9))
@@ -91,7 +86,7 @@ def test_a_damper_of_the_bodies_does_not_delay_the_slip(rtol):
     loading = {"p": Ramp(start=p_0, rate=rise), "w_t": Ramp(rate=V)}
     mount = Mounting(k=k, m=m, c_b=c)
     trajectory = solved(Interface("T", frictions=[friction]), loading, 6.0, rtol, tangential=mount)
-    assert names(trajectory) == ["slip forward", "stop"] * (len(trajectory.jumps) // 2)
+    assert trajectory.events == ["slip forward", "stop"] * (len(trajectory.jumps) // 2)
     for jump in trajectory.jumps[::2]:
         u = jump.before.y[0]
         onset = (0.7 * p_0 + k * u - c * V) / (k * V - 0.7 * rise)
@@ -110,7 +105,7 @@ def test_what_lies_in_the_air_moves_with_the_least_push():
     """A traction that begins while nothing presses begins to move it at once, and to and fro."""
     push = Table(times=[0.0, 1e-3, 1e-3, 2e-2], values=[0.0, 0.0, 50.0, 50.0])
     trajectory = bouncing(Mounting(m=3.0), {}, 1.5e-3, push)
-    assert names(trajectory) == ["touch", "release", "slip forward"]
+    assert trajectory.events == ["touch", "release", "slip forward"]
     assert trajectory.jumps[-1].t == pytest.approx(1e-3, rel=1e-12)
     assert trajectory.result.y[3] == pytest.approx(50.0 / 3.0 * 0.5e-3, rel=1e-9)
 
@@ -129,7 +124,7 @@ def closing(friction, rtol):
 @pytest.mark.parametrize("rtol", RTOLS)
 def test_what_slides_as_a_rigid_contact_closes_stops_where_friction_grows_faster(rtol):
     trajectory, times, pressing = closing(Coulomb(mu=0.8), rtol)
-    assert names(trajectory) == ["slip forward", "touch", "stop", "slip forward", "open"]
+    assert trajectory.events == ["slip forward", "touch", "stop", "slip forward", "open"]
     found = [jump.t for jump in trajectory.jumps]
     np.testing.assert_allclose(found, [0.0, 1 / 3, 1 / 3, 1 / 3 + 0.8, 11 / 3], rtol=0, atol=1e-14)
     held = (times > 1 / 3) & (times < 1 / 3 + 0.8)

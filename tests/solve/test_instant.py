@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import SITES, bodies, perfect_contact, varying
+from solved import Solved, solve
 
 import surfacechem
 from surfacechem.contracts.terms import Friction, parameter
@@ -23,33 +24,25 @@ from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene
 from surfacechem.solve.equilibria import Point
 from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES, Slack
-from surfacechem.solve.run import Model, Run
+from surfacechem.solve.run import Model
 
 TOLERANCES = [10.0**-k for k in range(5, 14)]
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
 
-def solved(scene, until, rtol=1e-11, outputs=21):
-    return Model(assemble(scene)).solve(Run(np.linspace(0.0, until, outputs).tolist(), rtol))
-
-
-def names(trajectory):
-    return [jump.edge.name for jump in trajectory.jumps]
-
-
 def test_bodies_touch_and_come_apart_once_at_any_tolerance():
     press = surfacechem.load("thermal-press")
     for rtol in TOLERANCES:
-        trajectory = press.model.solve(replace(press.case.run, rtol=rtol))
-        assert names(trajectory) == ["touch", "end of press", "end of hold", "release", "end of leave"], rtol
+        trajectory = Solved(press.model.solve(replace(press.case.run, rtol=rtol)))
+        assert trajectory.events == ["touch", "end of press", "end of hold", "release", "end of leave"], rtol
 
 
 @pytest.mark.parametrize("rtol", TOLERANCES)
 def test_a_contact_under_a_swinging_load_touches_once_in_each_period(rtol):
     loading = {"w_n": Harmonic(amplitude=1e-7, frequency=1.0, phase=0.3)}
     scene = Scene(COLD, Interface(None, [Penalty(E_n=1e14)]), (), loading, T_0=300.0, normal=Mounting(k=1e13))
-    trajectory = solved(scene, 5.0, rtol)
-    assert names(trajectory) == ["touch", "release"] * 5
+    trajectory = solve(scene, 5.0, rtol=rtol)
+    assert trajectory.events == ["touch", "release"] * 5
     exact = (np.arange(1, 11) / 2) - 0.3 / (2 * np.pi)
     assert [jump.t for jump in trajectory.jumps] == pytest.approx(exact, rel=1e-12)
 
@@ -61,7 +54,7 @@ def test_what_a_start_settles_to_has_to_be_admissible():
     loading, initial = {"w_n": Hold(level=-1e-8)}, {"T": 300.0, "T_2": 310.0, "g_n": 1e-8}
     scene = Scene(pair, interface, [film], loading, None, 300.0, initial, normal=Mounting(k=1e13))
     with pytest.raises(InputError, match="at the start d_m reached zero, where the law film ends"):
-        solved(scene, 1.0)
+        solve(scene, 1.0)
 
 
 def test_a_start_is_judged_in_the_modes_that_hold_there():
@@ -71,7 +64,7 @@ def test_a_start_is_judged_in_the_modes_that_hold_there():
     initial = {"T": 300.0, "phi": 0.5, "g_n": -5e-10}
     mount, loading = Mounting(k=1e12, c_b=1e10), {"w_n": Hold(level=0.0)}
     with pytest.raises(InputError, match="relaxation"):
-        solved(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=mount), 1.0)
+        solve(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=mount), 1.0)
 
 
 def test_a_jump_to_where_a_law_has_no_energy_is_impossible():
@@ -79,7 +72,7 @@ def test_a_jump_to_where_a_law_has_no_energy_is_impossible():
     interface = Interface("T", [zone], sites=SITES, limits=[TensileStrength(t_max=1e5)])
     loading, initial = {"w_n": Ramp(rate=1e-8)}, {"T": 300.0, "phi": 1.0}
     scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
-    trajectory = solved(scene, 10.0)
+    trajectory = solve(scene, 10.0)
     assert trajectory.jumps[-1].verdict == IMPOSSIBLE
     assert "which is impossible: the energy of the interface is not finite after it" in trajectory.reason
 
@@ -109,7 +102,7 @@ def test_a_law_that_destroys_entropy_is_named_at_any_tolerance(v_1, rtol):
     """Accelerated from rest to 1 m/s it destroys v_1^3 / 6 of what it produces, 1/3 - v_1 / 2 but for that."""
     loading = {"v": Ramp(rate=1.0)}
     scene = perfect_contact([], frictions=[Reluctant(c=1e3, v_1=v_1)], loading=loading)
-    books = audit(solved(scene, 1.0, rtol, outputs=201))
+    books = audit(solve(scene, 1.0, rtol=rtol, outputs=201))
     assert books.violations == ("reluctant",)
     whole = 1 / 3 - v_1 / 2 + v_1**3 / 3
     assert books.destroyed["reluctant"] == pytest.approx(v_1**3 / 6 / whole, rel=0.5)
@@ -137,9 +130,9 @@ def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
     zone = XuNeedleman(Phi_n=1.0, g_0=1e-7, g_t0=1e-7, q=1.0, r=0.0)
     loading, mount = {"w_t": Hold(level=0.0), "g_n": Hold(level=-3e-7)}, Mounting(k=1e10)
     scene = Scene(bodies("T", "T"), Interface("T", [zone]), (), loading, None, 300.0, {"T": 300.0}, tangential=mount)
-    trajectory = solved(scene, 1.0)
+    trajectory = solve(scene, 1.0)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith(
         "the quasi-static equilibrium of the gap was lost (mechanical fold), but nothing"
     )
-    assert names(trajectory) == ["snap"]
+    assert trajectory.events == ["snap"]

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies, varying
+import solved
+from scenes import SITES, bodies, together, varying
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
@@ -14,33 +15,17 @@ from surfacechem.laws.friction import BondedCoulomb, Coulomb
 from surfacechem.laws.kinetics import LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
 
 ZONE = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e13)
 LIMIT = TensileStrength(t_max=1e6)
 K = 1e11
 
 
-def solve(potentials=(), *, until, loading, J_c=None, **scene):
-    interface = Interface(
-        "T",
-        potentials,
-        scene.pop("frictions", ()),
-        scene.pop("reactions", ()),
-        sites=SITES,
-        limits=scene.pop("limits", ()),
-    )
+def solve(potentials=(), *, until, J_c=None, loading, **scene):
     loads = loading | ({"J_c": Hold(level=J_c)} if J_c else {})
-    initial = {"T": 300.0} | scene.pop("initial", {})
-    whole = Scene(bodies("T", "T"), interface, loading=loads, T_0=300.0, initial=initial, **scene)
-    return Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21)))
-
-
-def jumps(trajectory, name):
-    return [jump for jump in trajectory.jumps if jump.edge.name == name]
+    return solved.solve(together(potentials, loading=loads, sites=SITES, **scene), until, outputs=21)
 
 
 def test_a_dead_load_does_its_work_in_a_snap():
@@ -48,18 +33,18 @@ def test_a_dead_load_does_its_work_in_a_snap():
     mount = Mounting(k=K)
     driven = solve([ZONE], until=30.0, loading={"w_n": Ramp(rate=1e-6)}, normal=mount)
     loaded = solve([ZONE], until=30.0, loading={"w_n": Hold(level=0.0), "F_n": Ramp(rate=1e-6 * K)}, normal=mount)
-    (first,), (second,) = jumps(driven, "snap"), jumps(loaded, "snap")
+    (first,), (second,) = driven.of("snap"), loaded.of("snap")
     assert second.released == pytest.approx(first.released, rel=1e-9)
     assert (first.verdict, second.verdict) == ("admissible", "admissible")
-    assert max(audit(run).energy_error for run in (driven, loaded)) < 1e-9
+    assert max(run.energy_error for run in (driven, loaded)) < 1e-9
 
 
 @pytest.mark.parametrize("J_c", [0.5, 1.0, 2.0])
 def test_sticking_bears_friction_on_the_current_area(J_c):
     loading = {"p": Hold(level=1e5), "w_t": Ramp(rate=1e-6)}
     trajectory = solve(until=5.0, loading=loading, J_c=J_c, frictions=[Coulomb(mu=0.5)], tangential=Mounting(k=5e10))
-    assert jumps(trajectory, "slip forward")[0].t == pytest.approx(J_c * 0.5 * 1e5 / (5e10 * 1e-6), rel=1e-12)
-    assert audit(trajectory).energy_error < 1e-9
+    assert trajectory.of("slip forward")[0].t == pytest.approx(J_c * 0.5 * 1e5 / (5e10 * 1e-6), rel=1e-12)
+    assert trajectory.energy_error < 1e-9
 
 
 def test_a_rigid_interface_that_has_debonded_bears_no_tension():
@@ -72,7 +57,7 @@ def test_a_rigid_interface_that_has_debonded_bears_no_tension():
         limits=[LIMIT],
         initial={"phi": 1.0},
     )
-    first, second = jumps(trajectory, "debond")
+    first, second = trajectory.of("debond")
     assert (first.t, second.t) == pytest.approx((1.0, 5.0), rel=1e-9)
     assert second.released == pytest.approx(0.0, abs=1e-9)
 
@@ -91,13 +76,13 @@ def test_a_gap_in_equilibrium_follows_bonds_that_sliding_breaks():
         tangential=Mounting(k=1e11, m=1e9, c_b=1e10),
         initial={"phi": 1.0},
     )
-    slip = jumps(trajectory, "slip forward")[0]
+    slip = trajectory.of("slip forward")[0]
     gaps = [point.y[trajectory.model.jumper.states.index("g_n")] for point in (slip.before, slip.after)]
     np.testing.assert_allclose(gaps, [1e12 * w_n / (1e12 + 1.5 * E), 1e12 * w_n / (1e12 + E)], rtol=1e-12)
     p = np.array(gaps) * np.array([1.5 * E, E])
     stored = p**2 / 2 * (1 / 1e12 + 1 / np.array([1.5 * E, E]))
     assert slip.released == pytest.approx(stored[0] - stored[1] - 0.5, rel=1e-9)
-    assert audit(trajectory).energy_error < 1e-9
+    assert trajectory.energy_error < 1e-9
 
 
 def test_a_dead_shear_load_sticks_up_to_the_limit_and_ends_there():

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scenes import bodies
+import solved
+from scenes import bodies, together
 
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
@@ -15,7 +16,7 @@ from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Interface, Mounting, Scene
 from surfacechem.solve.diagnose import paces
-from surfacechem.solve.run import Model, Run
+from surfacechem.solve.run import Model
 
 LOADS = {
     "ramp": "ramp: {{rate: {way}0.1 um/s}}",
@@ -67,10 +68,8 @@ ZONE = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)
 
 
 def solve(until, potentials=(), frictions=(), initial=None, max_steps=100_000, *, loading, **mounts):
-    interface = Interface("T", potentials, frictions)
-    start = {"T": 300.0} | (initial or {})
-    scene = Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=start, **mounts)
-    return Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 11), rtol=1e-13, max_steps=max_steps))
+    given = together(potentials, frictions, loading, initial, **mounts)
+    return solved.solve(given, until, rtol=1e-13, max_steps=max_steps)
 
 
 def test_a_slider_that_swings_too_often_says_its_period():
