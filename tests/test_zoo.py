@@ -102,10 +102,10 @@ def test_equations_are_linear_in_the_rates(member):
 
 @each()
 def test_guards_read_modes_only_where_their_limit_depends_on_them(member):
-    """A guard is in play in some modes; only a fold, a strength and a velocity have a direction of their own."""
+    """A guard is in play in some modes; only a fold and a strength depend on them."""
     modes = {mode.symbol for mode in member.system.modes}
     reading = {e.name for e in member.system.edges if symengine.sympify(e.guard).free_symbols & modes}
-    assert reading <= {"snap", "debond", "stop"}
+    assert reading <= {"snap", "debond"}
 
 
 def test_the_page_on_events_names_every_edge():

@@ -1,7 +1,7 @@
 """From a scene to its system: phase by phase its components state what they add; the balances follow from all of it.
 
 A component is a module in one of the folders beside this one. Its functions named like the phases take what has been
-stated so far and yield records: nodes, bonds and energies, powers, states, margins, edges, notes, warnings.
+stated so far and yield records: nodes, bonds and energies, powers, states, margins, constraints, notes, warnings.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ ORDER = (
     "programme",
     "interface",
     "threshold",
+    "unilateral",
     "chemistry",
     "force",
     "friction",
     "gap",
     "tangential",
-    "unilateral",
     "medium",
     "heat",
     "fold",

@@ -42,7 +42,6 @@ class Mode:
     """A discrete variable, such as sticking or sliding; it changes along edges only."""
 
     name: str
-    symbol: Any
     initial: float
     words: Mapping[float, str]
     """What each value means."""
@@ -53,16 +52,26 @@ class Mode:
     waits: Mapping[float, str] = field(default_factory=dict)
     """Until when a value holds, in words, where it is meant to be left."""
 
+    @property
+    def symbol(self) -> Any:
+        """Its symbol, a parameter that edges change."""
+        return symengine.Symbol(self.name)
+
 
 @dataclass(frozen=True)
 class Register:
     """A number that only edges write: a time, a direction or an impulse that what follows has to remember."""
 
     name: str
-    symbol: Any
     text: str
+    initial: float = 0.0
     given: Callable[[Mapping[str, float]], float] | None = None
     """The value at the start as it follows from what a case gives, by path, where it does."""
+
+    @property
+    def symbol(self) -> Any:
+        """Its symbol, a parameter that edges change."""
+        return symengine.Symbol(self.name)
 
 
 @dataclass(frozen=True)
@@ -120,6 +129,28 @@ class Edge:
     def masked(self) -> Expression:
         """The guard while it is in play, else 1, as one expression to be read or printed."""
         return masked(self.guard, self.when)
+
+
+def _nothing(edge: Edge) -> Mapping[Any, Expression]:
+    return {}
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """An inclusion as automaton and balances see it; stated in parts, a mode before the edges that change it."""
+
+    modes: tuple[Mode, ...] = ()
+    """Modes, in which it holds or not; one that is stated again is refined."""
+    registers: tuple[Register, ...] = ()
+    edges: tuple[Edge, ...] = ()
+    active: Expression = 1
+    """One while the balance of what it holds governs, zero while the constraint does."""
+    reaction: Expression = 0
+    """What it bears while it holds [Pa]."""
+    at_once: bool = False
+    """Whether its edges come before those of others that are due at the same moment."""
+    beside: Callable[[Edge], Mapping[Any, Expression]] = _nothing
+    """New values of its modes and registers along an edge of another constraint."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -14,7 +14,7 @@ from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.model import balances
-from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink
+from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register, Sink
 from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
 from surfacechem.model.refit import Fit
@@ -73,12 +73,10 @@ class Motion:
     """New values of states that follow the normal gap where it jumps."""
     gap_rates: dict[str, Expression] = field(default_factory=dict)
     """Rates of the gaps that move by a balance."""
-    heals: dict[Expression, Expression] = field(default_factory=dict)
-    """New values of modes that a rigid contact has as it closes again."""
 
 
 Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor | Fit
-Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Edge | Equilibrium | Power | Note | str
+Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
 """What components state; a string is a warning."""
 
 
@@ -93,6 +91,8 @@ class Build:
     thermal: Thermal = NO_NODES
     bonding: dict[str, Bond] = field(default_factory=dict)
     energy: Energy = NO_ENERGY
+    heals: Mapping[Expression, Expression] = field(default_factory=dict)
+    """New values of modes that a rigid contact has as it closes again."""
     rates: Mapping[Any, Expression] = field(default_factory=dict)
     """Time derivatives of what the interface's free energy depends on beside temperature."""
     inflow: dict[str, list[Expression]] = field(default_factory=dict)
@@ -109,9 +109,8 @@ class Build:
     """All that passes energy on, from which the ledger and the balances of energy follow."""
     loads: dict[str, Load] = field(default_factory=dict)
     """Histories that are in use, by variable."""
-    modes: list[Mode] = field(default_factory=list)
-    registers: list[Register] = field(default_factory=list)
-    edges: list[Edge] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    """All that must not be passed, as it was stated."""
     equilibria: list[Equilibrium] = field(default_factory=list)
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
@@ -154,6 +153,8 @@ class Build:
                 self.energy = record
             case Bond():
                 self.bonding[str(record.symbol)] = record
+            case Constraint():
+                self.constrain(record)
             case HeatPath():
                 self.conductances.setdefault(record.ends, []).append(record.h)
             case _:
@@ -166,7 +167,6 @@ class Build:
             State: self.states,
             Account: self.ledger,
             Margin: self.margins,
-            Edge: self.edges,
             Equilibrium: self.equilibria,
             Power: self.powers,
             str: self.warnings,
@@ -249,32 +249,45 @@ class Build:
                 law.place,
             )
 
-    def mode(
-        self,
-        name: str,
-        initial: float,
-        words: Mapping[float, str],
-        start: Expression | None = None,
-        waits: Mapping[float, str] | None = None,
-        given: Callable[[Mapping[str, float]], float] | None = None,
-    ) -> Any:
-        """A discrete variable; its symbol is a parameter that only transitions change."""
-        spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in words.items()))
-        symbol = self.constant(name, f"mode.{name}", spec, initial, internal=True)
-        self.modes.append(Mode(name, symbol, initial, words, start, given, waits or {}))
-        return symbol
+    def constrain(self, stated: Constraint) -> Constraint:
+        """Keep a constraint; its modes and registers are parameters that only edges change."""
+        for mode in stated.modes:
+            if self.mode(mode.name) is None:
+                spec = Spec("1", " or ".join(f"{value:g}: {word}" for value, word in mode.words.items()))
+                self.constant(mode.name, f"mode.{mode.name}", spec, mode.initial, internal=True)
+        known = {register.name for register in self.registers}
+        for register in (item for item in stated.registers if item.name not in known):
+            spec = Spec("1", register.text)
+            self.constant(register.name, f"register.{register.name}", spec, register.initial, internal=True)
+        self.constraints.append(stated)
+        return stated
 
-    def register(
-        self, name: str, text: str, initial: float = 0.0, given: Callable[[Mapping[str, float]], float] | None = None
-    ) -> Any:
-        """A number that edges write; its symbol is a parameter that nothing else changes."""
-        symbol = self.constant(name, f"register.{name}", Spec("1", text), initial, internal=True)
-        self.registers.append(Register(name, symbol, text, given))
-        return symbol
+    def constraint(self, mode: str) -> Constraint:
+        """The constraint with the mode of that name; one that never holds where the scene has none."""
+        holding = (item for item in self.constraints if any(mode == other.name for other in item.modes))
+        return next(holding, Constraint())
 
-    def find_mode(self, name: str) -> Any:
+    def mode(self, name: str) -> Any:
         """The symbol of a mode, None where the scene has none of that name."""
-        return next((mode.symbol for mode in self.modes if mode.name == name), None)
+        return next((mode.symbol for mode in self.constraint(name).modes if mode.name == name), None)
+
+    @property
+    def modes(self) -> list[Mode]:
+        """The modes of all constraints as they were stated last."""
+        return list({mode.name: mode for item in self.constraints for mode in item.modes}.values())
+
+    @property
+    def registers(self) -> list[Register]:
+        """The registers of all constraints."""
+        return list({register.name: register for item in self.constraints for register in item.registers}.values())
+
+    @property
+    def edges(self) -> list[Edge]:
+        """The edges of all constraints, each with what it changes of the others; what comes at once is the first."""
+        edges = [edge for item in sorted(self.constraints, key=lambda item: not item.at_once) for edge in item.edges]
+        for item in self.constraints:
+            edges = [replace(edge, modes={**edge.modes, **item.beside(edge)}) for edge in edges]
+        return edges
 
     def at_start(self, expression: Expression) -> float:
         """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""

@@ -177,7 +177,7 @@ def check_summary(
         "States": _state_rows(system),
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
         "Modes": [(mode.name, _words(mode)) for mode in system.modes if len(mode.words) > 1],
-        "Transitions": [(item.name, item.reason) for item in system.edges],
+        "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
         "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
         "Warnings": [(warning,) for warning in warnings],

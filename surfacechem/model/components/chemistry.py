@@ -19,8 +19,8 @@ from surfacechem.model.build import Build
 from surfacechem.model.components.force import SHARED
 from surfacechem.model.components.mounting import law_reads
 from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, departure, opposed, own_departure
-from surfacechem.model.constraints.bound import free_to_react
-from surfacechem.model.constraints.envelope import softening, within_reach
+from surfacechem.model.constraints.bound import bound
+from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCHING
 from surfacechem.model.parts import Bond
 from surfacechem.model.system import Account, Capped, Caution
@@ -124,10 +124,12 @@ def _rates(build: Build, found: Sequence[Reaction]) -> dict[str, Expression]:
     # carry them beyond; a law with an envelope ends at its bound by itself.
     free: Expression = symengine.Integer(1)
     if "phi" in build.bonding and forming != 0:
-        free = within_reach(build) * free_to_react(build, forming)
+        free = build.constraint("debonding").active * build.constrain(bound(build, forming)).active
     for item in found:
         if item.label not in laws:
-            rates[item.label] = softening(build, item.law, forming, free)
+            envelope, rates[item.label] = softening(build, item.law, forming, free)
+            for record in envelope:
+                build.add(record)
         elif "phi" in item.law.stoichiometry():
             rates[item.label] *= free
     for item in found:

@@ -9,13 +9,13 @@ import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
-from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import Equilibrium
+from surfacechem.expressions import Expression, absolute, derivative
+from surfacechem.model.automaton import Constraint, Equilibrium
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, read_by_potentials
 from surfacechem.model.constraints.threshold import bonds_left
-from surfacechem.model.constraints.unilateral import TOUCHING, closing
+from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact, impacts
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
@@ -38,9 +38,9 @@ def variables(build: Build) -> None:
             )
         far = far_field(build, mount)
         pull = far.force(symengine.Integer(0), symengine.Integer(0))
-        closed = build.mode("closed", 1.0, {0.0: "open", 1.0: "closed"}, _starts_closed(build, pull))
-        build.variables.define("g_n", partial(_rigid_gap, build, mount, closed), "algebraic", mount.by)
-        _carry(build, closed * pull)
+        closed = build.constrain(contact(pull, _bonded(build)))
+        build.variables.define("g_n", partial(_rigid_gap, build, mount, closed.active), "algebraic", mount.by)
+        _carry(build, closed.reaction)
     else:
         build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
         build.variables.get("g_n", "the mechanics", "mechanics")
@@ -52,7 +52,7 @@ def variables(build: Build) -> None:
 
 def _refuse_idle_restitution(build: Build, mount: Held) -> None:
     """Only a mass that meets a rigid contact rebounds by a coefficient."""
-    if not mount.law.e or (mount.inertial and build.find_mode("closed") is not None):
+    if not mount.law.e or (mount.inertial and build.mode("closed") is not None):
         return
     why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
     if mount.inertial and read_by_potentials(build, "g_n"):
@@ -81,13 +81,7 @@ def _yielding(build: Build, mount: Held) -> Expression:
     """Velocity at which dampers bear what is out of balance; given by the state, so that power is linear in rates."""
     g = symengine.Symbol("g_n")
     yielding = far_field(build, mount).yielding(g, derivative(build.psi, g))
-    return build.name(VARIABLES["v_n"], _free(build) * yielding)
-
-
-def _free(build: Build) -> Expression:
-    """Zero while a rigid contact is closed."""
-    closed = build.find_mode("closed")
-    return symengine.Integer(1) if closed is None else 1 - closed
+    return build.name(VARIABLES["v_n"], build.constraint("closed").active * yielding)
 
 
 def _unilateral(build: Build, mount: Held) -> None:
@@ -95,16 +89,13 @@ def _unilateral(build: Build, mount: Held) -> None:
     far = far_field(build, mount)
     pull = far.force(symengine.Integer(0), symengine.Integer(0))
     g, v = symengine.symbols("g_n v_n")
-    start = _starts_closed(build, pull)
+    closed = build.constrain(contact(pull, _bonded(build), g, v if mount.inertial else None))
     if mount.inertial:
-        start = where(absolute(v) > 0, 0, start)
-    closed = build.mode("closed", 0.0, {0.0: "open", 1.0: "closed"}, where(g > 0, 0, start))
-    if mount.inertial:
-        build.motion.gap_rates["g_n"] = (1 - closed) * v
+        build.motion.gap_rates["g_n"] = closed.active * v
     initial = build.scene.initial.get("g_n", 0.0)
     first = build.constant("g_n_i", "initial.g_n", Spec("m", "initial gap"), initial, internal=False)
     build.margins.append(Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n"))
-    _carry(build, closed * pull)
+    _carry(build, closed.reaction)
 
 
 def _carry(build: Build, traction: Expression) -> None:
@@ -113,17 +104,15 @@ def _carry(build: Build, traction: Expression) -> None:
     build.variables.define("p", partial(_pressure, build), "derived", "equilibrium with the far field")
 
 
-def _starts_closed(build: Build, pull: Expression) -> Expression:
-    """Whether a rigid interface is closed at the start: it is where bonds hold it, or the far field does not pull."""
+def _bonded(build: Build) -> Expression:
+    """What is above zero where bonds hold a rigid interface."""
     bonds = bonds_left(build)
-    if bonds is None:
-        bonds = symengine.Integer(1 if build.interface.limits else 0)
-    return where(bonds > 0, 1, where(pull > 0, 0, 1))
+    return symengine.Integer(bool(build.interface.limits)) if bonds is None else bonds
 
 
-def _rigid_gap(build: Build, mount: Held, closed: Expression) -> Expression:
+def _rigid_gap(build: Build, mount: Held, opens: Expression) -> Expression:
     far = far_field(build, mount)
-    return build.name(VARIABLES["g_n"], (1 - closed) * (far.w + far.F / far.k))
+    return build.name(VARIABLES["g_n"], opens * (far.w + far.F / far.k))
 
 
 def _reaction(build: Build, traction: Expression) -> Expression:
@@ -135,7 +124,7 @@ def _pressure(build: Build) -> Expression:
     return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
 
 
-def laws(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power | Constraint]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
     mount = held(build, "n")
     if mount is None:
@@ -150,14 +139,14 @@ def laws(build: Build) -> Iterator[Power]:
     t_n = derivative(build.psi, g)
     if not mount.quasi_static:
         build.variables.get("v_n", "the mechanics", "mechanics")
-    if build.find_mode("closed") is None:
+    if build.mode("closed") is None:
         closing(build, g)
     dot = symengine.Symbol("dg_n_dt")
     yield from far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
     if mount.inertial:
         build.rows.kinematics("g_n", rate)
         force = far.force(g, rate) - t_n - far.c_g * rate
-        build.rows.momentum("v_n", force, far.m, _free(build))
+        build.rows.momentum("v_n", force, far.m, build.constraint("closed").active)
     elif mount.damped:
         build.rows.kinematics("g_n", rate)
     else:
@@ -166,3 +155,4 @@ def laws(build: Build) -> Iterator[Power]:
         size = far.size(g) + absolute(t_n)
         build.rows.equilibrium("g_n", build.total_derivative(residual))
         build.equilibria.append(Equilibrium("g_n", residual, size))
+    yield from impacts(build)

@@ -12,7 +12,7 @@ import symengine
 from surfacechem.contracts.terms import Load, Potential, Spec, UnderPressure
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, positive, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.balances import INTERFACE
 from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import initial_bonding
@@ -158,7 +158,7 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
 
 
-def energies(build: Build) -> Iterator[Energy | Thermal]:
+def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
     gaps = _gaps(build)
@@ -172,7 +172,8 @@ def energies(build: Build) -> Iterator[Energy | Thermal]:
         psi += F
         build.law_ranges(law)
         build.law_margins(bounds[law], gaps[law])
-    psi = _in_sides(build, psi)
+    psi, kinks = _in_sides(build, psi)
+    yield from kinks
     names = (*build.thermal.nodes, "T_c") if build.interface.temperature is None else ()
     if any(depends(psi, symengine.Symbol(name)) for name in names):
         raise InputError(
@@ -187,7 +188,7 @@ def energies(build: Build) -> Iterator[Energy | Thermal]:
             stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
             for law, b in bounds.items()
         ]
-        sides = {} if build.find_mode("side") is None else _by_side(symengine.Symbol("g_n"))
+        sides = {} if build.mode("side") is None else _by_side(symengine.Symbol("g_n"))
         contact = partial(_contact_pressure, build, [symengine.sympify(F).xreplace(sides) for F in borne])
         build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
         _warn_of_net_pressure(build)
@@ -272,36 +273,33 @@ def _per_reference_area(
     return F.subs({n_c: build.variables.get("N_c", law) / build.stretch}) if depends(F, n_c) else F
 
 
-def _in_sides(build: Build, given: Expression) -> Expression:
+def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constraint | Margin]]:
     """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
     g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
     psi = symengine.sympify(given).xreplace(_by_side(g))
     if not depends(psi, side):
-        return given
+        return given, []
     if "g_n" not in build.motion.gap_rates:
-        build.margins.append(Margin("g_n", g, "the given gap closes or opens", terminal=False))
-        return given
+        return given, [Margin("g_n", g, "the given gap closes or opens", terminal=False)]
     # Bodies at no gap are in contact, loaded or not, under a dead load: nothing else holds them there.
     mount = held(build, "n")
     rests = mount is not None and mount.quasi_static and not mount.law.k
     start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
-    build.mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
-    for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
-        other = {side: symengine.Integer(-value)}
-        bears = rests and name == "release"
-        build.edges.append(
-            Edge(
-                name,
-                value * g,
-                reason,
-                other,
-                equilibrates=True,
-                strict=bears,
-                measure="g_n",
-                when={side: (value,)},
-            )
+    edges = (
+        Edge(
+            name,
+            value * g,
+            reason,
+            {side: symengine.Integer(-value)},
+            equilibrates=True,
+            strict=rests and name == "release",
+            measure="g_n",
+            when={side: (value,)},
         )
-    return psi
+        for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart"))
+    )
+    mode = Mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
+    return psi, [Constraint((mode,), edges=tuple(edges))]
 
 
 def _by_side(g: Any) -> dict[Any, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import symengine
@@ -10,7 +10,7 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.interface import LOADABLE
 from surfacechem.model.components.mounting import LENGTH, TRACTIONS
@@ -20,25 +20,25 @@ from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
 from surfacechem.units import quotient
 
+BEGUN = Register("stage_begun", "time at which the stage began")
 SCALES = {"m": LENGTH, "m/s": LENGTH}
 
 
-def variables(build: Build) -> None:
+def variables(build: Build) -> Iterator[Constraint]:
     """The stage as a mode, and a state for each variable that the stages move."""
     stages = build.scene.programme
-    if not stages:
-        return
     words = {float(i): stage.name for i, stage in enumerate(stages)} | {float(len(stages)): "after the last stage"}
     for i, item in enumerate(stages):
         if item.name in [other.name for other in stages[:i]]:
             raise InputError(f"two stages are called '{item.name}'. Give each a name of its own.", item.place)
     waits = {float(i): _awaited(stage) for i, stage in enumerate(stages) if _awaited(stage)}
-    stage = build.mode("stage", 0.0, words, waits=waits)
+    stage = Mode("stage", 0.0, words, waits=waits)
+    yield Constraint((stage,))
     for name in dict.fromkeys(name for item in stages for name in item.rates):
         if name not in LOADABLE:
             message = f"a programme cannot move '{name}'.{suggestion(name, LOADABLE)}"
             raise InputError(message, stages[0].place)
-        build.variables.define(name, partial(_driven, build, name, stage), "driven", "programme")
+        build.variables.define(name, partial(_driven, build, name, stage.symbol), "driven", "programme")
 
 
 def _awaited(stage: Stage) -> str:
@@ -71,63 +71,57 @@ def _during(stage: Expression, i: int) -> Expression:
     return symengine.Lt((stage - i) ** 2, symengine.RealDouble(0.25))
 
 
-def stages(build: Build) -> None:
-    """The transition at the end of each stage: after a time, at a value of a variable, or at another transition."""
-    stages = build.scene.programme
-    if not stages:
-        return
-    stage = build.find_mode("stage")
-    begun = build.register("stage_begun", "time at which the stage began")
-    for i, item in enumerate(stages):
-        advance = {stage: symengine.Integer(i + 1), begun: build.t}
+def stages(build: Build) -> Iterator[Constraint]:
+    """The edge at the end of each stage: after a time, at a value of a variable, or along an edge of the interface."""
+    stage, begun, edges = symengine.Symbol("stage"), BEGUN.symbol, []
+    for i, item in enumerate(build.scene.programme):
+        if item.event:
+            if not _waiting(build.edges, item):
+                known = [other.name for other in build.edges]
+                message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
+                raise InputError(message, item.place)
+            continue
         if item.duration is not None:
             spec = Spec("s", f"length of the stage {item.name}", above=0)
-            length = build.parameters.add("length", f"{_path(item)}.for", spec, item.duration)
-            _stage_end(build, item, begun + length - build.t, advance, {stage: (i,)})
-        elif item.event:
-            # The transition itself moves the programme on.
-            found = [j for j, other in enumerate(build.edges) if other.name.startswith(item.event)]
-            if not found:
-                known = [other.name for other in build.edges]
-                raise InputError(
-                    f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}", item.place
-                )
-            for j in found:
-                other = build.edges[j]
-                modes = {
-                    **other.modes,
-                    stage: where(_during(stage, i), i + 1, other.modes.get(stage, stage)),
-                    begun: where(_during(stage, i), build.t, other.modes.get(begun, begun)),
-                }
-                build.edges[j] = replace(other, modes=modes)
+            margin = begun + build.parameters.add("length", f"{_path(item)}.for", spec, item.duration) - build.t
         elif item.variable:
-            _at_value(build, item, stage, i, advance)
+            margin = _until(build, item)
+        else:
+            continue
+        modes, reason = {stage: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
+        edges.append(Edge(f"end of {item.name}", margin, reason, modes, passes=True, when={stage: (i,)}))
+
+    def advancing(edge: Edge) -> dict[Expression, Expression]:
+        """What a stage waits for moves the programme on by itself."""
+        modes: dict[Expression, Expression] = {}
+        for i, item in enumerate(build.scene.programme):
+            if item.event and _waiting([edge], item):
+                during = _during(stage, i)
+                modes[stage] = where(during, i + 1, modes.get(stage, stage))
+                modes[begun] = where(during, build.t, modes.get(begun, begun))
+        return modes
+
+    yield Constraint(registers=(BEGUN,), edges=tuple(edges), beside=advancing)
+
+
+def _waiting(edges: Sequence[Edge], item: Stage) -> bool:
+    """Whether a stage ends along any of the edges."""
+    return any(edge.name.startswith(item.event) and not edge.passes for edge in edges)
 
 
 def _path(item: Stage) -> str:
     return f"programme.{item.name}"
 
 
-def _stage_end(
-    build: Build,
-    item: Stage,
-    margin: Expression,
-    advance: dict[Expression, Expression],
-    during: dict[Expression, tuple[int]],
-) -> None:
-    reason = f"the stage {item.name} ends"
-    build.edges.append(Edge(f"end of {item.name}", margin, reason, advance, passes=True, when=during))
-
-
-def _at_value(build: Build, item: Stage, stage: Expression, i: int, advance: dict[Expression, Expression]) -> None:
+def _until(build: Build, item: Stage) -> Expression:
+    """Positive until a variable reaches the value at which a stage ends."""
     x = _variable(build, item)
     traction = item.variable in TRACTIONS
     spec = Spec("Pa" if traction else unit_of(item.variable), f"end of the stage {item.name}")
     path = f"{_path(item)}.until.{item.variable}{'' if item.rising else '.falls-to'}"
     name = f"{item.variable}_end" if traction else item.variable
     value = build.parameters.add(name, path, spec, item.value)
-    sign = symengine.Integer(1 if item.rising else -1)
-    _stage_end(build, item, sign * (value - x), advance, {stage: (i,)})
+    return value - x if item.rising else x - value
 
 
 def _variable(build: Build, item: Stage) -> Expression:

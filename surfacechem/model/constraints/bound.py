@@ -19,7 +19,7 @@ import symengine
 
 from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.logarithms import LOGARITHM
 from surfacechem.quantities import Quantity
@@ -36,26 +36,32 @@ BOUNDS = (
 """Side and value of each bound, the value next to it, names and reasons of the edges to the bound and away from it."""
 
 
-def free_to_react(build: Build, rate: Expression) -> Expression:
-    """One while the bonding state is free, zero while it is held at a bound; ``rate`` is what would change it."""
+def bound(build: Build, rate: Expression) -> Constraint:
+    """The bounds of the bonding state, which ``rate`` would change."""
     if not _may_leave_the_range(build):
-        return symengine.Integer(1)
+        return Constraint()
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
     bounds = [bound for bound in BOUNDS if outward[bound[0]] != 0]
     if not bounds:
-        return symengine.Integer(1)
-    sides = {0, *(side for side, *_ in bounds)}
-    held = build.mode("held", 0.0, {side: text for side, text in HELD_AT.items() if side in sides})
+        return Constraint()
+    sides, edges = {0, *(side for side, *_ in bounds)}, []
+    mode = Mode("held", 0.0, {side: text for side, text in HELD_AT.items() if side in sides})
+    held = mode.symbol
     for side, at, _, name, reason, back, why in bounds:
         # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
         left = where(outward[side] > 0, side * (at - PHI), 1)
         turned = build.stretch * outward[side] / build.bonding["phi"].density
         modes, free = {held: symengine.Integer(side)}, {held: symengine.Integer(0)}
-        build.edges += [
+        edges += [
             Edge(name, left, reason, modes, {PHI: at}, measure="phi", when={held: (0,)}),
             Edge(back, turned, why, free, when={held: (side,)}),
         ]
-    return 1 - held**2
+
+    def breaking(edge: Edge) -> dict[Expression, Expression]:
+        """Bonds that break at once free the bonding state from a bound that held it."""
+        return {held: symengine.Integer(0)} if PHI in edge.reset and held not in edge.modes else {}
+
+    return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)
 
 
 def _may_leave_the_range(build: Build) -> bool:
@@ -96,11 +102,3 @@ def _read(build: Build, expression: Expression) -> set[str]:
         if item.name in found:
             found |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
     return found
-
-
-def jumps(build: Build) -> None:
-    """Edges that break bonds at once free the bonding state from a bound that held it."""
-    held = build.find_mode("held")
-    for j, item in enumerate(build.edges):
-        if held is not None and PHI in item.reset and held not in item.modes:
-            build.edges[j] = replace(item, modes={**item.modes, held: symengine.Integer(0)})

@@ -13,6 +13,7 @@ Source: Sauer, Duong & Mandadapu (2021), section 5.2; damage as a unilateral con
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import symengine
@@ -20,7 +21,7 @@ import symengine
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Mode
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, held
 from surfacechem.model.system import Margin
@@ -30,25 +31,21 @@ from surfacechem.tolerances import NOTHING
 MATCH = 1e3 * NOTHING
 """Relative difference of two statements of a strength that rounded input explains: both have six digits."""
 
+WORDS = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
+DEBONDING = Mode("debonding", 0.0, WORDS)
+MODE = DEBONDING.symbol
+
 SAME = "Give `bond-stiffness` and this law the same E_b."
 
 
-def variables(build: Build) -> None:
-    """The mode, for the laws that read it."""
-    if not any(law.envelope is not None for law in build.interface.reactions):
-        return
-    words = {-1.0: "is open beyond the reach of bonds", 0.0: "keeps its bonds", 1.0: "loses bonds"}
-    mode = build.mode("debonding", 0.0, words)
-    build.variables.define("softening", lambda: (mode + mode**2) / 2, "mode", "interface.bonding")
+def variables(build: Build) -> Iterator[Constraint]:
+    """The mode, for the laws that read it; bonds can form where the gap is not open beyond their reach."""
+    if any(law.envelope is not None for law in build.interface.reactions):
+        build.variables.define("softening", lambda: (MODE + MODE**2) / 2, "mode", "interface.bonding")
+        yield Constraint((DEBONDING,), active=1 - MODE * (MODE - 1) / 2)
 
 
-def within_reach(build: Build) -> Expression:
-    """One while bonds can form, zero where the gap is open beyond their reach."""
-    mode = build.find_mode("debonding")
-    return symengine.Integer(1) if mode is None else 1 - mode * (mode - 1) / 2
-
-
-def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> None:
+def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: Expression) -> tuple[Margin, ...]:
     """The envelope falls after it rose, from the traction that complete bonding bears there."""
     t_max, g_f = law.t_max, law.g_f  # type: ignore[attr-defined]
     start, end, strength = build.at_start(peak), build.at_start(g_f), build.at_start(t_max)
@@ -62,7 +59,7 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     t_n = derivative(build.psi, symengine.Symbol("g_n")).xreplace({g_n: peak, symengine.Symbol("side"): 1})
     bonds = t_n.subs({phi: 1}) - t_n.subs({phi: 0})
     if bonds.has(symengine.zoo):
-        return  # the potential does not exist without bonds, which then bear nothing of their own
+        return ()  # the potential does not exist without bonds, which then bear nothing of their own
     borne = build.at_start(bonds)
     if abs(borne - strength) > MATCH * strength:
         raise InputError(
@@ -73,26 +70,28 @@ def _check(build: Build, law: RateLaw, phi: Expression, g_n: Expression, peak: E
     # What varies, and what a sweep gives, is watched.
     reason = "the bonds of the potential bear another traction than t_max where they begin to break"
     near = 2 * MATCH - absolute(build.expanded(bonds / t_max) - 1)
-    build.margins += [
+    return (
         Margin("t_max / E_b < g_f", 1 - peak / g_f, "bonds begin to break beyond g_f"),
         Margin("t_max", near, reason, remedy=SAME, path=law.path),
-    ]
+    )
 
 
-def softening(build: Build, law: RateLaw, forming: Expression, free: Expression) -> Expression:
-    """Rate of a bound law with an envelope, where others form bonds, and what starts and ends the loss of bonds."""
-    mode = build.find_mode("debonding")
+def softening(
+    build: Build, law: RateLaw, forming: Expression, free: Expression
+) -> tuple[list[Constraint | Margin], Expression]:
+    """What starts and ends the loss of bonds, and the rate of a bound law with an envelope, where others form bonds."""
+    mode = MODE
     phi, g_n, n_c = (build.variables.get(name, law) for name in ("phi", "g_n", "n_c"))
     left = build.variables.call(law, law.envelope)
     peak = law.peak()  # type: ignore[attr-defined]
-    _check(build, law, phi, g_n, peak)
+    agrees = _check(build, law, phi, g_n, peak)
     # The envelope moves with the gap, by its velocity where that has a variable of its own.
     rate = build.total_derivative(left)
     if build.variables.has("v_n"):
         rate = rate.subs({symengine.Symbol("dg_n_dt"): build.variables.get("v_n", "the envelope")})
     overshoot = build.name(VARIABLES["overshoot"], forming * free / n_c - rate, output=False)
     none, one = symengine.Integer(0), symengine.Integer(1)
-    lost, bound = {mode: -one}, build.find_mode("held")
+    lost, bound = {mode: -one}, build.mode("held")
     breaks = {mode: one} if bound is None else {mode: one, bound: none}
     # Where there are no bonds, and none form, none break.
     present = where(phi > 0, left - phi, where(forming * free > 0, left - phi, 1))
@@ -102,7 +101,7 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     if "g_n" in build.motion.gap_rates and not build.variables.has("v_n"):
         build.motion.follows[phi] = remains
     fewer = "a jump leaves fewer bonds than there were"
-    build.edges += [
+    edges = [
         Edge("yield", beyond, fewer, reset={phi: remains}, equilibrates=True, heat="snap", when=keeps),
         # Bonds turn back from the envelope where the gap does: rounding must not take them there again.
         Edge("soften", present, "bonds begin to break as the gap opens", breaks, strict=True, when=keeps),
@@ -112,14 +111,19 @@ def softening(build: Build, law: RateLaw, forming: Expression, free: Expression)
     ]
     if forming != 0:
         margin, reason = where(forming > 0, -left, 1), "the gap is closed enough to bond"
-        build.edges.append(Edge("rejoin", margin, reason, {mode: none}, strict=True, when=parted))
+        edges.append(Edge("rejoin", margin, reason, {mode: none}, strict=True, when=parted))
     # A run begins with no more bonds than the gap leaves.
-    j = next(j for j, item in enumerate(build.modes) if item.name == "debonding")
-    build.modes[j] = replace(build.modes[j], start=where(left < 0, -1.0, 0.0))
     given = where(build.t > 0, 1, where(left > 0, left, 0) - phi + build.variables.get("slack", "the bonds"))
     reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
-    build.margins.append(Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi"))
-    return build.variables.call(law, law.statement, {"overshoot": overshoot})
+    within = Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi")
+    modes = (replace(DEBONDING, start=where(left < 0, -1.0, 0.0)),)
+    stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=_apart)]
+    return stated, build.variables.call(law, law.statement, {"overshoot": overshoot})
+
+
+def _apart(edge: Edge) -> dict[Expression, Expression]:
+    """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
+    return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
 
 def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:
@@ -133,12 +137,3 @@ def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> 
     reason = "the traction falls faster with the gap than the bodies unload: the interface tears open"
     gone, when = {phi: symengine.Integer(0)}, {mode: (1,)}
     return [Edge("tear", guard, reason, lost, gone, equilibrates=True, heat="snap", when=when)]
-
-
-def jumps(build: Build) -> None:
-    """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
-    mode = build.find_mode("debonding")
-    for j, item in enumerate(build.edges):
-        if mode is not None and item.equilibrates and mode not in item.modes:
-            modes = {**item.modes, mode: where(mode > 0, 0, mode)}
-            build.edges[j] = replace(item, modes=modes)

@@ -12,14 +12,14 @@ Equilibrium is stable while det A > 0; where all gaps but one are eliminated thi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import symengine
 
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
-from surfacechem.model.automaton import FOLD, Edge, Equilibrium, Fold
+from surfacechem.model.automaton import FOLD, Constraint, Edge, Equilibrium, Fold
 from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
 
@@ -29,7 +29,7 @@ Rise = Mapping[Any, Expression]
 Matrix = Sequence[Sequence[Expression]]
 
 
-def jumps(build: Build) -> None:
+def jumps(build: Build) -> Iterator[Constraint]:
     """The edge where the gaps in equilibrium lose it, and what tells which way they run."""
     if not build.equilibria:
         return
@@ -48,16 +48,15 @@ def jumps(build: Build) -> None:
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
     # The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later.
     left = tangent - FOLD
-    build.edges.append(
-        Edge(
-            "snap",
-            left / (1 + absolute(left)),
-            "the quasi-static equilibrium of the gap was lost (mechanical fold)",
-            equilibrates=True,
-            heat="snap",
-            fold=Fold(tangent, falling, relative, warming),
-        )
+    snap = Edge(
+        "snap",
+        left / (1 + absolute(left)),
+        "the quasi-static equilibrium of the gap was lost (mechanical fold)",
+        equilibrates=True,
+        heat="snap",
+        fold=Fold(tangent, falling, relative, warming),
     )
+    yield Constraint(edges=(snap,))
 
 
 def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises: Sequence[Rise]) -> Matrix:

@@ -25,14 +25,16 @@ import symengine
 from surfacechem.contracts.terms import Friction
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import far_field, law_reads
 from surfacechem.model.constraints.threshold import broken
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 
+SLIP = symengine.Symbol("slip")
 P = symengine.Symbol("p of an impact")
+EXERTED = Register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
 
 HIGH, VERY_HIGH = 1e50, 1e100
 """Pressures [Pa] between which friction has to grow in proportion, as it does at one that is infinite."""
@@ -40,86 +42,89 @@ HIGH, VERY_HIGH = 1e50, 1e100
 SOFTEN = "Let a potential bear the bodies, such as `penalty`."
 
 
-def slip_along_a_line(
-    build: Build,
-    slip: Expression,
+def along_a_line(
     needed: Expression,
     limit: Expression,
-    still: Expression,
+    back: Mapping[int, Expression],
+    breaks: Mapping[Expression, Expression],
     stops: Sequence[Expression],
     *,
     equilibrates: bool,
-) -> list[Edge]:
-    """Edges of one direction: ``needed`` is what sticking has to bear, ``still`` is zero where sliding stops.
+) -> Constraint:
+    """Edges of one direction: ``needed`` is what sticking has to bear, ``back`` is zero where sliding either way stops.
 
-    ``stops`` are the states that are zero from then on, the velocity where it has inertia. Gaps that are quasi-static
-    find their equilibrium, and others follow the bonds that break and their heat.
+    Sliding ``breaks`` bonds as it begins. ``stops`` are the states that are zero where it ends, the velocity where it
+    has inertia. Gaps that are quasi-static find their equilibrium, and others follow the bonds that break and their
+    heat.
     """
     # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
-    bears, breaks = where(limit > 0, limit, 0), _broken(build)
-    edges = [
+    bears = where(limit > 0, limit, 0)
+    begin = [
         Edge(
             f"slip {word}",
             bears - s * needed,
             f"sticking gives way and the interface slides {word}",
-            {slip: symengine.Integer(s)},
+            {SLIP: symengine.Integer(s)},
             breaks,
             equilibrates=equilibrates or bool(breaks),
             heat="local",
             strict=True,
-            when={slip: (0,)},
+            when={SLIP: (0,)},
         )
         for s, word in ((1, "forward"), (-1, "backward"))
     ]
     # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
     onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else NONE
     reset = dict.fromkeys(stops, NONE)
-    when, reason = {slip: (-1, 1)}, "sliding comes to a stop"
-    return [*edges, Edge("stop", still, reason, {slip: onward}, reset, strict=True, when=when)]
+    end = [
+        Edge("stop", guard, "sliding comes to a stop", {SLIP: onward}, reset, strict=True, when={SLIP: (s,)})
+        for s, guard in back.items()
+    ]
+    return Constraint(edges=(*begin, *end))
 
 
-def slip_in_the_plane(
-    build: Build,
-    slip: Expression,
+def in_the_plane(
     beyond: Expression,
     aim: Mapping[Expression, Expression],
     turn: Expression,
     still: Expression,
+    breaks: Mapping[Expression, Expression],
     stops: Sequence[Expression],
-) -> list[Edge]:
+) -> Constraint:
     """Edges of two directions: ``beyond`` is what sticking bears beyond the pull, ``aim`` the direction of slip."""
-    modes, reason = {slip: ONE, **aim}, "sticking gives way and the interface slides"
-    reset = {**_broken(build), turn: NONE}
-    begins = Edge("slip", beyond, reason, modes, reset, heat="local", strict=True, when={slip: (0,)})
+    modes, reason = {SLIP: ONE, **aim}, "sticking gives way and the interface slides"
+    reset = {**breaks, turn: NONE}
+    begins = Edge("slip", beyond, reason, modes, reset, heat="local", strict=True, when={SLIP: (0,)})
     # What has inertia slides on where sticking does not bear what pulls.
-    onward = {slip: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
-    modes, reset = onward if stops else {slip: NONE}, {turn: NONE, **dict.fromkeys(stops, NONE)}
-    reason, when = "sliding comes to a stop", {slip: (1,)}
-    return [begins, Edge("stop", still, reason, modes, reset, heat="local", strict=True, when=when)]
+    onward = {SLIP: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
+    modes, reset = onward if stops else {SLIP: NONE}, {turn: NONE, **dict.fromkeys(stops, NONE)}
+    reason, when = "sliding comes to a stop", {SLIP: (1,)}
+    stop = Edge("stop", still, reason, modes, reset, heat="local", strict=True, when=when)
+    return Constraint(edges=(begins, stop))
 
 
-def _broken(build: Build) -> dict[Expression, Expression]:
+def breaks_bonds(build: Build) -> dict[Expression, Expression]:
     """New values of the bonding variables where a law breaks the bonds as sliding begins."""
     law = next((law for law in build.interface.frictions if law.breaks_bonds), None)
     return {} if law is None else broken(build, law)
 
 
-def friction_impulse(build: Build, impulse: Expression) -> tuple[dict[Expression, Expression], list[Edge]]:
-    """What the ``impulse`` of the pressure [Pa s] takes from sliding that has a mass: modes it sets, and the edge."""
+def friction_impulse(
+    build: Build, impulse: Expression
+) -> tuple[list[Register], dict[Expression, Expression], list[Edge]]:
+    """What the ``impulse`` of the pressure [Pa s] takes from sliding that has a mass: register, its value, the edge."""
     laws = [law for law in build.interface.frictions if law_reads(law, "p")]
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
-        return {}, []
-    v = symengine.Symbol("speed" if len(sliding) == 2 else "v")
-    exerted = build.register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
-    slip = build.find_mode("slip")
+        return [], {}, []
+    v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), EXERTED.symbol
     ratio = build.energy.rubs * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
     loss = ratio * exerted / far_field(build, sliding[0].mount).m
-    stops = {} if slip is None else {slip: where(loss < absolute(v), slip, NONE)}
+    stops = {} if build.mode("slip") is None else {SLIP: where(loss < absolute(v), SLIP, NONE)}
     left = {v: where(loss < absolute(v), v - loss * sign(v), NONE)}
     due, reason = where(exerted > 0, -1, 1), "friction answers the impact"
     rub = Edge("rub", due, reason, {exerted: NONE, **stops}, left, heat="local")
-    return {exerted: where(absolute(v) > 0, impulse, NONE)}, [rub]
+    return [EXERTED], {exerted: where(absolute(v) > 0, impulse, NONE)}, [rub]
 
 
 def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:

@@ -12,7 +12,7 @@ Source: Sauer, Duong & Mandadapu (2021), eq. e:debond.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import symengine
@@ -20,13 +20,16 @@ import symengine
 from surfacechem.contracts.terms import Law, Limit
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends, derivative, where
-from surfacechem.model.automaton import Edge
+from surfacechem.model.automaton import Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import law_reads
+from surfacechem.model.components.mounting import held, law_reads
 
 Stoichiometry = Mapping[str, int | float]
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
+
+BONDED = Mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"})
+LOOSE = Register("loose", "whether the gaps have yet to follow a local jump")
 
 
 def variables(build: Build) -> None:
@@ -39,7 +42,7 @@ def variables(build: Build) -> None:
             start = where(build.variables.get("g_n", "the bonds", "interface") > 0, 0, 1)
             bonds = bonds_left(build)
             start = start if bonds is None else where(bonds > 0, 1, start)
-        return build.mode("bonded", 1.0, {0.0: "debonded", 1.0: "bonded"}, start)
+        return build.constrain(Constraint((replace(BONDED, start=start),))).modes[0].symbol
 
     given = ("mode", "interface.limits") if build.interface.limits else ("internal", "no limit of the traction")
     build.variables.define("bonded", bonded, *given)
@@ -53,68 +56,69 @@ def bonds_left(build: Build) -> Expression | None:
     return symengine.Add(*bonds) if bonds else None
 
 
-def laws(build: Build) -> None:
-    """Where a limit is reached bonds break; a rigid interface opens, and closes where the gap has closed."""
-    closed = build.find_mode("closed")
-    heals = [_limit(build, law, closed) for law in build.interface.limits]
+def laws(build: Build) -> Iterator[Constraint]:
+    """Bonds break where the traction passes a limit; where the strength is theirs they hold again as the gap closes."""
+    closed, heals = build.mode("closed"), []
+    for law in build.interface.limits:
+        stated, with_bonds = _limit(build, law, closed)
+        heals.append(with_bonds)
+        yield from stated
     again = {build.variables.get("bonded", "the limit"): ONE} if heals and all(heals) else {}
-    moves = "g_n" in build.motion.gap_rates
-    if closed is None:
+    if closed is not None:
+        build.heals = {closed: ONE, **again}
+    elif again and "g_n" in build.motion.gap_rates:
         # An elastic interface whose strength is that of its bonds can bond again where the gap has closed.
-        if again and moves:
-            gap = build.variables.get("g_n", "the limit", "interface")
-            reason = "the gap closes, so that bonds can hold again"
-            build.edges.append(Edge("rejoin", gap, reason, again, when=dict.fromkeys(again, (0,))))
-        return
-    if not build.interface.limits:
-        _opening(build, build.variables.get("t_n", "the rigid interface", "interface"), closed, {closed: (1,)})
-    build.motion.heals = {closed: ONE, **again}
-    gap = build.variables.get("g_n", "the rigid interface", "interface")
-    if not moves:
-        build.edges.append(Edge("touch", gap, "the gap closes", build.motion.heals, when={closed: (0,)}))
+        gap = build.variables.get("g_n", "the limit", "interface")
+        reason = "the gap closes, so that bonds can hold again"
+        yield Constraint(edges=(Edge("rejoin", gap, reason, again, when=dict.fromkeys(again, (0,))),))
 
 
-def _opening(build: Build, t_n: Expression, closed: Expression, when: Mapping[Expression, tuple[int]]) -> None:
-    """A rigid interface without bonds opens under tension; one that only touches zero does not part a mass."""
-    strict = any(state.name == "v_n" for state in build.states)
-    reason = "the interface opens"
-    build.edges.append(Edge("open", -t_n, reason, {closed: NONE}, equilibrates=True, strict=strict, when=when))
-
-
-def _limit(build: Build, law: Limit, closed: Expression | None) -> bool:
-    """State a limit; whether its strength is that of the bonds, so that it can come back with them."""
+def _limit(build: Build, law: Limit, closed: Expression | None) -> tuple[list[Constraint], bool]:
+    """A limit, and whether its strength is that of the bonds, so that it can come back with them."""
     if not build.variables.has("t_n"):
         message = "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
         raise InputError(message, law.place)
     bound = build.variables.bind(law, f"interface.limits.{law.name()}")
     strength = build.variables.call(bound, bound.statement)
     t_n, bonded = build.variables.get("t_n", law), build.variables.get("bonded", law)
-    if closed is None:
-        modes, when = [bonded], {bonded: (1,)}
-    else:
+    local = law.release == "local"
+    lost, when = [bonded], {bonded: (1,)}
+    if closed is not None:
         # Closed again, a rigid interface that has debonded bears pressure only.
         strength = bonded * strength
-        modes, when = [bonded, closed], {closed: (1,)}
-        if law.release == "local":
-            modes, when = [bonded], {bonded: (1,), closed: (1,)}
-            _opening(build, t_n, closed, {bonded: (0,), closed: (1,)})
-    breaks = broken(build, law, law.breaks)
+        when = {closed: (1,)}
+        lost, when = ([bonded], {bonded: (1,), **when}) if local else ([bonded, closed], when)
+    modes, breaks = dict.fromkeys(lost, NONE), broken(build, law, law.breaks)
     _refuse_idle(build, law, {*modes, *breaks})
-    build.edges.append(
-        Edge(
-            "debond",
-            strength - t_n,
-            "the interface debonds as its tensile strength is reached",
-            dict.fromkeys(modes, NONE),
-            breaks,
-            equilibrates=True,
-            heat=law.release,
-            violation=law.violation,
-            when=when,
-        )
+    stated = []
+    # Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do.
+    follow = local and _gaps_follow(build)
+    if follow:
+        modes[LOOSE.symbol] = ONE
+        reason, due = "the gap follows what gave way", {LOOSE.symbol: (1,)}
+        relax = Edge("relax", -ONE, reason, {LOOSE.symbol: NONE}, equilibrates=True, when=due)
+        stated.append(Constraint(registers=(LOOSE,), edges=(relax,), at_once=True))
+    debond = Edge(
+        "debond",
+        strength - t_n,
+        "the interface debonds as its tensile strength is reached",
+        modes,
+        breaks,
+        equilibrates=not follow,
+        heat=law.release,
+        violation=law.violation,
+        when=when,
     )
+    stated.append(Constraint(edges=(debond,)))
     expanded = build.expanded(strength)
-    return any(depends(expanded, symengine.Symbol(name)) for name in ("phi", *build.interface.bonds))
+    return stated, any(depends(expanded, symengine.Symbol(name)) for name in ("phi", *build.interface.bonds))
+
+
+def _gaps_follow(build: Build) -> bool:
+    """Whether any gap is in equilibrium, so that it moves at once where the tractions change."""
+    mount = held(build, "n")
+    normal = mount is not None and mount.quasi_static and "g_n" in build.motion.gap_rates
+    return normal or any(slip.in_equilibrium for slip in build.motion.slips)
 
 
 def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
@@ -128,19 +132,6 @@ def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
         "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
         law.place,
     )
-
-
-def jumps(build: Build) -> None:
-    """Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do."""
-    local = [j for j, item in enumerate(build.edges) if item.name == "debond" and item.heat == "local"]
-    if not (local and build.equilibria):
-        return
-    loose = build.register("loose", "whether the gaps have yet to follow a local jump")
-    for j in local:
-        item = build.edges[j]
-        build.edges[j] = replace(item, modes={**item.modes, loose: ONE}, equilibrates=False)
-    reason, when = "the gap follows what gave way", {loose: (1,)}
-    build.edges.insert(0, Edge("relax", -ONE, reason, {loose: NONE}, equilibrates=True, when=when))
 
 
 def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expression]:

@@ -16,13 +16,14 @@ Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.expressions import Expression, absolute, derivative, where
-from surfacechem.model.automaton import RESTS, Edge
+from surfacechem.model.automaton import RESTS, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
 from surfacechem.model.constraints.set_valued import friction_impulse
@@ -31,6 +32,8 @@ from surfacechem.tolerances import PICOMETRE, SOLVED
 
 NONE, ONE = symengine.Integer(0), symengine.Integer(1)
 G, V = symengine.symbols("g_n v_n")
+LANDED = Register("landed", "whether the bodies have met and do not rebound")
+FASTEST = Register("fastest", "speed of the fastest impact [m/s]")
 
 NOTHING, SLOWEST = 0.1, 10 * PICOMETRE
 """Part of the fastest impact, or of the time so far, that counts as none, in units of the relative tolerance; and the
@@ -56,67 +59,94 @@ TOUCHING = PICOMETRE
 REMEDY = "Give a potential that does, such as `penalty`."
 
 
-def laws(build: Build) -> None:
+def contact(pull: Expression, bonded: Expression, gap: Any = None, velocity: Any = None) -> Constraint:
+    """A rigid contact that ``pull`` opens; it is closed at the start where bonds hold it, or nothing pulls.
+
+    ``gap`` and ``velocity`` are those of what moves by a balance of its own.
+    """
+    start = where(bonded > 0, 1, where(pull > 0, 0, 1))
+    if velocity is not None:
+        start = where(absolute(velocity) > 0, 0, start)
+    if gap is not None:
+        start = where(gap > 0, 0, start)
+    mode = Mode("closed", 1.0 if gap is None else 0.0, {0.0: "open", 1.0: "closed"}, start)
+    return Constraint((mode,), active=1 - mode.symbol, reaction=mode.symbol * pull)
+
+
+def laws(build: Build) -> Iterator[Constraint]:
+    """A rigid contact opens under tension where no bonds hold it; where the gap follows at once it closes as well."""
+    closed, limits = build.mode("closed"), build.interface.limits
+    if closed is None:
+        return
+    t_n = build.variables.get("t_n", "the rigid interface", "interface")
+    debonded = {build.variables.get("bonded", "the rigid interface"): (0,)} if limits else {}
+    if not limits or any(law.release == "local" for law in limits):  # else what debonds opens
+        # What only touches zero does not part a mass.
+        strict, when = any(state.name == "v_n" for state in build.states), {**debonded, closed: (1,)}
+        opens = Edge("open", -t_n, "the interface opens", {closed: NONE}, equilibrates=True, strict=strict, when=when)
+        yield Constraint(edges=(opens,))
+    gap = build.variables.get("g_n", "the rigid interface", "interface")
+    if "g_n" not in build.motion.gap_rates:
+        yield _closing(Edge("touch", gap, "the gap closes", build.heals, when={closed: (0,)}))
+
+
+def _closing(touch: Edge) -> Constraint:
+    """An edge that closes the contact; what loads press together closes as they jump, too."""
+    pressed = {mode: where(touch.masked < 0, value, mode) for mode, value in touch.modes.items()}
+    return Constraint(edges=(touch,), beside=lambda edge: pressed if edge.times else {})
+
+
+def impacts(build: Build) -> Iterator[Constraint]:
     """How a gap that moves closes: where it has a mass by an impact, after which the bodies rebound or rest."""
-    closed = build.find_mode("closed")
+    closed = build.mode("closed")
     if closed is None or "g_n" not in build.motion.gap_rates:
         return
     mount = held(build, "n")
     assert mount is not None
     shut, apart = {G: NONE}, {closed: (0,)}
     if not mount.inertial:
-        closes = Edge("touch", G, "the gap closes", build.motion.heals, shut, equilibrates=True, when=apart)
-        build.edges.append(closes)
+        yield _closing(Edge("touch", G, "the gap closes", build.heals, shut, equilibrates=True, when=apart))
         return
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
-    landed = build.register("landed", "whether the bodies have met and do not rebound")
     rests, remembered = _rests(build, far, speed, pressing)
-    begins, rubs = friction_impulse(build, (1 + far.e) * far.m * speed)
+    impulse, answers, rubs = friction_impulse(build, (1 + far.e) * far.m * speed)
+    hits = Edge(
+        "impact",
+        G,
+        "the bodies hit each other",
+        {LANDED.symbol: rests, **remembered, **answers},
+        {**shut, V: where(rests > 0, NONE, far.e * speed)},
+        returns=where(pressing > 0, 2 * V / pressing, NONE),
+        when=apart,
+    )
+    calm, reason = {LANDED.symbol: NONE, **build.heals}, "the bodies rest on each other"
+    rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
+    registers = (LANDED, *([FASTEST] if remembered else []), *impulse)
     # What follows at the same moment comes before what would slide as long as the contact is open.
-    build.edges[:0] = [
-        Edge(
-            "impact",
-            G,
-            "the bodies hit each other",
-            {landed: rests, **remembered, **begins},
-            {**shut, V: where(rests > 0, NONE, far.e * speed)},
-            returns=where(pressing > 0, 2 * V / pressing, NONE),
-            when=apart,
-        ),
-        *rubs,
-        Edge(
-            "rest",
-            -ONE,
-            "the bodies rest on each other",
-            {landed: NONE, **build.motion.heals},
-            equilibrates=True,
-            when={landed: (1,)},
-        ),
-    ]
+    yield Constraint(registers=registers, edges=(hits, *rubs, rest), at_once=True)
 
 
 def _rests(
     build: Build, far: FarField, speed: Expression, pressing: Expression
 ) -> tuple[Expression, dict[Expression, Expression]]:
-    """One where the bodies do not rebound, else zero; and the registers that this needs."""
+    """One where the bodies do not rebound, else zero; and what this remembers."""
     if far.e == 0:
         return ONE, {}
     tolerance = build.constant("tolerance", TOLERANCE, Spec("1", "relative tolerance of the run"), 0.0, internal=True)
-    fastest = build.register("fastest", "speed of the fastest impact [m/s]")
-    swift = where(speed > fastest, speed, fastest)
+    swift = where(speed > FASTEST.symbol, speed, FASTEST.symbol)
     rebound = far.e * speed
     nothing = NOTHING * tolerance
     # This flight takes 2 rebound / pressing, and all that follow together 1 / (1 - e) times as long.
     brief = pressing * build.t * ((1 - far.e) * nothing + BRIEF)
     slow = where(rebound < nothing * (swift + SLOWEST), 1, where(2 * rebound < brief, 1, 0))
     at_once = build.constant("rests_at", RESTS, Spec("s", "time at which rebounds rest"), -1.0, internal=True)
-    return where(build.t > at_once, slow, 1), {fastest: swift}
+    return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 
 
 def jumps(build: Build) -> None:
     """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
-    if not any(register.name == "landed" for register in build.registers):
+    if LANDED not in build.registers:
         return
     found = [law.name() for law in build.interface.reactions if law_reads(law, "p") or law_reads(law, "t_n")]
     if not build.motion.slips:  # the velocity of sliding is prescribed, and its drive does the work of friction

@@ -56,6 +56,8 @@ class Formulation:
     """Whether some friction has a limit below which nothing slides."""
     rate_dependent: bool
     """Whether what resists sliding depends on its velocity."""
+    in_equilibrium: bool
+    """Whether a gap of it moves at once where the tractions change."""
     slides: bool
     """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
 
@@ -154,7 +156,10 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     if not elastic and mount is not None:
         rate_dependent = rate_dependent or mount.damped
     sticks = any(law.has_limit for law in laws)
-    return Formulation(d, mount, elastic, sticks, rate_dependent, bool(laws) or not elastic)
+    stiff = elastic or mount is None or mount.law.k > 0 or bool(in_parallel(build))  # else under a dead load alone
+    at_once = not rate_dependent and (elastic or mount is None or mount.quasi_static)
+    at_once = at_once or (elastic and mount is not None and mount.quasi_static)
+    return Formulation(d, mount, elastic, sticks, rate_dependent, stiff and at_once, bool(laws) or not elastic)
 
 
 def evolve(build: Build, name: str, *, algebraic: bool = False, scale: float = LENGTH) -> Expression:

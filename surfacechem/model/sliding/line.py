@@ -15,11 +15,11 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, sign, where
-from surfacechem.model.automaton import Equilibrium, When
+from surfacechem.model.automaton import Constraint, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import KEYS, FarField, far_field
-from surfacechem.model.constraints.set_valued import slip_along_a_line
+from surfacechem.model.constraints.set_valued import SLIP, along_a_line, breaks_bonds
 from surfacechem.model.sliding import rate_and_state
 from surfacechem.model.sliding.formulation import (
     NONE,
@@ -45,7 +45,7 @@ def states(build: Build, kind: Formulation) -> None:
     v, rates = kind.d.velocity, build.motion.gap_rates
     if kind.sticks:
         start = sign(symengine.Symbol("v")) if kind.slides_inertially else None
-        slip = build.mode("slip", 0.0, WORDS, start)
+        slip = build.constrain(Constraint((Mode("slip", 0.0, WORDS, start),), active=SLIP**2)).modes[0].symbol
         build.variables.define("direction", lambda: slip, "mode", "sticks or slides")
         build.variables.define("sticking", lambda: 1 - slip**2, "mode", "sticks or slides")
     if kind.mount is not None:
@@ -116,7 +116,7 @@ def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
     return build.name(VARIABLES[kind.d.velocity], build.variables.get("direction", "sliding") ** 2 * rate)
 
 
-def motion(build: Build, kind: Formulation) -> Iterator[Power]:
+def motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint]:
     """Balance of the tractions in one direction, and the edges between sticking and sliding."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
@@ -145,15 +145,10 @@ def motion(build: Build, kind: Formulation) -> Iterator[Power]:
     name_traction(build, d, slides, t_a + carried, t_a + held)
     if kind.sticks and "sticks" not in (margin.name for margin in build.margins):
         limit = build.motion.stick_limits["t"] * (1 if kind.elastic else rubs)
-        _slip(build, kind, needed, limit, _still(build, kind, needed, t_f, v))
-
-
-def _slip(build: Build, kind: Formulation, needed: Expression, limit: Expression, still: Expression) -> None:
-    """The edges between sticking and sliding."""
-    stops = [symengine.Symbol(_velocity_state(build, kind))] if kind.slides_inertially else []
-    equilibrates = not (kind.slides_inertially or kind.rate_dependent)
-    slip = build.variables.get("direction", "sliding")
-    build.edges += slip_along_a_line(build, slip, needed, limit, still, stops, equilibrates=equilibrates)
+        stops = [symengine.Symbol(_velocity_state(build, kind))] if kind.slides_inertially else []
+        equilibrates = not (kind.slides_inertially or kind.rate_dependent)
+        back = {s: build.expanded(_still(build, kind, s, needed, t_f, v)).subs({SLIP: s}) for s in (1, -1)}
+        yield along_a_line(needed, limit, back, breaks_bonds(build), stops, equilibrates=equilibrates)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
@@ -227,7 +222,7 @@ def _elastic_rows(
 
 def _while_sliding(build: Build, slides: Expression) -> When:
     """Modes in which the interface slides; any, where it cannot stick."""
-    slip = build.find_mode("slip")
+    slip = build.mode("slip")
     return {slip: (-1, 1)} if slip is not None and depends(slides, slip) else {}
 
 
@@ -257,13 +252,14 @@ def _sliding_row(build: Build, kind: Formulation, slides: Expression, driving: E
     build.margins.append(Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(build, slides)))
 
 
-def _still(build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression) -> Expression:
-    """What is zero where sliding stops, positive in the direction of sliding.
+def _still(
+    build: Build, kind: Formulation, slip: int, needed: Expression, t_f: Expression, v: Expression
+) -> Expression:
+    """What is zero where sliding stops, positive in the direction ``slip`` of sliding.
 
     Where tractions alone give a velocity, in proportion, it is their balance at rest: what is left of this as sliding
     begins is rounding, which must not stop it.
     """
-    slip = build.variables.get("direction", "sliding")
     if kind.slides_inertially:
         return slip * symengine.Symbol(_velocity_state(build, kind))
     if str(v) not in build.motion.slides_by or build.motion.creeping is not None:

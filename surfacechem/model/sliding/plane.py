@@ -28,10 +28,11 @@ import symengine
 
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
+from surfacechem.model.automaton import Constraint, Mode, Register
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, LENGTH, FarField, far_field
-from surfacechem.model.constraints.set_valued import slip_in_the_plane
+from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, in_the_plane
 from surfacechem.model.sliding.formulation import (
     NONE,
     PLACE,
@@ -45,7 +46,8 @@ from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL
 
-SPEED, TURNED, SLIDES = symengine.symbols("speed turn slip")
+SPEED, TURNED = symengine.symbols("speed turn")
+SLIDES = SLIP
 BEGAN = symengine.symbols("began began_2")
 WORDS = {0.0: "sticks", 1.0: "slides"}
 
@@ -89,7 +91,12 @@ def states(build: Build, kinds: Sequence[Formulation]) -> None:
             PLACE,
         )
     role = "evolved" if inertial else "algebraic"
-    slip = build.mode("slip", 0.0, WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
+    mode = Mode("slip", 0.0, WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
+    began = [
+        Register(str(b), "component of the direction in which sliding began", initial, partial(_began, v))
+        for b, initial, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True)
+    ]
+    slip = build.constrain(Constraint((mode,), tuple(began), active=SLIDES)).active
     build.variables.define("sticking", lambda: 1 - slip, "mode", "sticks or slides")
     for kind in kinds:
         u = evolve(build, kind.d.displacement)
@@ -102,8 +109,6 @@ def states(build: Build, kinds: Sequence[Formulation]) -> None:
         for j, v, of in ((-2, "v", _speed), (-1, "v_2", _straight)):
             given = Given(VARIABLES[v], start[f"initial.{v}"], of)
             build.states[j] = replace(build.states[j], initial=of(start), given=given)
-    for axis, initial, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True):
-        build.register(str(axis), "component of the direction in which sliding began", initial, partial(_began, v))
     for kind, cosine in zip(kinds, _unit_vector(), strict=True):
         build.variables.define(kind.d.cosine, partial(_same, slip * cosine), role, "turn")
         velocity = build.name(VARIABLES[kind.d.velocity], SPEED * cosine)
@@ -129,7 +134,7 @@ def _began(v: str, values: Mapping[str, float]) -> float:
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
-def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power]:
+def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power | Constraint]:
     """Balances along and across the direction of sliding, and the edges between sticking and sliding."""
     sides = [_side(build, kind) for kind in kinds]
     for side in sides:
@@ -140,7 +145,7 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power]:
     still = _inertial(build, sides) if kinds[0].inertial else _steady(build, sides)
     beyond = _largest(sides) - norm(*_scaled(sides))
     stops = (SPEED,) if kinds[0].inertial else ()
-    build.edges += slip_in_the_plane(build, SLIDES, beyond, _aim(build, sides), TURNED, still, stops)
+    yield in_the_plane(beyond, _aim(build, sides), TURNED, still, breaks_bonds(build), stops)
 
 
 def _side(build: Build, kind: Formulation) -> Side:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from surfacechem.expressions import Expression, norm, sign, where
+from surfacechem.model.automaton import Constraint
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG
@@ -60,7 +61,7 @@ def _along_displacement(build: Build) -> Expression:
     return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
 
 
-def laws(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power | Constraint]:
     """Balance of the tangential tractions, and the edges between sticking and sliding."""
     if _in_the_plane(build.motion.slips):
         yield from plane.motion(build, build.motion.slips)
