@@ -131,7 +131,7 @@ class ReactorNet(cantera.ReactorNet):
         self._arrive(self.time)
         return float(self.time)
 
-    def advance_to_steady_state(  # type: ignore[override] - the stub has overloads by `return_residuals`
+    def advance_to_steady_state(  # type: ignore[override]  # its stub has overloads
         self,
         max_steps: int = 10000,
         residual_threshold: float = 0.0,
