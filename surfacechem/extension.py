@@ -12,9 +12,12 @@ import math
 import warnings
 import weakref
 from collections.abc import Collection, Mapping
+from functools import cached_property
 from typing import Any, ClassVar
 
 import cantera
+import numpy as np
+import symengine
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
@@ -26,6 +29,7 @@ from surfacechem.mechanism.source import sides
 from surfacechem.mechanism.thermo import KILO
 from surfacechem.mechanism.values import converted, own_parameters
 from surfacechem.quantities import BOLTZMANN, VARIABLES
+from surfacechem.solve.contract import Array
 from surfacechem.tolerances import TINY
 
 __all__ = ["LoadedInterface"]
@@ -57,19 +61,30 @@ class Surroundings(cantera.ExtensibleRateData):
         super().__init__()
         self.T = 0.0
         self.names: list[str] = []
-        self.coverages: dict[str, float] = {}
         self.surface: Any = None
+        self._coverages: dict[str, float] | None = None
 
     def update(self, surface: Any) -> bool:
         """Take over the state; always, since a force can change at constant temperature."""
-        self.T = surface.T
+        self.T, self._coverages = surface.T, None
         if not self.names:
             self.names = [surface.species(k).name for k in range(surface.n_species)]
-        coverages = getattr(surface, "coverages", None)  # a clone is no Interface; it has lost its load too
-        self.coverages = dict(zip(self.names, coverages.tolist(), strict=True)) if coverages is not None else {}
         # Only what takes attributes can be referred to weakly; a strong reference would keep the surface alive.
         self.surface = weakref.ref(surface) if hasattr(surface, "__weakref__") else None
+        if self.surface is None:
+            self._coverages = self._of(surface)
         return True
+
+    @property
+    def coverages(self) -> dict[str, float]:
+        """Coverages by species, taken from the surface where a rate reads one."""
+        if self._coverages is None:
+            self._coverages = self._of(self.surface())
+        return self._coverages
+
+    def _of(self, surface: Any) -> dict[str, float]:
+        coverages = getattr(surface, "coverages", None)  # a clone is no Interface; it has lost its load too
+        return dict(zip(self.names, coverages.tolist(), strict=True)) if coverages is not None else {}
 
     def read(self, name: str, kind: str) -> Any:
         """An attribute of the surface; there is no default, since a load that was forgotten is not zero."""
@@ -82,6 +97,14 @@ class Surroundings(cantera.ExtensibleRateData):
                 f"its attribute `{name}`, and do not let Cantera clone it."
             )
         return getattr(surface, name)
+
+
+class _Symbols(dict[str, Any]):
+    """Symbols by name, made where a formula asks for them."""
+
+    def __missing__(self, name: str) -> Any:
+        self[name] = symengine.Symbol(name)
+        return self[name]
 
 
 class LoadedRate(cantera.ExtensibleRate):
@@ -170,14 +193,25 @@ class LoadedRate(cantera.ExtensibleRate):
                 "would be wrong. Write two one-way reactions."
             )
 
+    @cached_property
+    def coefficient(self) -> tuple[tuple[str, ...], Any, Array, Array]:
+        """What the coefficient reads beside the temperature, its function, and room for arguments and value."""
+        assert self.bound is not None
+        symbols = _Symbols(T_c=symengine.Symbol("T_c"))
+        expression = self.bound.coefficient(symbols, 0.0)
+        made = symengine.Lambdify(list(symbols.values()), [expression])
+        _, *names = symbols
+        return tuple(names), made.unsafe_real, np.zeros(len(symbols)), np.zeros(1)
+
     def eval(self, data: Any) -> float:
         """Rate coefficient in kmol, m and s."""
         assert self.bound is not None
-        values: dict[str, Any] = {"T_c": data.T, **data.coverages}
-        for name in self.bound.own_reads():
-            if name not in values:
-                values[name] = self._load(data, name)
-        found = float(self.bound.coefficient(values, 0.0))
+        names, evaluate, values, result = self.coefficient
+        values[0] = data.T
+        for i, name in enumerate(names, start=1):
+            values[i] = data.coverages[name] if name in data.names else self._load(data, name)
+        evaluate(values, result)
+        found = float(result[0])
         largest = max(self.bound.A * data.T**self.bound.b, 1.0) * math.exp(EXPONENT_CAP)
         if not self.capped and found > largest:
             self.capped = True
@@ -191,7 +225,7 @@ class LoadedRate(cantera.ExtensibleRate):
 
     def _load(self, data: Surroundings, name: str) -> float:
         value = data.read(name, self.kind)
-        if not isinstance(value, Mapping):
+        if isinstance(value, float) or not isinstance(value, Mapping):  # the first is by far the cheaper question
             return float(value)
         found = next((species for species in self.species if species in value), None)
         if found is None:

@@ -245,13 +245,19 @@ def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool
 
     With `reactions: declared-species` Cantera leaves out those of other species.
     """
-    known = set(surface.kinetics_species_names)
-    own = [
-        entry
-        for entry in source.reactions(phase)
-        for reactants, products, _ in (sides(str(entry["equation"])),)
-        if {*reactants, *products} <= known
-    ]
+    known = dict.fromkeys(surface.kinetics_species_names)
+    declared = {name.casefold(): name for name in known}
+    own = []
+    for entry in source.reactions(phase):
+        reactants, products, _ = sides(str(entry["equation"]))
+        others = [name for name in (*reactants, *products) if name not in known]
+        # Cantera takes a name in another case for the declared one; here two names would stand for one species.
+        for name in others:
+            if name.casefold() in declared:
+                message = f"reaction {entry['equation']}: no species '{name}'. Write '{declared[name.casefold()]}'."
+                raise source.error(message, entry, "equation")
+        if not others:
+            own.append(entry)
     beside, names = has_neighbours(phase), surface.species_names
     pairs = zip(surface.reactions(), own, strict=True)
     return [(x, entry, is_evaluated(entry, names, beside) or x.rate.uses_electrochemistry) for x, entry in pairs]

@@ -311,3 +311,11 @@ def test_what_neighbours_do_not_hold_is_told(tmp_path):
     assert any(
         "the neighbours hold no H2, H2O, CO, CO2, which reactions make" in text for text in simulation.system.warnings
     )
+
+
+def test_species_in_another_case_than_declared_are_told(tmp_path):
+    case = written(tmp_path, ("ptcombust.yaml", "Pt_surf"))
+    file = tmp_path / "ptcombust.yaml"
+    file.write_text(file.read_text().replace("equation: H + PT(S) => H(S)", "equation: H + Pt(s) => H(S)"))
+    with pytest.raises(InputError, match=r"ptcombust\.yaml:\d+: reaction H \+ Pt\(s\) .* Write 'PT\(S\)'"):
+        surfacechem.load(case)
