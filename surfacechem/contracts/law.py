@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, dataclass_transform
 
+from surfacechem.contracts.units import quotient
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression
-from surfacechem.units import quotient
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+from surfacechem.contracts.units import parse
 from surfacechem.documents import document
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.laws.loading import Table
-from surfacechem.units import parse
 
 TEXTS = {
     "file": "a CSV file beside the case; its first line is like t [s], w_n [um]",

@@ -28,12 +28,12 @@ from typing import Any, ClassVar, TypeVar
 
 from surfacechem import laws
 from surfacechem.contracts.terms import Factor, Law, Load, Spec, Varying, resolved_unit
+from surfacechem.contracts.units import parse as si
+from surfacechem.contracts.units import quotient
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place
 from surfacechem.format import csvtable
 from surfacechem.quantities import INTERNAL, VARIABLES
-from surfacechem.units import parse as si
-from surfacechem.units import quotient
 
 Schema = dict[str, Any]
 

@@ -15,6 +15,7 @@ from surfacechem import laws, references
 from surfacechem import solve as solvers
 from surfacechem.contracts.substances import Property
 from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
+from surfacechem.contracts.units import quotient
 from surfacechem.documents.document import Tree
 from surfacechem.format.declarations import (
     NODE,
@@ -46,7 +47,6 @@ from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
 from surfacechem.solve.run import DEFAULT_RTOL, OWN
-from surfacechem.units import quotient
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 

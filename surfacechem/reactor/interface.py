@@ -13,6 +13,7 @@ import numpy as np
 
 from surfacechem import format as cases
 from surfacechem.contracts.terms import Spec
+from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError
 from surfacechem.format import Case
 from surfacechem.reactor.coupling import Port, node_of, refuse, suffix_of
@@ -22,7 +23,6 @@ from surfacechem.runs.simulation import Simulation
 from surfacechem.solve.adapters.cantera_network import BackOffError, HeldReactor, contents
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import DIGITS, ROUNDING
-from surfacechem.units import parse
 
 if TYPE_CHECKING:
     import xarray

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surfacechem import format as cases
+from surfacechem.contracts.units import parse
 from surfacechem.documents.document import from_plain
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError, Place, suggestion
@@ -26,7 +27,6 @@ from surfacechem.results.solution import Solution
 from surfacechem.scene import Scene
 from surfacechem.solve import AUTO
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
-from surfacechem.units import parse
 
 if TYPE_CHECKING:
     from surfacechem.format.plans import Plan

@@ -27,6 +27,9 @@ BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
 BUDGET = 10.0
 """A solver at one value is not timed again once it has taken this long [s]."""
 
+LOOSEST = 0.1
+"""Relative tolerance above which no solver is asked."""
+
 FAULTS = (ArithmeticError, RuntimeError, ValueError)
 """Errors with which libraries end that cannot even say how a run failed."""
 
@@ -37,8 +40,8 @@ class Cell:
 
     outcome: str
     reason: str
-    counters: Counters | None = field(default=None, kw_only=True)
-    """Counts of the solver; None where nothing was run."""
+    counters: Counters = field(default_factory=Counters, kw_only=True)
+    """Counts of the solver; of no run where there are no seconds."""
     seconds: list[float] = field(default_factory=list, kw_only=True)
     """Run times; of a failed solve, the time that it took to fail."""
     stepping: list[float] = field(default_factory=list, kw_only=True)
@@ -52,7 +55,7 @@ class Cell:
     def count(self, name: str) -> float:
         """A count of the solver; not a number where its library does not tell."""
         counters = self.counters
-        if counters is None or (name == "rejected" and not solver(self.solver).counts_rejected):
+        if not self.seconds or (name == "rejected" and not solver(self.solver).counts_rejected):
             return math.nan
         if name == "factorizations" and counters.jacobians > 0 and counters.factorizations == 0:
             return math.nan
@@ -107,24 +110,21 @@ def _time_again(cell: Cell) -> None:
         cell.stepping += done.stepping
 
 
-def check_solvers(wanted: Sequence[str], path: str) -> None:
-    """InputError for a solver that there is not, and for none."""
-    for name in wanted:
+def check_options(
+    solvers: Sequence[str], tolerances: Sequence[float], rounds: int, bounds: tuple[int, int], options: Sequence[str]
+) -> None:
+    """InputError for a solver that there is not, a tolerance that no solver takes, rounds out of bounds, and for none
+    of the first two; ``options`` names the three.
+    """
+    for name in solvers:
         if name not in names:
-            raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=path))
-    if not wanted:
-        raise InputError("at least one is needed.", Place(path=path))
-
-
-def check_tolerances(wanted: Sequence[float], path: str) -> None:
-    """InputError for a tolerance that no solver takes, and for none."""
-    for rtol in wanted:
-        check_range(rtol, 0 < rtol <= 0.1, "> 0 and <= 0.1", path)
-    if not wanted:
-        raise InputError("at least one is needed.", Place(path=path))
-
-
-def check_range(value: float, inside: bool, allowed: str, path: str) -> None:
-    """InputError for a value that is not ``inside`` of what is ``allowed``."""
-    if not inside:
-        raise InputError(f"{value:g} is outside its range: {allowed}.", Place(path=path))
+            raise InputError(f"no solver '{name}'.{suggestion(name, names)}", Place(path=options[0]))
+    for rtol in tolerances:
+        if not 0 < rtol <= LOOSEST:
+            raise InputError(f"{rtol:g} is outside its range: > 0 and <= {LOOSEST:g}.", Place(path=options[1]))
+    for given, option in zip((solvers, tolerances), options, strict=False):
+        if not given:
+            raise InputError("at least one is needed.", Place(path=option))
+    low, high = bounds
+    if not low <= rounds <= high:
+        raise InputError(f"{rounds} is outside its range: >= {low} and <= {high}.", Place(path=options[2]))

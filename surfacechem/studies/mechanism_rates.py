@@ -70,21 +70,15 @@ class Curves:
         self._known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
         for name, spring in springs.items():
             self._known[f"f_{self.species[name].variable}"] = spring.stiffness * (gap - spring.rest_length)
-        # Every number of a law is a symbol: the logarithm of one that is zero is infinite only when it is evaluated.
-        self._bound: dict[str, InterfaceArrhenius] = {}
-        self._numbers: dict[Expression, float] = {}
-        for label, law in self.laws.items():
-            symbols = {name: symengine.Symbol(f"{label}.{name}") for name, _ in law.specs()}
-            self._bound[label] = law.bind(symbols)
-            self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in symbols.items()}
-        # Without interactions, so that standard states depend on no coverage.
-        plain = [
-            law.bind({"species": tuple(replace(item, interactions=()) for item in law.species)})
-            if isinstance(law, IdealMixture)
-            else law
-            for law in mechanism.potentials
-        ]
-        self._psi = sum(self._call(law.statement) for law in plain)
+        self._numbers = {
+            symbol: float(getattr(law, name)) for law in self.laws.values() for name, symbol in _symbols(law).items()
+        }
+        self._psi: Expression = 0
+        for potential in mechanism.potentials:
+            if isinstance(potential, IdealMixture):  # without interactions, so that no standard state has a coverage
+                plain = tuple(replace(item, interactions=()) for item in potential.species)
+                potential = potential.bind({"species": plain})
+            self._psi += self._call(potential.statement)
 
     @property
     def loaded(self) -> bool:
@@ -128,7 +122,8 @@ class Curves:
 
     def _log_rate(self, labels: Iterable[str], change: Mapping[str, int | float]) -> Expression:
         """Over the amount of the bond that the reaction makes or breaks."""
-        total = log_sum([self._call(self._bound[label].log_forward) for label in labels])
+        laws = (self.laws[label] for label in labels)
+        total = log_sum([self._call(law.bind(_symbols(law)).log_forward) for law in laws])
         return total - log(min(self._amounts[name] for name in change))
 
     def _log_equilibrium(self, change: Mapping[str, int | float], paired: bool) -> Expression:
@@ -145,6 +140,11 @@ class Curves:
         function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [full], cse=True)
         points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
         return np.asarray(function(points), dtype=np.float64)[..., 0]
+
+
+def _symbols(law: InterfaceArrhenius) -> dict[str, Expression]:
+    """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
+    return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
 
 
 @dataclass(frozen=True)
@@ -170,12 +170,18 @@ class ReactionCycle:
 
 def cycles(curves: Curves) -> list[ReactionCycle]:
     """Independent cycles that hold at least one pair or one-way reaction; others agree by construction."""
+    from sympy import Matrix  # slow to import
+
     paired = {label for pair in curves.pairs for label in pair.labels}
     steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
     changes = [curves.laws[step].change if isinstance(step, str) else step.change for step in steps]
+    names = dict.fromkeys(name for change in changes for name in change)
+    rows = [[Fraction(change.get(name, 0)).limit_denominator(1000) for change in changes] for name in names]
     found = []
-    for row in _null_space(changes):
-        taken = [(step, times) for step, times in zip(steps, row, strict=True) if times]
+    # Combinations of changes that are none, one for each change that depends on those before it.
+    for row in Matrix(rows).nullspace() if rows else ():
+        scale = lcm(*(int(value.q) for value in row))
+        taken = [(step, int(value * scale)) for step, value in zip(steps, row, strict=True) if value]
         if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
             found.append(ReactionCycle(taken))
     return found
@@ -193,24 +199,3 @@ def cycle_verdict(cycle: ReactionCycle, curves: Curves, temperatures: Array, for
     if abs(worst) <= ROUNDED:
         return f"the product of k_f/k_r is 1 to within {abs(worst):.1e}"
     return f"INCONSISTENT: the product of k_f/k_r is not 1 but exp({worst:.3g}) at most, which no thermo allows"
-
-
-def _null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
-    """Integer combinations of changes that are none, one for each change that depends on those before it."""
-    reduced: list[tuple[str, dict[str, Fraction], list[Fraction]]] = []
-    found = []
-    for k, change in enumerate(changes):
-        rest = {name: Fraction(nu).limit_denominator(1000) for name, nu in change.items() if nu}
-        made = [Fraction(int(i == k)) for i in range(len(changes))]
-        for pivot, other, combination in reduced:
-            factor = rest.get(pivot, Fraction(0)) / other[pivot]
-            for name, value in other.items():
-                rest[name] = rest.get(name, Fraction(0)) - factor * value
-            made = [a - factor * b for a, b in zip(made, combination, strict=True)]
-        rest = {name: value for name, value in rest.items() if value}
-        if rest:
-            reduced.append((next(iter(rest)), rest, made))
-        else:
-            scale = lcm(*(value.denominator for value in made))
-            found.append([int(value * scale) for value in made])
-    return found

@@ -5,25 +5,23 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, Place
-from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.mechanism.source import Source
 from surfacechem.results.detailed_balance import said
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.summaries import columns
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles
 from surfacechem.tolerances import ROUNDING
-from surfacechem.units import parse
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -78,25 +76,34 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     """Everything about a mechanism, one fact a line."""
     shown, grid = reference(temperatures), _grid(curves, temperatures, forces)
     T, f = temperatures.values(), forces.values()
-    hot = _table(curves, "T [K]", T, T, np.zeros(1))
-    pulled = _table(curves, "f [pN]", f * 1e12, np.array(shown), f) if curves.loaded else ()
-    around = [(" ".join(cycle.labels), cycle_verdict(cycle, curves, *grid)) for cycle in cycles(curves)]
-    sections = [
-        f"phase {curves.mechanism.phase}, {curves.site_density:.6g} sites/m^2",
-        _section(f"Species at {shown:g} K, without force", _species(curves, shown)),
-        "\n".join(["Reactions", *_reactions(curves, temperatures, forces)]),
-        _section("Cycles", around),
-        _section("Against temperature, without force; rates per bond at coverages of one", hot),
-        _section(f"Against the force on {curves.pulled or 'a bond'}, at {shown:g} K", pulled),
-        "\n".join(["Rate types", *map(_source, dict.fromkeys(map(type, curves.laws.values())))]),
-        _section("Remarks", [(remark,) for remark in remarks(curves)]),
-    ]
-    return "\n\n".join(part for part in sections if part)
-
-
-def _section(heading: str, rows: Iterable[Sequence[str]]) -> str:
-    lines = [f"  {line}" for line in columns(rows)]
-    return "\n".join([heading, *lines]) if lines else ""
+    reactions = []
+    for label, law in curves.laws.items():
+        place = f"{law.place.file}:{law.place.line}" if law.place else ""
+        units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
+        numbers = [f"{name} = {getattr(law, name):.6g} {unit}".removesuffix(" 1") for name, unit in units.items()]
+        balance = verdict(curves, label, temperatures, forces)
+        reactions += [f"{label}  {law.equation}  ({law.kind}, {place})", f"    {', '.join(numbers)}", f"    {balance}"]
+    types = []
+    for kind in dict.fromkeys(map(type, curves.laws.values())):
+        text = f"{kind.kind}: {source(kind)}".replace("``", "")
+        types += textwrap.wrap(text, WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
+    cold, pulled = np.array([shown]), curves.pulled or "a bond"
+    sections = {
+        f"Species at {shown:g} K, without force": columns(_species(curves, shown)),
+        "Reactions": reactions,
+        "Cycles": columns((" ".join(cycle.labels), cycle_verdict(cycle, curves, *grid)) for cycle in cycles(curves)),
+        "Against temperature, without force; rates per bond at coverages of one": columns(
+            _table(curves, "T [K]", T, T, np.zeros(1))
+        ),
+        f"Against the force on {pulled}, at {shown:g} K": columns(_table(curves, "f [pN]", f * 1e12, cold, f))
+        if curves.loaded
+        else [],
+        "Rate types": types,
+        "Remarks": list(remarks(curves)),
+    }
+    head = f"phase {curves.mechanism.phase}, {curves.site_density:.6g} sites/m^2"
+    parts = ["\n  ".join([heading, *lines]) for heading, lines in sections.items() if lines]
+    return "\n\n".join([head, *parts])
 
 
 def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
@@ -113,16 +120,6 @@ def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
 def _number(value: float, digits: int = 6) -> str:
     """A difference of numbers of up to a thousand [kJ/mol]; rounding is shown as zero."""
     return f"{value:.{digits}g}" if abs(value) > 1e3 * ROUNDING else "0"
-
-
-def _reactions(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:
-    for label, law in curves.laws.items():
-        place = f"{law.place.file}:{law.place.line}" if law.place else ""
-        units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
-        numbers = [f"{name} = {getattr(law, name):.6g} {unit}".removesuffix(" 1") for name, unit in units.items()]
-        yield f"  {label}  {law.equation}  ({law.kind}, {place})"
-        yield f"      {', '.join(numbers)}"
-        yield f"      {verdict(curves, label, temperatures, forces)}"
 
 
 def verdict(curves: Curves, label: str, temperatures: Span, forces: Span) -> str:
@@ -169,11 +166,6 @@ def power_of_ten(logarithm: float) -> str:
     return f"{math.exp(logarithm - exponent * math.log(10)):.3g}e{exponent:+03d}"
 
 
-def _source(law: type[InterfaceArrhenius]) -> str:
-    text = f"{law.kind}: {source(law)}".replace("``", "")
-    return textwrap.fill(text, WIDTH, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
-
-
 def remarks(curves: Curves) -> Iterator[str]:
     """Peculiarities of a mechanism that are not wrong."""
     yield from curves.mechanism.remarks
@@ -193,37 +185,28 @@ def remarks(curves: Curves) -> Iterator[str]:
 
 def figure(curves: Curves, temperatures: Span, forces: Span) -> Figure:
     """Rates (left) and equilibrium constants (right), over temperature and in a second row over force."""
-    from surfacechem.plots.style import panels
+    from surfacechem.plots.style import COLOURS, panels
 
-    rows = 2 if curves.loaded else 1
-    with panels(7.2, 0.6 + 2.5 * rows, rows, 2) as (plot, axes):
-        T = temperatures.values(POINTS)
-        _row(axes[0], curves, T, T, np.zeros(1), "Temperature [K]")
+    shown, T, f = reference(temperatures), temperatures.values(POINTS), forces.values(POINTS)
+    rows = [(T, T, np.zeros(1), "Temperature [K]")]
+    rows += [(f * 1e12, np.array([shown]), f, f"Force on {curves.pulled or 'a bond'} [pN]")] if curves.loaded else []
+    with panels(7.2, 0.6 + 2.5 * len(rows), len(rows), 2) as (plot, axes):
+        for (rates, constants), (x, hot, pulled, label) in zip(axes, rows, strict=True):
+            for (name, law), colour in zip(curves.laws.items(), itertools.cycle(COLOURS), strict=False):
+                drawn = [
+                    (rates, curves.log_forward(name, hot, pulled), "-", f"{name}: {law.equation}"),
+                    (rates, curves.log_reverse(name, hot, pulled), "--", f"{name}, reverse"),
+                    (constants, curves.log_equilibrium(name, hot, pulled), "-", "_"),
+                ]
+                for ax, logarithm, style, text in drawn:
+                    if logarithm is not None:
+                        values = np.broadcast_to(logarithm, x.shape) / math.log(10)
+                        ax.plot(x, values, style, color=colour, label=text, marker="o" if len(x) == 1 else "")
+            rates.set(xlabel=label, ylabel="log$_{10}$ Rate per bond [1/s]")
+            constants.set(xlabel=label, ylabel="log$_{10}$ K [1]")
         if curves.loaded:
-            f = forces.values(POINTS)
-            shown, label = reference(temperatures), f"Force on {curves.pulled or 'a bond'} [pN]"
-            _row(axes[1], curves, f * 1e12, np.array([shown]), f, label)
             axes[1][0].set_title(f"at {shown:g} K", loc="left", fontsize=8, color="#555555")
         handles, labels = axes[0][0].get_legend_handles_labels()
         plot.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 3))
         plot.suptitle(f"Phase {curves.mechanism.phase}", x=0.01, ha="left", fontsize=11, fontweight="bold")
     return plot
-
-
-def _row(axes: tuple[Axes, Axes], curves: Curves, x: Array, T: Array, f: Array, label: str) -> None:
-    from surfacechem.plots import COLOURS
-
-    rates, constants = axes
-    for (name, law), colour in zip(curves.laws.items(), itertools.cycle(COLOURS), strict=False):
-        drawn = [
-            (rates, curves.log_forward(name, T, f), "-", f"{name}: {law.equation}"),
-            (rates, curves.log_reverse(name, T, f), "--", f"{name}, reverse"),
-            (constants, curves.log_equilibrium(name, T, f), "-", "_"),
-        ]
-        for ax, logarithm, style, text in drawn:
-            if logarithm is not None:
-                values = np.broadcast_to(logarithm, x.shape) / math.log(10)
-                ax.plot(x, values, style, color=colour, label=text, marker="o" if len(x) == 1 else "")
-    for ax, text in ((rates, "Rate per bond [1/s]"), (constants, "K [1]")):
-        ax.set_xlabel(label)
-        ax.set_ylabel(f"log$_{{10}}$ {text}")

@@ -25,10 +25,9 @@ from surfacechem.plots.study import MARKS, NO_ANSWER
 from surfacechem.results.accuracy import largest_errors
 from surfacechem.results.error_estimates import computed
 from surfacechem.solve import names as known_solvers
-from surfacechem.solve.contract import Counters
 from surfacechem.solve.run import OWN, Model, Run, Trajectory
 from surfacechem.studies.condition import condition, least
-from surfacechem.studies.grid import Cell, attempt, check_range, check_solvers, check_tolerances, filled
+from surfacechem.studies.grid import Cell, attempt, check_options, filled
 from surfacechem.studies.regimes import Exact, Expectation, Refused, Regime, Stops, Trial, chosen
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 from surfacechem.tolerances import EPS
@@ -83,11 +82,6 @@ class Attempt(Cell):
     """Condition number of the problem: relative change of its answer over that of its data; none where not known."""
 
     @property
-    def cost(self) -> Counters:
-        """Counts of the solver; none where the input is refused."""
-        return self.counters or Counters()
-
-    @property
     def text(self) -> str:
         """The attempt in a table.
 
@@ -105,10 +99,6 @@ class MatrixRow(NamedTuple):
     values: Sequence[float]
     cells: Mapping[tuple[str, float], Attempt]
 
-    def at(self, k: int, solver: str) -> Attempt | None:
-        """The attempt at the k-th value; None where the regime has fewer."""
-        return self.cells[solver, self.values[k]] if k < len(self.values) else None
-
 
 class Corner(NamedTuple):
     """The worst point that a search has found, of how many tried, and how many were not solved."""
@@ -118,12 +108,6 @@ class Corner(NamedTuple):
     cell: Attempt
     tried: int
     unsolved: int
-
-    @property
-    def texts(self) -> Sequence[str]:
-        """The corner in a table."""
-        where = ", ".join(f"{name} = {value:.3g}" for name, value in self.point.items())
-        return self.regime.name, f"{self.tried}", f"{self.unsolved}", f"{self.cell.text} {self.cell.reason}", where
 
 
 def stability(
@@ -138,9 +122,7 @@ def stability(
     ``rounds`` of a search for the worst corner of each regime that has one; none where it is zero.
     """
     found = chosen(regimes)
-    check_solvers(solvers, "--solvers")
-    check_tolerances([rtol], "--rtol")
-    check_range(rounds, 0 <= rounds <= MOST_ROUNDS, f">= 0 and <= {MOST_ROUNDS}", "--search")
+    check_options(solvers, [rtol], rounds, (0, MOST_ROUNDS), ("--solvers", "--rtol", "--search"))
     rows = []
     for number, regime in enumerate(found, 1):
         values = few(regime.values) if quick else list(regime.values)
@@ -178,12 +160,12 @@ def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
     try:
         model = Model(read(problem).system())
     except InputError as error:
-        refused = error
-        return lambda name: _judged(problem, rtol, math.nan, refused)
+        refused = _judged(problem.expected, rtol, math.nan, error)
+        return lambda name: replace(refused)
     known = condition(problem, [state.name for state in model.system.states])
     times = (0.0, *problem.times) if problem.times[0] else tuple(problem.times)
     run = Run(times=times, rtol=rtol, max_steps=STEPS)
-    judge = partial(_judged, problem, rtol, known)
+    judge = partial(_judged, problem.expected, rtol, known)
     return lambda name: attempt(partial(model.solve, replace(run, solver=name)), judge)
 
 
@@ -195,34 +177,31 @@ def read(problem: Trial) -> Case:
     return replace(case, reference=None)  # the regime has its own expectation
 
 
-def _judged(problem: Trial, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
-    """Outcome of a run, judged by the ``known`` condition of its problem."""
-    expected = problem.expected
+def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
+    """Outcome, digits and reason of a run, judged by the ``known`` condition of its problem."""
     if isinstance(done, Exception):
         reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
         right = isinstance(expected, Refused) and expected.reason in reason
         return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
-    outcome, digits, reason = _outcome(expected, done)
-    if outcome in (SOLVED, REFUSED) and digits < LEAST:
+    if isinstance(expected, Stops) and done.status == "stopped" and expected.reason in done.reason:
+        outcome, reason = REFUSED, done.reason
+        digits = digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0))
+    elif done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
+        return Attempt(FAILED, done.reason, 0.0, known)
+    elif not isinstance(expected, Exact):
+        return Attempt(WRONG, done.reason, 0.0, known)
+    elif expected.events not in (None, len(done.jumps)):
+        return Attempt(WRONG, f"{len(done.jumps)} events, not {expected.events}", 0.0, known)
+    else:
+        compared = {*expected.also, *(state.name for state in done.model.system.states)}
+        exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in compared}
+        errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
+        kept = {name: digits_of(error) for name, error in errors.items()}
+        worst = min(kept, key=lambda name: (kept[name], not math.isnan(errors[name]), -errors[name]))
+        outcome, digits, reason = SOLVED, kept[worst], f"in {worst}"
+    if digits < LEAST:
         outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
     return Attempt(outcome, reason, digits, known)
-
-
-def _outcome(expected: Expectation, done: Trajectory) -> tuple[str, float, str]:
-    """Outcome, digits and reason of a run that was begun."""
-    if done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
-        return FAILED, 0.0, done.reason
-    if isinstance(expected, Stops) and done.status == "stopped" and expected.reason in done.reason:
-        return REFUSED, digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0)), done.reason
-    if not isinstance(expected, Exact):
-        return WRONG, 0.0, done.reason
-    if expected.events not in (None, len(done.jumps)):
-        return WRONG, 0.0, f"{len(done.jumps)} events, not {expected.events}"
-    known = {*expected.also, *(state.name for state in done.model.system.states)}
-    exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in known}
-    errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
-    worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
-    return SOLVED, digits_of(errors[worst]), f"in {worst}"
 
 
 def digits_of(error: float) -> float:
@@ -264,7 +243,7 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
     def kept(logarithms: NDArray[np.float64]) -> float:
         point = {name: float(10.0**x) for name, x in zip(names, logarithms, strict=True)}
         try:
-            cell = prepared(regime.corner(point), rtol)(OWN)
+            cell = prepared(regime.corner(**point), rtol)(OWN)
         except InputError as error:  # the corner is outside of what the exact solution holds for
             cell = Attempt(REFUSED, error.message, MOST)
         seen.append((point, cell))
@@ -293,30 +272,31 @@ def _variables(first: str) -> Iterator[Variable]:
     """The variables over regime, decade and solver, the coordinates first; nothing where a regime has fewer values."""
 
     def at(read: Callable[[Attempt], float | str], nothing: float | str = math.nan) -> Callable[..., float | str]:
-        return lambda row, k, solver=first: read(cell) if (cell := row.at(k, solver)) else nothing
+        def value(row: MatrixRow, k: int, solver: str = first) -> float | str:
+            return read(row.cells[solver, row.values[k]]) if k < len(row.values) else nothing
 
-    def value(row: MatrixRow, k: int) -> float:
-        return row.values[k] if k < len(row.values) else math.nan
+        return value
 
     problem, cell = ("regime", "decade"), ("regime", "decade", "solver")
+    relative = "relative change of the answer over its data's"
+    possible = "digits that rounding of the data leaves"
+    largest = "-log10 of the largest relative error, of values or of the time of the end"
+    came = f"what came of it: {', '.join(OUTCOMES)}"
     yield Variable("regime", ("regime",), lambda row: row.regime.name, "1", "regime")
     yield Variable("decade", ("decade",), float, "1", "number of the value, from mild to extreme")
     yield Variable("solver", ("solver",), str, "1", "solver")
     yield Variable("symbol", ("regime",), lambda row: row.regime.symbol, "1", "parameter")
-    yield Variable("value", problem, value, "1", "value of the parameter")
-    text = "relative change of the answer over its data's"
-    yield Variable("condition", problem, at(lambda cell: cell.condition), "1", text)
-    text = "digits that rounding of the data leaves"
-    yield Variable("possible", problem, at(lambda cell: digits_left(cell.condition, EPS)), "1", text)
-    text = "-log10 of the largest relative error, of values or of the time of the end"
-    yield Variable("digits", cell, at(lambda cell: cell.digits), "1", text)
-    yield Variable("steps", cell, at(lambda cell: cell.cost.steps), "1", "steps")
-    yield Variable("residuals", cell, at(lambda cell: cell.cost.residuals), "1", "evaluations of the equations")
+    yield Variable("value", problem, at(lambda cell: cell.value), "1", "value of the parameter")
+    yield Variable("condition", problem, at(lambda cell: cell.condition), "1", relative)
+    yield Variable("possible", problem, at(lambda cell: digits_left(cell.condition, EPS)), "1", possible)
+    yield Variable("digits", cell, at(lambda cell: cell.digits), "1", largest)
+    yield Variable("steps", cell, at(lambda cell: cell.counters.steps), "1", "steps")
+    yield Variable("residuals", cell, at(lambda cell: cell.counters.residuals), "1", "evaluations of the equations")
     yield Variable("seconds", cell, at(lambda cell: sum(cell.seconds)), "s", "run time")
-    text = f"what came of it: {', '.join(OUTCOMES)}"
-    yield Variable("outcome", cell, at(lambda cell: cell.outcome, ""), "1", text)
-    text = "where the error is largest, or why the run ended"
-    yield Variable("reason", cell, at(lambda cell: cell.reason, ""), "1", text)
+    yield Variable("outcome", cell, at(lambda cell: cell.outcome, ""), "1", came)
+    yield Variable(
+        "reason", cell, at(lambda cell: cell.reason, ""), "1", "where the error is largest, or why the run ended"
+    )
 
 
 def _sections(
@@ -324,47 +304,44 @@ def _sections(
 ) -> Iterator[PageSection]:
     """The report; the terminal shows the summary and the corners."""
     headings = ("condition", "possible", f"at rtol {rtol:g}")
-    lines = []
+    lines, details = [], []
     for regime, values, cells in rows:
         known = [cells[solvers[0], value].condition for value in values]
         worst = max((number for number in known if math.isfinite(number)), default=math.nan)
         span = f"{regime.symbol}: {regime.label(values[0])} .. {regime.label(values[-1])}"
-        kept = [_kept([cells[solver, value] for value in values]) for solver in solvers]
+        kept = []
+        for solver in solvers:  # the least digits of all answers, and how many cells failed or are wrong
+            outcomes = [cells[solver, value].outcome for value in values]
+            answers = [cells[solver, value].digits for value in values if cells[solver, value].outcome not in NO_ANSWER]
+            counts = [f"{outcomes.count(word)} {word}" for word in NO_ANSWER if word in outcomes]
+            kept.append(", ".join([f"{min(answers):.1f}" if answers else "none", *counts]))
         lines.append((regime.name, span, *_condition_texts(worst, rtol), *kept))
+        every = []
+        for value in values:
+            first, *_ = attempts = [cells[solver, value] for solver in solvers]
+            texts = (regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in attempts))
+            every.append((*texts, str(first.counters.steps), first.reason))
+        marked = [i for i, v in enumerate(values) if any(cells[s, v].outcome in NO_ANSWER for s in solvers)]
+        of_first = (f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
+        details.append(PageTable((regime.symbol, *headings, *solvers, *of_first), every, regime.title, marked))
     caption = f"Least digits kept over all values, at rtol {rtol:g}, and the largest condition number"
     summary = PageTable(("regime", "from .. to", *headings, *solvers), lines, caption)
     yield PageSection("Digits kept", [MEANING], [summary], figure=True)
     if corners:
+        found = []
+        for corner in corners:
+            where = ", ".join(f"{name} = {value:.3g}" for name, value in corner.point.items())
+            worst_cell = f"{corner.cell.text} {corner.cell.reason}"
+            found.append((corner.regime.name, f"{corner.tried}", f"{corner.unsolved}", worst_cell, where))
         heading, caption = ("regime", "points", "not solved", "worst", "where"), "Worst corners that a search has found"
-        yield PageSection("Corners", tables=[PageTable(heading, [corner.texts for corner in corners], caption)])
-    yield PageSection("Every cell", tables=[_details(row, [*headings, *solvers], rtol) for row in rows], details=True)
-
-
-def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
-    """Every cell of a regime, with what was said of the first solver's."""
-    lines, marked = [], []
-    for i, value in enumerate(row.values):
-        first, *_ = cells = [cell for cell in row.cells.values() if cell.value == value]
-        texts = (row.regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in cells))
-        lines.append((*texts, str(first.cost.steps), first.reason))
-        marked += [i] if any(cell.outcome in NO_ANSWER for cell in cells) else []
-    of_first = (f"steps of {first.solver}", f"{first.solver}: where, or why")
-    return PageTable((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
+        yield PageSection("Corners", tables=[PageTable(heading, found, caption)])
+    yield PageSection("Every cell", tables=details, details=True)
 
 
 def _condition_texts(number: float, rtol: float) -> Sequence[str]:
     """A condition number, the digits that are possible, and those that it leaves at the tolerance."""
     left = (f"{digits_left(number, change):.1f}" for change in (EPS, rtol))
     return (f"{number:.0e}", *left) if math.isfinite(number) else ("", "", "")
-
-
-def _kept(cells: Sequence[Attempt]) -> str:
-    """The least digits of all answers, and how many cells failed or are wrong."""
-    answers = [cell.digits for cell in cells if cell.outcome not in NO_ANSWER]
-    counts = {word: sum(cell.outcome == word for cell in cells) for word in NO_ANSWER}
-    return ", ".join(
-        [f"{min(answers):.1f}" if answers else "none", *(f"{n} {word}" for word, n in counts.items() if n)]
-    )
 
 
 def _omissions(rows: Sequence[MatrixRow], solvers: Sequence[str], searched: bool) -> Iterator[str]:
@@ -376,5 +353,5 @@ def _omissions(rows: Sequence[MatrixRow], solvers: Sequence[str], searched: bool
         yield f"the solvers {', '.join(others)}, which were not asked for"
     if not searched:
         yield "the search for worst corners, which was not asked for"
-    if full := sum(cell.cost.steps >= STEPS for row in rows for cell in row.cells.values()):
+    if full := sum(cell.counters.steps >= STEPS for row in rows for cell in row.cells.values()):
         yield f"what lies beyond {STEPS} steps of a run: {full} took as many, and count as failed"

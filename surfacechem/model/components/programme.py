@@ -8,6 +8,7 @@ from functools import partial
 import symengine
 
 from surfacechem.contracts.terms import Spec
+from surfacechem.contracts.units import quotient
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.automaton import Constraint, Edge, Mode, Register
@@ -18,7 +19,6 @@ from surfacechem.model.system import State
 from surfacechem.model.variables import unit_of
 from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
-from surfacechem.units import quotient
 
 BEGUN = Register("stage_begun", "time at which the stage began")
 SCALES = {"m": LENGTH, "m/s": LENGTH}

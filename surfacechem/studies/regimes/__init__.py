@@ -1,6 +1,6 @@
 """Regimes of the stability matrix: a case, a parameter taken over decades until it breaks, and what is expected there.
 
-A class in any file of this folder is a regime; finding it needs nothing else.
+A function marked `regime` in any file of this folder is one; finding it needs nothing else.
 
 >>> list(regimes())[:3]
 ['affinity', 'bell', 'capacity']
@@ -9,13 +9,11 @@ A class in any file of this folder is a regime; finding it needs nothing else.
 from __future__ import annotations
 
 import pkgutil
-import re
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
 from importlib import import_module
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,42 +91,55 @@ class Trial:
     changes: Mapping[str, object] = field(default_factory=dict)
 
 
-class Regime(ABC):
-    """One row of the stability matrix. Subclasses state what they are; the class gives its name."""
+@dataclass(frozen=True)
+class Regime:
+    """One row of the stability matrix: a parameter that is taken over decades, and the problem at each value."""
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    symbol: ClassVar[str]
-    """The parameter that is taken over decades, as in a heading."""
-    values: ClassVar[tuple[float, ...]]
-    space: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    name: str
+    title: str
+    symbol: str
+    """The parameter, as in a heading."""
+    values: Sequence[float]
+    problem: Callable[[float], Trial]
+    label: Callable[[float], str]
+    """A value as in a heading."""
+    corner: Callable[..., Trial]
+    """The problem at a point of the space, of parameters by name."""
+    space: Mapping[str, tuple[float, float]]
     """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
 
-    def __init_subclass__(cls) -> None:
-        cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__.removesuffix("Regime")).lower()
+    @property
+    def text(self) -> str:
+        """What it is."""
+        return " ".join((self.problem.__doc__ or "").split())
 
-    @abstractmethod
-    def problem(self, value: float) -> Trial:
-        """The case at one value, and what is expected of it."""
 
-    def corner(self, point: Mapping[str, float]) -> Trial:
-        """The case at a point of :attr:`space`, of parameters by name."""
-        raise NotImplementedError(f"{self.name} has no space to search")
+def regime(
+    title: str,
+    symbol: str,
+    values: Sequence[float],
+    corner: Callable[..., Trial] | None = None,
+    label: Callable[[float], str] = "{:g}".format,
+    **space: tuple[float, float],
+) -> Callable[[Callable[..., Trial]], Regime]:
+    """Makes a regime of a problem as a function of the parameter, which gives the name; ``corner`` where it differs."""
 
-    def label(self, value: float) -> str:
-        """A value as in a heading."""
-        return f"{value:g}"
+    def made(problem: Callable[..., Trial]) -> Regime:
+        name = problem.__name__.replace("_", "-")
+        return Regime(name, title, symbol, values, problem, label, corner or problem, space)
+
+    return made
 
 
 @cache
 def regimes() -> dict[str, Regime]:
     """Every regime by name."""
     modules = [import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    kinds = [kind for kind in Regime.__subclasses__() if kind.__module__ in {module.__name__ for module in modules}]
-    return {kind.name: kind() for kind in sorted(kinds, key=lambda kind: kind.name)}
+    found = [item for module in modules for item in vars(module).values() if isinstance(item, Regime)]
+    return {item.name: item for item in sorted(found, key=lambda item: item.name)}
 
 
-def chosen(names: tuple[str, ...]) -> list[Regime]:
+def chosen(names: Sequence[str]) -> list[Regime]:
     """The regimes of these names, or all; InputError with the nearest guess."""
     known = regimes()
     for name in names:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.film import ClosingFilm
 from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.regimes import Array, Exact, Regime, Stops, Trial
+from surfacechem.studies.regimes import Array, Exact, Stops, Trial, regime
 
 SHORTEST = 1e-5
 """Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
@@ -21,19 +20,14 @@ bottleneck over which its speed is taken: enough for a condition number, which i
 """
 
 
-class FilmRegime(Regime):
+@regime("Film that closes", "gap / initial gap", (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0))
+def film(value: float) -> Trial:
     """A sheared film closes: heat grows like the logarithm of the gap, until time cannot tell the gap from zero."""
-
-    title = "Film that closes"
-    symbol = "gap / initial gap"
-    values = (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0)
-
-    def problem(self, value: float) -> Trial:
-        exact = ClosingFilm(eta=1e-2, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
-        if value == 0.0:
-            return Trial("closing-film", [20.0], Stops.of("g_n reached zero", exact))
-        last = 10.0 * (1.0 - value)
-        return Trial("closing-film", [last / 2, last], Exact.of(exact))
+    exact = ClosingFilm(eta=1e-2, v=0.5, g_i=1e-5, a=1e-6, C=800.0, T_0=300.0, T_i=300.0)
+    if value == 0.0:
+        return Trial("closing-film", [20.0], Stops.of("g_n reached zero", exact))
+    last = 10.0 * (1.0 - value)
+    return Trial("closing-film", [last / 2, last], Exact.of(exact))
 
 
 PENALTY = """\
@@ -51,90 +45,73 @@ run: {until: 1 s}
 """
 
 
-class PenaltyRegime(Regime):
+@regime("Contact stiffness to rigid", "E_n [Pa/m]", (1e0, 1e8, 1e12, 1e16, 1e20, 1e28, 1e38))
+def penalty(value: float) -> Trial:
     """A contact that becomes rigid: the gap k w / (k + E_n) vanishes and its traction stays."""
-
-    title = "Contact stiffness to rigid"
-    symbol = "E_n [Pa/m]"
-    values = (1e0, 1e8, 1e12, 1e16, 1e20, 1e28, 1e38)
-
-    def problem(self, value: float) -> Trial:
-        exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
-        changes = {"interface.potential.normal-stiffness.E_n": value}
-        return Trial(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
+    exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
+    changes = {"interface.potential.normal-stiffness.E_n": value}
+    return Trial(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
 
 
-class Chatter(Regime):
+@regime(
+    "Stick-slip, speed to nothing",
+    "V [m/s]",
+    (1e3, 1.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15),
+    V=(-15.0, 3.0),
+    m=(-6.0, 6.0),
+    k=(3.0, 13.0),
+)
+def chatter(V: float, m: float = 10.0, k: float = 1e8) -> Trial:
     """Stick-slip over nineteen decades of speed: one slip a cycle and none that is not there."""
+    exact = StickSlip(t_s=6e4, t_k=4e4, V=V, m=m, k=k)
+    if exact.stick_time < SHORTEST * exact.slip.duration:
+        raise InputError(f"a stick of less than {SHORTEST:g} of a slip is within rounding of steady sliding.")
+    first = exact.onset_time + exact.slip.duration
+    # In the middle of three sticks.
+    times = [first + (j + 0.5) * exact.stick_time + j * exact.slip.duration for j in range(3)]
+    changes = {
+        "loading.w_t": {"ramp": {"rate": V}},
+        "mechanics.tangential.m": m,
+        "mechanics.tangential.k": k,
+    }
 
-    title = "Stick-slip, speed to nothing"
-    symbol = "V [m/s]"
-    values = (1e3, 1.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
-    space: ClassVar = {"V": (-15.0, 3.0), "m": (-6.0, 6.0), "k": (3.0, 13.0)}
+    def at_rest(cycle: StickSlip, t: Array) -> dict[str, Array]:
+        found = cycle.solution(t)
+        return {"u_t": found["u_t"], "v": np.zeros_like(t), "t_t": found["spring_traction"]}
 
-    def problem(self, value: float) -> Trial:
-        return self.corner({"V": value, "m": 10.0, "k": 1e8})
-
-    def corner(self, point: Mapping[str, float]) -> Trial:
-        """Speed, mass and stiffness of any size; outputs in the middle of three sticks."""
-        exact = StickSlip(t_s=6e4, t_k=4e4, **point)
-        if exact.stick_time < SHORTEST * exact.slip.duration:
-            raise InputError(f"a stick of less than {SHORTEST:g} of a slip is within rounding of steady sliding.")
-        first = exact.onset_time + exact.slip.duration
-        times = [first + (k + 0.5) * exact.stick_time + k * exact.slip.duration for k in range(3)]
-        changes = {
-            "loading.w_t": {"ramp": {"rate": point["V"]}},
-            "mechanics.tangential.m": point["m"],
-            "mechanics.tangential.k": point["k"],
-        }
-
-        def at_rest(cycle: StickSlip, t: Array) -> dict[str, Array]:
-            found = cycle.solution(t)
-            return {"u_t": found["u_t"], "v": np.zeros_like(t), "t_t": found["spring_traction"]}
-
-        return Trial("stick-slip", times, Exact.of(exact, at_rest, also=["t_t"], events=6), changes)
+    return Trial("stick-slip", times, Exact.of(exact, at_rest, also=["t_t"], events=6), changes)
 
 
-class Stop(Regime):
+@regime("Coulomb friction stops a mass", "v_0 [m/s]", (1e-15, 1e-10, 1e-5, 1.0, 1e3, 1e6))
+def stop(value: float) -> Trial:
     """A sliding mass that friction stops: its velocity is zero from there on, exactly."""
-
-    title = "Coulomb friction stops a mass"
-    symbol = "v_0 [m/s]"
-    values = (1e-15, 1e-10, 1e-5, 1.0, 1e3, 1e6)
-
-    def problem(self, value: float) -> Trial:
-        exact = CoulombStop(m=5.0, mu=0.25, p=3e4, v_i=value, C=100.0, T_0=300.0, T_i=300.0)
-        end = exact.stop_time
-        times = [end * part for part in (0.25, 0.5, 0.9, 1.1, 2.0)]
-        return Trial("coulomb-stop", times, Exact.of(exact, events=1), {"initial.v": value})
+    exact = CoulombStop(m=5.0, mu=0.25, p=3e4, v_i=value, C=100.0, T_0=300.0, T_i=300.0)
+    end = exact.stop_time
+    times = [end * part for part in (0.25, 0.5, 0.9, 1.1, 2.0)]
+    return Trial("coulomb-stop", times, Exact.of(exact, events=1), {"initial.v": value})
 
 
-class FoldRegime(Regime):
+@regime("Slow passage of a fold", "distance / fold", (1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11))
+def fold(value: float) -> Trial:
     """A damped gap beside the place where its equilibrium was lost: the closer, the longer it lingers in a bottleneck,
     within which it is compared.
     """
+    gap = {"t_max": 1e6, "g_0": 1e-8, "k": 1e13, "c": 2e5}
+    exact = OverdampedPullOff(**gap, delta_w=value * OverdampedPullOff(**gap, delta_w=1.0).fold.w)
+    gaps = exact.fold.g + exact.width * np.linspace(-3.0, 3.0, 7)
+    times = np.array([exact.time(g) for g in gaps])
+    ahead = np.array([exact.time(g) for g in gaps + SHORTEST * exact.width])
+    speeds = SHORTEST * exact.width / (ahead - times)
 
-    title = "Slow passage of a fold"
-    symbol = "distance / fold"
-    values = (1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+    def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
+        """Gaps for other data, to first order, from when these are reached; given is the far-field displacement."""
+        given = {name: data[name] for name in ("t_max", "g_0", "k", "c")}
+        beyond = data["w"] - OverdampedPullOff(**given, delta_w=1.0).fold.w
+        if beyond <= 0:
+            raise InputError("the fold is not reached.")
+        other = OverdampedPullOff(**given, delta_w=beyond)
+        return {"g_n": gaps + speeds * (t - np.array([other.time(g) for g in gaps]))}
 
-    def problem(self, value: float) -> Trial:
-        gap = {"t_max": 1e6, "g_0": 1e-8, "k": 1e13, "c": 2e5}
-        exact = OverdampedPullOff(**gap, delta_w=value * OverdampedPullOff(**gap, delta_w=1.0).fold.w)
-        gaps = exact.fold.g + exact.width * np.linspace(-3.0, 3.0, 7)
-        times = np.array([exact.time(g) for g in gaps])
-        ahead = np.array([exact.time(g) for g in gaps + SHORTEST * exact.width])
-        speeds = SHORTEST * exact.width / (ahead - times)
-
-        def again(data: Mapping[str, float], t: Array) -> Mapping[str, Array]:
-            """Gaps for other data, to first order, from when these are reached; given is the far-field displacement."""
-            given = {name: data[name] for name in ("t_max", "g_0", "k", "c")}
-            beyond = data["w"] - OverdampedPullOff(**given, delta_w=1.0).fold.w
-            if beyond <= 0:
-                raise InputError("the fold is not reached.")
-            other = OverdampedPullOff(**given, delta_w=beyond)
-            return {"g_n": gaps + speeds * (t - np.array([other.time(g) for g in gaps]))}
-
-        data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
-        passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
-        return Trial("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})
+    data = {"t_max": exact.t_max, "g_0": exact.g_0, "k": exact.k, "c": exact.c, "w": exact.w}
+    passed = Exact(lambda t: {"g_n": np.append(0.0, gaps)}, data=data, again=again)
+    return Trial("slow-passage", times.tolist(), passed, {"loading.w_n": exact.w})

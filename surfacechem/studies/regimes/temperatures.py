@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from surfacechem.references.semenov_fold import SemenovFold
 from surfacechem.references.three_temperatures import ThreeTemperatures
-from surfacechem.studies.regimes import Exact, Refused, Regime, Stops, Trial
+from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regime
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 
 
-def three_temperatures(parameters: Mapping[str, float]) -> Trial:
+def three_temperatures(**parameters: float) -> Trial:
     """Two bodies and a medium, from its layer to the end."""
     p = {**BODIES, **parameters}
     exact = ThreeTemperatures(T_1=290.0, T_2=350.0, T_c=300.0, **p)
@@ -34,49 +32,34 @@ def three_temperatures(parameters: Mapping[str, float]) -> Trial:
     return Trial("three-temperatures", times, Exact.of(exact), changes)
 
 
-class Capacity(Regime):
+@regime("Capacity of the interface to nothing", "C_c [J/(m^2 K)]", (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18))
+def capacity(value: float) -> Trial:
     """A medium whose capacity vanishes: it follows the bodies after a layer as short as its capacity is small."""
-
-    title = "Capacity of the interface to nothing"
-    symbol = "C_c [J/(m^2 K)]"
-    values = (8.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18)
-
-    def problem(self, value: float) -> Trial:
-        return three_temperatures({"C_c": value})
+    return three_temperatures(C_c=value)
 
 
-class ConductanceRegime(Regime):
+@regime("Conductances to perfect contact", "h [W/(m^2 K)]", (1e0, 1e4, 1e8, 1e12, 1e16, 1e20))
+def conductance(value: float) -> Trial:
     """Conductances until the two bodies are in perfect contact."""
-
-    title = "Conductances to perfect contact"
-    symbol = "h [W/(m^2 K)]"
-    values = (1e0, 1e4, 1e8, 1e12, 1e16, 1e20)
-
-    def problem(self, value: float) -> Trial:
-        return three_temperatures({"h_1": value, "h_2": value})
+    return three_temperatures(h_1=value, h_2=value)
 
 
-class Stiffness(Regime):
+@regime(
+    "Range of the rates of heat exchange",
+    "fastest rate / slowest rate",
+    (1e2, 1e5, 1e10, 1e15, 1e20, 1e25),
+    three_temperatures,
+    C_1=(-9.0, 9.0),
+    C_2=(-9.0, 9.0),
+    C_c=(-18.0, 6.0),
+    h_1=(-9.0, 15.0),
+    h_2=(-9.0, 15.0),
+    D_0=(-6.0, 6.0),
+)
+def stiffness(value: float) -> Trial:
     """One body light and well connected, the other heavy and insulated: a range of rates in a linear system."""
-
-    title = "Range of the rates of heat exchange"
-    symbol = "fastest rate / slowest rate"
-    values = (1e2, 1e5, 1e10, 1e15, 1e20, 1e25)
-    space: ClassVar = {
-        "C_1": (-9.0, 9.0),
-        "C_2": (-9.0, 9.0),
-        "C_c": (-18.0, 6.0),
-        "h_1": (-9.0, 15.0),
-        "h_2": (-9.0, 15.0),
-        "D_0": (-6.0, 6.0),
-    }
-
-    def problem(self, value: float) -> Trial:
-        spread = math.sqrt(value)
-        return three_temperatures({"C_1": spread, "C_2": 1.0, "C_c": 1.0 / spread, "h_1": 1.0, "h_2": 1.0, "D_0": 1e-3})
-
-    def corner(self, point: Mapping[str, float]) -> Trial:
-        return three_temperatures(point)
+    spread = math.sqrt(value)
+    return three_temperatures(C_1=spread, C_2=1.0, C_c=1.0 / spread, h_1=1.0, h_2=1.0, D_0=1e-3)
 
 
 BETWEEN_RESERVOIRS = """\
@@ -104,23 +87,22 @@ run: {until: 1 s}
 )
 
 
-class LostCapacity(Regime):
+@regime(
+    "Capacity that bonds leave to the interface",
+    "C_eff [J/(m^2 K)]",
+    (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1),
+)
+def lost_capacity(value: float) -> Trial:
     """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
-
-    title = "Capacity that bonds leave to the interface"
-    symbol = "C_eff [J/(m^2 K)]"
-    values = (1e-1, 1e-4, 1e-8, 1e-12, 1e-15, -1e-15, -1e-8, -1e-1)
-
-    def problem(self, value: float) -> Trial:
-        changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
-        if value < 0:
-            return Trial(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
-        settled = Exact(
-            lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
-            data={"T_1": 300.0, "T_2": 300.0},
-            again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
-        )
-        return Trial(MEDIUM, [1.0], settled, changes)
+    changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
+    if value < 0:
+        return Trial(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
+    settled = Exact(
+        lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
+        data={"T_1": 300.0, "T_2": 300.0},
+        again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
+    )
+    return Trial(MEDIUM, [1.0], settled, changes)
 
 
 FILM = (
@@ -137,22 +119,21 @@ run: {until: 1 s}
 )
 
 
-class Ignition(Regime):
+CRITICAL = 50.0 / (math.e * 0.05)
+
+
+@regime(
+    "Ignition of an algebraic temperature",
+    "1 - D_0 / D_crit",
+    (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1),
+)
+def ignition(value: float) -> Trial:
     r"""Heat of a medium without capacity that grows exponentially with its temperature: one half before the fold at
     :math:`H/(e\beta)`, where the temperature is known to the root of rounding, and none beyond.
     """
-
-    title = "Ignition of an algebraic temperature"
-    symbol = "1 - D_0 / D_crit"
-    values = (0.5, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, -1e-9, -1e-3, -1e-1)
-    CRITICAL = 50.0 / (math.e * 0.05)
-
-    def problem(self, value: float) -> Trial:
-        heat = (1.0 - value) * self.CRITICAL
-        changes = {
-            "interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}
-        }
-        if value < 0:
-            return Trial(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
-        exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
-        return Trial(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
+    heat = (1.0 - value) * CRITICAL
+    changes = {"interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}}
+    if value < 0:
+        return Trial(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
+    exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
+    return Trial(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
