@@ -212,11 +212,9 @@ class _Builder:
     """Builds a tree from the events of the parser, so that limits hold before anything is expanded."""
 
     def __init__(self, text: str, file: str, limits: Limits) -> None:
-        self.file = file
-        self.most = limits.most
+        self.file, self.most = file, limits.most
         self.events = self._events(text)
-        self.anchors: dict[str, Tree] = {}
-        self.sizes: dict[str, int] = {}
+        self.anchors: dict[str, tuple[Tree, int]] = {}
         self.count = 0
 
     def _events(self, text: str) -> Iterator[Any]:
@@ -230,26 +228,23 @@ class _Builder:
             line = text.count("\n", 0, error.position) + 1
             raise InputError("a control character, which YAML does not allow.", Place(self.file, line)) from None
         except MarkedYAMLError as error:
-            raise self._syntax(error) from None
+            mark = error.problem_mark or error.context_mark
+            message = " ".join(", ".join(part for part in (error.context, error.problem) if part).split())
+            place = Place(self.file, mark.line + 1 if mark else 0)
+            raise InputError(f"not YAML: {message.rstrip('.')}.", place) from None
         except Exception as error:  # only the parser runs in here, and it also fails by assertions
-            raise InputError(f"not YAML: {_one_line(str(error))}.", Place(self.file)) from None
-
-    def _syntax(self, error: Any) -> InputError:
-        mark = error.problem_mark or error.context_mark
-        message = _one_line(", ".join(part for part in (error.context, error.problem) if part))
-        return InputError(f"not YAML: {message}.", Place(self.file, mark.line + 1 if mark else 0))
+            message = " ".join(str(error).split())
+            raise InputError(f"not YAML: {message.rstrip('.')}.", Place(self.file)) from None
 
     def document(self) -> Tree:
         """The only document of the text."""
-        import ruamel.yaml.events as kinds
-
         next(self.events)
-        if isinstance(next(self.events), kinds.StreamEndEvent):
+        if type(next(self.events)).__name__ == "StreamEndEvent":
             raise InputError("the file is empty.", Place(self.file))
         tree = self._value(next(self.events), 0)
         next(self.events)
         extra = next(self.events)
-        if not isinstance(extra, kinds.StreamEndEvent):
+        if type(extra).__name__ != "StreamEndEvent":
             raise InputError("more than one document.", self._place(extra))
         return tree
 
@@ -257,36 +252,37 @@ class _Builder:
         return Place(self.file, event.start_mark.line + 1, column=event.start_mark.column)
 
     def _value(self, event: Any, depth: int) -> Tree:
-        place = self._place(event)
-        self._limits(event, depth, place)
-        match type(event).__name__:
-            case "AliasEvent":
-                return self._alias(event, place)
-            case "ScalarEvent":
-                tree = Tree(scalar(event.value) if event.implicit[0] else event.value, place)
-            case "SequenceStartEvent":
-                tree = Tree(list(self._items(depth)), place)
-            case _:
-                tree = Tree(self._mapping(depth), place)
-        return tree
-
-    def _limits(self, event: Any, depth: int, place: Place) -> None:
+        place, before, kind = self._place(event), self.count, type(event).__name__
         self.count += 1
         if self.count > self.most:
-            message = (
-                f"more than {self.most} values. A long table belongs into a CSV file: `table: {{file: NAME.csv}}`."
-            )
-            raise InputError(message, place)
+            remedy = "A long table belongs into a CSV file: `table: {file: NAME.csv}`."
+            raise InputError(f"more than {self.most} values. {remedy}", place)
         if depth > DEEPEST:
             raise InputError(f"nested deeper than {DEEPEST} levels.", place)
         if getattr(event, "tag", None) is not None:
             raise InputError(f"a tag ({event.tag}), which is not allowed.", place)
-
-    def _items(self, depth: int) -> Iterator[Tree]:
-        while type(event := next(self.events)).__name__ != "SequenceEndEvent":
-            yield self._anchored(event, depth + 1)
+        if kind == "AliasEvent":
+            if event.anchor not in self.anchors:
+                raise InputError(f"the alias *{event.anchor} has no anchor before it.", place)
+            known, size = self.anchors[event.anchor]
+            self.count += size  # what it repeats counts as if it were written out
+            if self.count > self.most:
+                raise InputError(f"aliases repeat more than {self.most} values.", place)
+            return replace(known, place=place)
+        if kind == "ScalarEvent":
+            tree = Tree(scalar(event.value) if event.implicit[0] else event.value, place)
+        elif kind == "SequenceStartEvent":
+            tree = Tree([], place)
+            while type(item := next(self.events)).__name__ != "SequenceEndEvent":
+                tree.value.append(self._value(item, depth + 1))
+        else:
+            tree = Tree(self._mapping(depth), place)
+        if event.anchor is not None:  # only now, so that nothing contains itself
+            self.anchors[event.anchor] = tree, self.count - before
+        return tree
 
     def _mapping(self, depth: int) -> dict[str, Tree]:
+        """The entries of a mapping; the place of a value is that of its key."""
         result: dict[str, Tree] = {}
         while type(event := next(self.events)).__name__ != "MappingEndEvent":
             place = self._place(event)
@@ -295,28 +291,8 @@ class _Builder:
             if event.value in result:
                 first = result[event.value].place.line
                 raise InputError(f"the key '{event.value}' is given twice, first in line {first}.", place)
-            result[event.value] = replace(self._anchored(next(self.events), depth + 1), place=place)
+            result[event.value] = replace(self._value(next(self.events), depth + 1), place=place)
         return result
-
-    def _anchored(self, event: Any, depth: int) -> Tree:
-        before = self.count
-        tree = self._value(event, depth)
-        if type(event).__name__ != "AliasEvent" and event.anchor is not None:
-            self.anchors[event.anchor] = tree
-            self.sizes[event.anchor] = self.count - before
-        return tree
-
-    def _alias(self, event: Any, place: Place) -> Tree:
-        if event.anchor not in self.anchors:
-            raise InputError(f"the alias *{event.anchor} has no anchor before it.", place)
-        self.count += self.sizes[event.anchor]
-        if self.count > self.most:
-            raise InputError(f"aliases repeat more than {self.most} values.", place)
-        return replace(self.anchors[event.anchor], place=place)
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split()).rstrip(".")
 
 
 def labels(items: Iterable[Tree]) -> list[str | None]:
@@ -324,9 +300,8 @@ def labels(items: Iterable[Tree]) -> list[str | None]:
     seen: dict[str, int] = {}
     result: list[str | None] = []
     for item in items:
-        name = item.value
-        if isinstance(name, dict):
-            name = next(iter(name)) if len(name) == 1 else None
+        single = isinstance(item.value, dict) and len(item.value) == 1
+        name = next(iter(item.value)) if single else item.value
         if not (isinstance(name, str) and _NAME.fullmatch(name)):
             result.append(None)
             continue
@@ -340,18 +315,17 @@ def with_paths(tree: Tree, path: str = "") -> Tree:
     place = replace(tree.place, path=path)
     if isinstance(tree.value, dict):
         return Tree({key: with_paths(child, join(path, key)) for key, child in tree.value.items()}, place)
-    if isinstance(tree.value, list):
-        pairs = enumerate(zip(tree.value, labels(tree.value), strict=True), start=1)
-        return Tree([_with_label(item, path, label or f"[{i}]") for i, (item, label) in pairs], place)
-    return Tree(tree.value, place)
-
-
-def _with_label(item: Tree, path: str, label: str) -> Tree:
-    own = join(path, label)
-    if isinstance(item.value, dict) and len(item.value) == 1:
-        ((name, inner),) = item.value.items()
-        return Tree({name: with_paths(inner, own)}, replace(item.place, path=own))
-    return with_paths(item, own)
+    if not isinstance(tree.value, list):
+        return Tree(tree.value, place)
+    items = []
+    for i, (item, label) in enumerate(zip(tree.value, labels(tree.value), strict=True), start=1):
+        own = join(path, label or f"[{i}]")
+        if isinstance(item.value, dict) and len(item.value) == 1:  # a law, whose parameters are below its label
+            ((name, inner),) = item.value.items()
+            items.append(Tree({name: with_paths(inner, own)}, replace(item.place, path=own)))
+        else:
+            items.append(with_paths(item, own))
+    return Tree(items, place)
 
 
 def join(path: str, key: str) -> str:

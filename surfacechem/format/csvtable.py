@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -55,87 +54,66 @@ def is_csv(tree: Tree) -> bool:
 def table(tree: Tree, unit: str) -> Table:
     """The history of a column; times are in the column ``t``, values in the one named, or after the variable."""
     fields = tree.value["table"].mapping(KEYS[1:])
-    content = fields["csv"]
-    heading, *rows = _rows(content)
-    columns = _columns(heading)
-    names, variable = [name for name, _ in columns], tree.place.path.rpartition(".")[2]
-    times = _index("t", names, heading)
-    values = _index(fields["column"].text("column") if "column" in fields else variable, names, heading)
-    for row in rows:
-        if len(row.cells) != len(columns):
-            raise row.error(f"{len(row.cells)} values for {len(columns)} columns.")
-    moments = [_number(row, times, columns, "s") for row in rows]
-    for row, (earlier, later) in zip(rows[1:], pairwise(moments), strict=True):
+    content, variable = CSVText(fields["csv"]), tree.place.path.rpartition(".")[2]
+    name = fields["column"].text("column") if "column" in fields else variable
+    times, values = content.column("t", "s", "t"), content.column(name, unit, variable)
+    for (line, _), (earlier, later) in zip(content.rows[1:], pairwise(times), strict=True):
         if later < earlier:
-            raise row.error("times must never decrease.")
+            raise content.error(line, "times must never decrease.")
     try:
-        read = [_number(row, values, columns, unit, variable) for row in rows]
-        return Table(times=moments, values=read, place=tree.place)
+        return Table(times=times, values=values, place=tree.place)
     except InputError as error:
         raise error.at(content.place) from None
 
 
-@dataclass(frozen=True)
-class TableLine:
-    """A line of the table, with its place."""
+class CSVText:
+    """A table as text: a heading of names and units, and rows; lines that are empty or comments do not count."""
 
-    cells: Sequence[str]
-    line: int
-    place: Place
+    def __init__(self, content: Tree) -> None:
+        self.place = content.place
+        lines = enumerate(content.text("the table").splitlines(), start=1)
+        kept = [(line, text) for line, text in lines if text.strip() and not text.lstrip().startswith("#")]
+        cells = csv.reader(text for _, text in kept)
+        rows = [(line, [cell.strip() for cell in row]) for (line, _), row in zip(kept, cells, strict=True)]
+        if not rows:
+            raise content.error(f"the table is empty; its first line names the columns and their units: {EXAMPLE}.")
+        self.heading, *self.rows = rows
+        found = [HEADING.fullmatch(cell) for cell in self.heading[1]]
+        if None in found:
+            column = f"the heading of column {found.index(None) + 1} is no name with a unit"
+            raise self.error(self.heading[0], f"{column}; the first line is like {EXAMPLE}.")
+        self.columns = [(match["name"], match["unit"].strip()) for match in found if match]
+        for line, row in self.rows:
+            if len(row) != len(self.columns):
+                raise self.error(line, f"{len(row)} values for {len(self.columns)} columns.")
 
-    def error(self, message: str) -> InputError:
-        """An input error at this line."""
-        if self.place.line or self.place.path:  # the text stands in the case itself
-            return InputError(f"line {self.line} of the table: {message}", self.place)
-        return InputError(message, replace(self.place, line=self.line))
+    def error(self, line: int, message: str) -> InputError:
+        """An input error at a line, of the file or of the text that stands in the case itself."""
+        if self.place.line or self.place.path:
+            return InputError(f"line {line} of the table: {message}", self.place)
+        return InputError(message, replace(self.place, line=line))
 
-
-def _rows(content: Tree) -> list[TableLine]:
-    """Lines that are neither empty nor comments; the first is the heading."""
-    lines = enumerate(content.text("the table").splitlines(), start=1)
-    kept = [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
-    rows = [
-        TableLine([cell.strip() for cell in cells], number, content.place)
-        for (number, _), cells in zip(kept, csv.reader(line for _, line in kept), strict=True)
-    ]
-    if not rows:
-        raise content.error(f"the table is empty; its first line names the columns and their units: {EXAMPLE}.")
-    return rows
-
-
-def _columns(heading: TableLine) -> list[tuple[str, str]]:
-    """Name and unit of each column."""
-    columns = []
-    for number, cell in enumerate(heading.cells, start=1):
-        if (found := HEADING.fullmatch(cell)) is None:
-            raise heading.error(
-                f"the heading of column {number} is no name with a unit; the first line is like {EXAMPLE}."
-            )
-        columns.append((found["name"], found["unit"].strip()))
-    return columns
-
-
-def _index(name: str, names: Sequence[str], heading: TableLine) -> int:
-    if names.count(name) > 1:
-        raise heading.error(f"the column {name} is there {names.count(name)} times.")
-    if name not in names:
-        others = [other for other in names if other != "t"]
-        other = others[0] if len(others) == 1 else "NAME"
-        # A column of another name is never meant by itself.
-        remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
-        raise heading.error(f"no column '{name}'.{suggestion(name, names)}{remedy}")
-    return names.index(name)
-
-
-def _number(row: TableLine, index: int, columns: Sequence[tuple[str, str]], unit: str, variable: str = "") -> float:
-    name, given = columns[index]
-    cell = row.cells[index]
-    whose = f"{variable}, from the column {name}," if variable and variable != name else name
-    try:
-        float(cell)
-    except ValueError:
-        raise row.error(f"{whose} is no number there.") from None
-    try:
-        return parse(cell if given == "1" else f"{cell} {given}", unit, name=whose)
-    except InputError as error:
-        raise row.error(error.message) from None
+    def column(self, name: str, unit: str, variable: str) -> list[float]:
+        """The numbers of a column, which are values of a variable, in SI."""
+        names = [known for known, _ in self.columns]
+        if names.count(name) > 1:
+            raise self.error(self.heading[0], f"the column {name} is there {names.count(name)} times.")
+        if name not in names:
+            others = [other for other in names if other != "t"]
+            other = others[0] if len(others) == 1 else "NAME"
+            # A column of another name is never meant by itself.
+            remedy = f" To take one of another name, write `column: {other}`." if others and name != "t" else ""
+            raise self.error(self.heading[0], f"no column '{name}'.{suggestion(name, names)}{remedy}")
+        index, found = names.index(name), []
+        given = self.columns[index][1]
+        whose = name if name == variable else f"{variable}, from the column {name},"
+        for line, row in self.rows:
+            try:
+                float(row[index])  # a unit beside the number would be a second one
+            except ValueError:
+                raise self.error(line, f"{whose} is no number there.") from None
+            try:
+                found.append(parse(row[index] if given == "1" else f"{row[index]} {given}", unit, name=whose))
+            except InputError as error:
+                raise self.error(line, error.message) from None
+        return found

@@ -107,13 +107,13 @@ class Number(Content):
 
     def schema(self) -> Schema:
         """A number in its range, or a text with a unit; else the value and its factors."""
-        limits = {"exclusiveMinimum": self.spec.above, "minimum": self.spec.at_least, "maximum": self.spec.at_most}
-        limits = {name: bound for name, bound in limits.items() if math.isfinite(bound)}
-        kinds: list[Schema] = [{"type": "number", **limits}, {"type": "string", "pattern": QUANTITY}]
-        if self.spec.varies:
+        spec = self.spec
+        bare = _bounded({"type": "number"}, exclusiveMinimum=spec.above, minimum=spec.at_least, maximum=spec.at_most)
+        kinds: list[Schema] = [bare, {"type": "string", "pattern": QUANTITY}]
+        if spec.varies:
             factors = {"type": "array", "items": reference(Factor.contract)}
             kinds.append(closed({"value": reference("quantity"), "times": factors}, required=("value",)))
-        return {"anyOf": kinds} if limits or self.spec.varies else reference("quantity")
+        return {"anyOf": kinds} if len(bare) > 1 or spec.varies else reference("quantity")
 
 
 def number(tree: Tree, spec: Spec, name: str, *, difference: bool = False) -> float:
@@ -151,12 +151,14 @@ class Whole(Content):
 
     def schema(self) -> Schema:
         """An integer, or its digits as text."""
-        limits = {"minimum": self.at_least, "maximum": self.at_most} | (
-            {"multipleOf": self.step} if self.step > 1 else {}
-        )
-        whole = {"type": "integer", **{name: bound for name, bound in limits.items() if math.isfinite(bound)}}
+        whole = _bounded({"type": "integer"}, minimum=self.at_least, maximum=self.at_most)
+        whole |= {"multipleOf": self.step} if self.step > 1 else {}
         word = [{"const": self.word}] if self.word else []
         return {"anyOf": [whole, {"type": "string", "pattern": "^[0-9]+$"}, *word]}
+
+
+def _bounded(schema: Schema, **limits: float) -> Schema:
+    return schema | {name: bound for name, bound in limits.items() if math.isfinite(bound)}
 
 
 @dataclass(frozen=True)
@@ -212,11 +214,11 @@ class ListOf(Content):
 
     def read(self, tree: Tree, name: str, context: Context) -> tuple[Any, ...]:
         """Its entries."""
-        example = self.content.example if isinstance(self.content, OneLaw) and not isinstance(tree.value, list) else ""
-        entries = tree.items(example or self.example)
+        law = self.content if isinstance(self.content, OneLaw) else None
+        entries = tree.items(law.example if law and not isinstance(tree.value, list) else self.example)
         if self.count is not None and len(entries) != self.count:
             raise tree.error(f"{name} needs {self.count} entries, got {len(entries)}.")
-        if isinstance(self.content, OneLaw) and len(entries) > MOST:
+        if law and len(entries) > MOST:
             raise entries[MOST].error(f"more than {MOST} laws in a list.")
         return tuple(self.content.read(entry, f"an entry of {name}", context) for entry in entries)
 
@@ -277,27 +279,24 @@ class Prescribed(Content):
     def read(self, tree: Tree, name: str, context: Context) -> Load:
         """The load."""
         unit = resolved_unit(self.unit, context.x)
-        load = self._read(tree, name, unit, context)
+        if csvtable.is_csv(tree):
+            load: Load = csvtable.table(tree, unit)
+        elif isinstance(tree.value, dict):
+            load = OneLaw(Load).read(tree, name, replace(context, x=unit))
+        else:
+            try:
+                level = number(tree, Spec(unit, name), name)
+            except InputError as error:
+                with suppress(InputError):  # who gives a rate means a ramp
+                    si(tree.plain(), quotient(unit, "s"))
+                    hint = f"To change it in time, write `{{ramp: {{rate: {tree.value}}}}}`."
+                    error = InputError(f"{error.message} {hint}", tree.place)
+                raise error from None
+            load = laws.find(Load, "hold")(level=level, place=tree.place)  # type: ignore[call-arg, assignment]
         start = float(load.bind(load.piece(0.0)).value(0.0)) if self.above_zero else 1.0
         if not start > 0:
             raise tree.error(f"{start:g} K is not an absolute temperature above zero.")
         return load
-
-    def _read(self, tree: Tree, name: str, unit: str, context: Context) -> Load:
-        if csvtable.is_csv(tree):
-            return csvtable.table(tree, unit)
-        if isinstance(tree.value, dict):
-            load: Load = OneLaw(Load).read(tree, name, replace(context, x=unit))
-            return load
-        try:
-            level = number(tree, Spec(unit, name), name)
-        except InputError as error:
-            with suppress(InputError):  # who gives a rate means a ramp
-                si(tree.plain(), quotient(unit, "s"))
-                hint = f"To change it in time, write `{{ramp: {{rate: {tree.value}}}}}`."
-                error = InputError(f"{error.message} {hint}", tree.place)
-            raise error from None
-        return laws.find(Load, "hold")(level=level, place=tree.place)  # type: ignore[call-arg, return-value]
 
     def schema(self) -> Schema:
         """The definition of a history."""
@@ -372,23 +371,19 @@ class Entries(Content):
 
     def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
         """The values by name."""
-        if self.wanted:
-            self._check_count(tree)
+        count = len(tree.value) if isinstance(tree.value, dict) else 0 if tree.value is None else 1
+        if self.wanted and not (isinstance(tree.value, dict) and 1 <= count <= (self.at_most or math.inf)):
+            got = "; none is given" if not count else f"; {count} are given" if count > 1 else f", not {tree.shown}"
+            raise tree.error(f"{self.wanted}{got}.")
         known = [*self.each, *self.names(context)] if self.names else None if self.others else [*self.each]
         units, found = {**self.units, **context.units}, {}
         for key, child in tree.mapping(None if self.by_scene else known, self.what).items():
             content = self.each[key].content if key in self.each else self.others
-            if known is not None and key not in known:  # refused by the scene, which knows better what it has
-                content = Unread()
-            assert content is not None
-            found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
+            if content is None or (known is not None and key not in known):
+                found[key] = math.nan  # refused by the scene, which knows better what it has
+            else:
+                found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
         return found
-
-    def _check_count(self, tree: Tree) -> None:
-        count = len(tree.value) if isinstance(tree.value, dict) else 0 if tree.value is None else 1
-        if not (isinstance(tree.value, dict) and 1 <= count <= (self.at_most or math.inf)):
-            got = "; none is given" if not count else f"; {count} are given" if count > 1 else f", not {tree.shown}"
-            raise tree.error(f"{self.wanted}{got}.")
 
     def schema(self) -> Schema:
         """An object with these names."""
@@ -437,18 +432,6 @@ class Shapes(Content):
         return {"anyOf": [content.schema() for content in self._contents]}
 
 
-class Unread(Content):
-    """A name that no case has; its value has no meaning."""
-
-    def read(self, tree: Tree, name: str, context: Context) -> float:
-        """Not a number."""
-        return math.nan
-
-    def schema(self) -> Schema:
-        """Nothing may stand there."""
-        return {"not": {}}
-
-
 @dataclass(frozen=True)
 class Later(Content):
     """Something whose units are known only when the scene is assembled."""
@@ -472,7 +455,12 @@ class Key:
 
     def __init__(self, content: Content, text: str = "", default: Any = None, name: str = "") -> None:
         self.content = content
-        self.text = text or _about(content)
+        # What stands there, by the parameter or the section that it is, if nothing else is said.
+        if not text and isinstance(content, Number):
+            text = content.spec.text
+        elif not text and isinstance(content, Nested):
+            text = (content.cls.__doc__ or "").strip().splitlines()[0]
+        self.text = text
         self.default = default
         self.name = name
         self.attribute = ""
@@ -500,13 +488,6 @@ class Key:
         """JSON Schema of the value, with meaning and default."""
         found = {**self.content.schema(), "description": self.meaning()}
         return {**found, "default": self.default} if isinstance(self.default, str | float | int) else found
-
-
-def _about(content: Content) -> str:
-    """What stands there, by the parameter or the section that it is."""
-    if isinstance(content, Number):
-        return content.spec.text
-    return (content.cls.__doc__ or "").strip().splitlines()[0] if isinstance(content, Nested) else ""
 
 
 def key(content: Content, text: str = "", default: Any = None, *, name: str = "") -> Any:

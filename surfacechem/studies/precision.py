@@ -19,7 +19,7 @@ from surfacechem.runs.simulation import Simulation, load
 from surfacechem.runs.summaries import duration
 from surfacechem.solve import names as known_solvers
 from surfacechem.solve.run import Trajectory
-from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_range, check_solvers, check_tolerances, filled
+from surfacechem.studies.grid import BRIEF, BUDGET, Cell, attempt, check_options, filled
 from surfacechem.studies.report import PageSection, PageTable, Study, Variable
 from surfacechem.studies.truth import KINDS, MEANING, TOLERANCES, Errors, Subject, Truth, establish
 from surfacechem.tolerances import LONGEST_STEP
@@ -110,11 +110,16 @@ def precision(
     number of timed rounds; ``overrides`` change values of every case, as for ``load``. InputError for what is unknown,
     before anything runs.
     """
-    check_solvers(solvers, "solvers")
-    check_tolerances(tolerances, "tolerances")
-    check_range(repeat, 1 <= repeat <= MOST_REPEAT, f">= 1 and <= {MOST_REPEAT}", "repeat")
+    check_options(solvers, tolerances, repeat, (1, MOST_REPEAT), ("solvers", "tolerances", "repeat"))
     cases = [cases] if isinstance(cases, str | Path) else cases
-    subjects = _subjects(cases, overrides, variables)
+    subjects = [subject(load(name, overrides)) for name in cases]
+    names = [one.case.name for one in subjects]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"the case {twice} is given twice.")
+    known = {name for one in subjects for name in one.names}
+    for name in variables:
+        if name not in known:
+            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
     tolerances = sorted(set(map(float, tolerances)), reverse=True)
     solvers, variables = tuple(dict.fromkeys(solvers)), tuple(dict.fromkeys(variables))
     compared = [_compared(one, variables, solvers, tolerances, repeat) for one in subjects]
@@ -123,7 +128,7 @@ def precision(
     status = "finished" if all(case.truth for case in compared) else "failed"
     return Study(
         kind="precision",
-        title=f"Error against run time: {', '.join(case.name for case in compared)}",
+        title=f"Error against run time: {', '.join(names)}",
         arguments=[*map(str, cases), *options, *(word for text in written(overrides) for word in ("--set", text))],
         axes={
             "tolerance": tolerances,
@@ -138,21 +143,6 @@ def precision(
         settings={"repeat": repeat, "status": status},
         status=status,
     )
-
-
-def _subjects(
-    cases: Sequence[str | Path], overrides: Sequence[str] | Mapping[str, object], variables: Sequence[str]
-) -> list[Subject]:
-    """The cases; InputError for one that is given twice, and for a variable that none has."""
-    subjects = [subject(load(name, overrides)) for name in cases]
-    names = [one.case.name for one in subjects]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f"the case {twice} is given twice.")
-    known = {name for one in subjects for name in one.names}
-    for name in variables:
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
-    return subjects
 
 
 def subject(simulation: Simulation) -> Subject:
@@ -192,9 +182,8 @@ def _compared(
 def _judged(truth: Truth | None, done: Trajectory | Exception) -> WorkPoint:
     if isinstance(done, Exception):
         return WorkPoint("failed", f"{type(done).__name__}: {done}")
-    if done.status == "failed":
-        return WorkPoint("failed", done.reason)
-    if truth and (objection := truth.objection(done)):
+    objection = truth.objection(done) if truth else done.reason if done.status == "failed" else ""
+    if objection:
         return WorkPoint("failed", objection)
     errors = truth.errors(computed(done), event_times(done)) if truth else None
     if errors and not all(math.isfinite(error) for kind in errors.by_kind.values() for error in kind.values()):
@@ -233,8 +222,7 @@ def _variables() -> Iterator[Variable]:
         *((f"count_{name}", "1", text, partial(WorkPoint.count, name=name)) for name, text in COUNTS.items()),
     ]
     for name, unit, text, read in of_point:
-        at = partial(lambda case, solver, rtol, read: read(case.points[solver, rtol]), read=read)
-        yield Variable(name, every, at, unit, text)
+        yield Variable(name, every, lambda case, s, rtol, read=read: read(case.points[s, rtol]), unit, text)
     for kind in KINDS:
         each = partial(lambda case, s, rtol, name, kind: case.points[s, rtol].error(kind, name), kind=kind)
         yield Variable(f"variable_error_{kind}", (*every, "variable"), each, "1", f"{MEANING[kind]} of each variable")
@@ -246,35 +234,34 @@ def _variables() -> Iterator[Variable]:
 def _sections(compared: Sequence[Compared]) -> Iterator[PageSection]:
     yield PageSection("Run time against error", figure=True, details=True)
     for case in compared:
-        yield _of_case(case)
+        lines = [f"reference  {case.reference}"]
+        if case.truth:
+            uncertain = {kind: case.uncertainty(kind) for kind in KINDS}
+            uncertain |= {"events": case.uncertainty("event")} if case.truth.events else {}
+            lines.append(f"uncertain  {', '.join(f'{kind} {error:.1e}' for kind, error in uncertain.items())}")
+        lines.append(f"variables  {', '.join(case.variables)}")
+        lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
+        points = [point for point in case.points.values() if point.outcome != "omitted"]
+        marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
+        tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
+        failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
+        tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
+        yield PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
         rows = [
             (p.solver, f"{p.value:.0e}", name, *(f"{p.error(kind, name):.1e}" for kind in KINDS))
-            for p in case.points.values()
+            for p in points
             if p.errors
             for name in case.variables
         ]
-        heading = ("solver", "rtol", "variable", "final", "max", "L2")
-        table = PageTable(heading, rows, "; ".join(MEANING[kind] for kind in KINDS))
+        heading, caption = (
+            ("solver", "rtol", "variable", "final", "max", "L2"),
+            "; ".join(MEANING[kind] for kind in KINDS),
+        )
+        table = PageTable(heading, rows, caption)
         yield PageSection(f"{case.name}, variable by variable", tables=[table], details=True)
     yield PageSection("How it was measured", METHOD.split("\n\n"), details=True)
     for case in compared:
         yield PageSection(f"Case {case.name}", [case.subject.case.text], details=True)
-
-
-def _of_case(case: Compared) -> PageSection:
-    lines = [f"reference  {case.reference}"]
-    if case.truth:
-        uncertain = {kind: case.uncertainty(kind) for kind in KINDS}
-        uncertain |= {"events": case.uncertainty("event")} if case.truth.events else {}
-        lines.append(f"uncertain  {', '.join(f'{kind} {error:.1e}' for kind, error in uncertain.items())}")
-    lines.append(f"variables  {', '.join(case.variables)}")
-    lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
-    points = [point for point in case.points.values() if point.outcome != "omitted"]
-    marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
-    tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
-    failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
-    tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
-    return PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
 
 
 def _row(point: WorkPoint, case: Compared) -> list[str]:

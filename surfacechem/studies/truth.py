@@ -130,7 +130,7 @@ class Subject:
     def methods(self) -> list[str]:
         """Methods for a reference; that of Cantera only where no other can run the case."""
         able = [name for name in METHODS if not self.unable(name)]
-        return able if able == ["cantera"] else [name for name in able if name != "cantera"]
+        return [name for name in able if name != "cantera"] or able
 
     def tight(self, method: str, rtol: float) -> Trajectory:
         """A run for a reference; InputError where it comes to nothing."""
@@ -157,6 +157,12 @@ class Truth:
     end: float
     """End of the run as it was asked for [s]."""
     uncertainty: Errors = field(default_factory=Errors)
+
+    @classmethod
+    def of(cls, run: Trajectory, source: str, variables: Sequence[str]) -> Truth:
+        """That of a run, without values and events."""
+        found = {name: floor for name, floor in floors(run).items() if name in variables}
+        return cls(source, run.status, run.result.times, {}, found, {}, run.run.times[-1])
 
     def errors(self, values: Values, events: Values) -> Errors:
         """Errors of values and of times of events, over the output times that both have reached."""
@@ -201,7 +207,7 @@ def establish(subject: Subject, variables: Sequence[str]) -> Truth:
     # Variables and times of events that the exact solution does not state are those of two methods.
     known = {name: exact[name] for name in variables if name in exact}
     alone = len(known) == len(variables) and not event_times(trajectory)
-    beside = _of_run("", trajectory, variables, {}, {}) if alone else numerical(subject, variables)
+    beside = Truth.of(trajectory, "", variables) if alone else numerical(subject, variables)
     noise = replace(beside, times=result.times, values=known, events={}).errors(moved, {}).by_kind
     uncertain = {
         kind: {**errors, **{name: error + EPS for name, error in noise[kind].items()}}
@@ -248,26 +254,13 @@ def _extrapolated(subject: Subject, method: str, variables: Sequence[str]) -> Tr
     before, after = ({name: computed(run)[name][:n] for name in variables} for run in (loose, tight))
     events, last = event_times(loose), event_times(tight)
     if loose.status != tight.status or difference(events, last):
-        raise InputError(
-            f"{subject.case.name} has no reference: {method} comes to other ends or events when it is tighter."
-        )
+        name = subject.case.name
+        raise InputError(f"{name} has no reference: {method} comes to other ends or events when it is tighter.")
     values = {name: _limit(before[name], after[name]) for name in variables}
-    truth = _of_run(method, tight, variables, values, {name: _limit(events[name], last[name]) for name in last})
-    truth = replace(truth, times=truth.times[:n])
+    whole = Truth.of(tight, method, variables)
+    limits = {name: _limit(events[name], last[name]) for name in last}
+    truth = replace(whole, times=whole.times[:n], values=values, events=limits)
     return replace(truth, uncertainty=truth.errors(after, last))
-
-
-def _of_run(source: str, run: Trajectory, variables: Sequence[str], values: Values, events: Values) -> Truth:
-    known = floors(run)
-    return Truth(
-        source,
-        run.status,
-        run.result.times,
-        values,
-        {name: known[name] for name in variables},
-        events,
-        run.run.times[-1],
-    )
 
 
 def _limit(loose: Array, tight: Array) -> Array:
