@@ -1,10 +1,15 @@
-"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one."""
+"""Figures of runs: states, fluxes and balances over time, the exact solution dashed where the dataset has one.
+
+Events are thin lines with their names, stages and modes are bands.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -13,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
-from surfacechem.plots import overlays, style
+from surfacechem.plots import style
 from surfacechem.plots.style import Array, meaning, symbol, unit, unit_text, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
@@ -47,6 +52,12 @@ PROFILE = re.compile("profile_[12]")
 PROFILE_TIMES = 6
 """Times at which profiles are drawn, evenly spread over the outputs."""
 
+FEW, MANY = 8, 60
+"""Up to this many events have their names written to them; above so many lines nothing could be told from them."""
+
+WIDE = 0.09
+"""Part of the run that a stage must last for its name to fit."""
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -60,7 +71,8 @@ class Panel:
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """The figure of a run; ``variables`` are shown instead of the usual choice, over ``against`` instead of time."""
     style.check(dataset, {"time": ("time",)})
-    if not np.isfinite(dataset["time"].values).all():
+    times = dataset["time"].values
+    if not np.isfinite(times).all():
         raise InputError("time does not hold finite numbers.", style.place(dataset))
     if variables and any(map(PROFILE.fullmatch, variables)):
         return _across(dataset, variables)
@@ -76,7 +88,12 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         if balances:
             _draw_balances(axes[-1], dataset)
         if against is None:
-            _time_axis(axes, dataset)
+            axes[-1].set_xlabel("Time [s]")
+            for ax in axes if logarithmic(times) else ():
+                ax.set(xscale="log", xlim=(times[times > 0][0], times[-1]))
+            if len(times) > 1:
+                _draw_bands(axes, dataset)
+            _draw_events(axes, dataset)
         else:
             axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{unit_text(unit(dataset[against]))}]")
             axes[-1].ticklabel_format(axis="x", useOffset=False, scilimits=(-3, 5))
@@ -89,46 +106,36 @@ def curves(dataset: xarray.Dataset) -> list[str]:
     return [str(n) for n, values in dataset.data_vars.items() if values.dims == ("time",) and values.dtype.kind == "f"]
 
 
+def is_mode(values: xarray.DataArray) -> bool:
+    """True for a mode of the automaton, as the long name of a variable says."""
+    return str(values.attrs.get("long_name", "")).startswith("mode (")
+
+
 def of_kind(dataset: xarray.Dataset, names: Sequence[str], unit_wanted: str, pattern: str) -> list[str]:
     """Those of the names that a panel of the usual figure shows; modes are shown as bands, exact values dashed."""
-    return [
-        name
-        for name in names
-        if unit(dataset[name]) == unit_wanted
-        and re.fullmatch(pattern, name)
-        and not (name.endswith("_exact") or overlays.is_mode(dataset[name]))
-    ]
+    fitting = [name for name in names if unit(dataset[name]) == unit_wanted and re.fullmatch(pattern, name)]
+    return [name for name in fitting if not (name.endswith("_exact") or is_mode(dataset[name]))]
 
 
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: str | None) -> list[Panel]:
-    """Panels of the variables, or of all that vary, without the variable that is their axis."""
+    """Panels of the variables by unit, or of all that vary by kind, without the variable that is their axis."""
     known = curves(dataset)
     for name in (*(variables or ()), *([against] if against else ())):
         if name not in known:
             raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
-    panels = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
-    panels = [replace(panel, names=[name for name in panel.names if name != against]) for panel in panels]
-    return [panel for panel in panels if panel.names]
-
-
-def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(unit(dataset[name]), []).append(name)
-    titles = [meaning(dataset[group[0]]) if len(group) == 1 else "" for group in groups.values()]
-    titles = [title if len(title) < TOO_LONG else "" for title in titles]
-    return [Panel(title, *group) for title, group in zip(titles, groups.items(), strict=True)]
-
-
-def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
     panels = []
-    for title, wanted, pattern in KINDS:
+    for wanted in dict.fromkeys(unit(dataset[name]) for name in variables or ()):
+        group = [name for name in dict.fromkeys(variables or ()) if unit(dataset[name]) == wanted]
+        title = meaning(dataset[group[0]]) if len(group) == 1 else ""
+        panels.append(Panel(title if len(title) < TOO_LONG else "", wanted, group))
+    for title, wanted, pattern in () if variables else KINDS:
         names = of_kind(dataset, known, wanted, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
         if any(varies(dataset[name].values) for name in names):
             panels.append(Panel(title, wanted, names))
-    return panels
+    panels = [replace(panel, names=[name for name in panel.names if name != against]) for panel in panels]
+    return [panel for panel in panels if panel.names]
 
 
 def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
@@ -141,12 +148,10 @@ def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
         for j, i in enumerate(shown.tolist()):
             colour = matplotlib.colormaps["viridis"](j / max(len(shown) - 1, 1) * 0.9)
             for name in names:
-                side = -1e3 if name == "profile_1" else 1e3
+                side = -1e3 if name == "profile_1" else 1e3  # [mm]
                 label = f"{float(dataset.time[i]):.3g} s" if name == names[0] else None
-                values = dataset[name].values[i]
-                ax.plot(side * dataset[f"x_{name[-1]}"].values, values, color=colour, label=label)
-        ax.set_xlabel("Distance from the contact [mm], body 1 to the left")
-        ax.set_ylabel("Temperature [K]")
+                ax.plot(side * dataset[f"x_{name[-1]}"].values, dataset[name].values[i], color=colour, label=label)
+        ax.set(xlabel="Distance from the contact [mm], body 1 to the left", ylabel="Temperature [K]")
         style.legend(ax)
         style.headings(plot, ax, dataset)
     return plot
@@ -156,10 +161,10 @@ def _draw(ax: Axes, dataset: xarray.Dataset, panel: Panel, over: str) -> None:
     t = dataset[over].values
     for names in merged(dataset, panel.names):
         ax.plot(t, dataset[names[0]].values, label=" = ".join(map(symbol, names)), marker="o" if len(t) == 1 else "")
-    exact = [name for name in panel.names if f"{name}_exact" in curves(dataset)]
-    for j, name in enumerate(exact):
-        values = dataset[f"{name}_exact"].values
-        ax.plot(t, values, "--", color="black", linewidth=0.9, label="exact" if j == 0 else "_")
+    exact = [f"{name}_exact" for name in panel.names if f"{name}_exact" in curves(dataset)]
+    for name in exact:
+        label = "exact" if name == exact[0] else "_"
+        ax.plot(t, dataset[name].values, "--", color="black", linewidth=0.9, label=label)
     ax.set_ylabel(f"{panel.title} [{unit_text(panel.unit)}]".strip())
     ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 5))
     drawn = np.concatenate([dataset[name].values for name in panel.names])
@@ -185,31 +190,67 @@ def merged(dataset: xarray.Dataset, names: Sequence[str]) -> list[list[str]]:
 
 def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     """Residuals relative to what their attributes state as the largest relative value."""
-    for name, attribute in RESIDUALS.items():
-        if name not in curves(dataset):
-            continue
-        relative = np.abs(dataset[name].values)
+    known = curves(dataset)
+    for name in (name for name in RESIDUALS if name in known):
+        relative, largest = np.abs(dataset[name].values), style.number(dataset, RESIDUALS[name])
         worst = float(np.max(relative, initial=0.0))
-        largest = style.number(dataset, attribute)
-        if worst > 0 and largest is not None:
-            relative = relative / worst * largest
+        relative = relative / worst * largest if worst > 0 and largest is not None else relative
         ax.plot(dataset["time"].values, np.maximum(relative, LEAST), label=name.partition("_")[0], linewidth=1.2)
     ax.set_yscale("log")
     low, high = ax.get_ylim()
-    ax.set_ylim(min(low, LEAST), max(high, ROUNDING))
-    ax.set_ylabel("Balance residual [1]")
+    ax.set(ylim=(min(low, LEAST), max(high, ROUNDING)), ylabel="Balance residual [1]")
     style.legend(ax)
 
 
-def _time_axis(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
-    times = dataset["time"].values
-    axes[-1].set_xlabel("Time [s]")
-    if logarithmic(times):
+def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """Thin vertical lines at the events; ends of stages show as bands."""
+    if "event_time" not in dataset:
+        return
+    named = {"event_name": ("event",)} if "event_name" in dataset else {}
+    style.check(dataset, {"event_time": ("event",)}, named)
+    times = dataset["event_time"].values
+    names = dataset["event_name"].values.astype(str) if named else np.full(times.shape, "")
+    moments = dict(zip(times.tolist(), names.tolist(), strict=True))
+    for moment in moments if len(moments) <= MANY else ():
         for ax in axes:
-            ax.set_xscale("log")
-            ax.set_xlim(times[times > 0][0], times[-1])
-    overlays.bands(axes, dataset)
-    overlays.events(axes, dataset)
+            ax.axvline(moment, color="black", linewidth=0.6, linestyle=":")
+    told = {t: name for t, name in moments.items() if not name.startswith("end of ")}
+    for moment, name in told.items() if len(told) <= FEW else ():
+        _write(axes[0], moment, name, rotation=90, ha="right", va="top", y=0.97)
+
+
+def _draw_bands(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """The stages of a programme, every other one; else times in which a mode is not what it was at the start."""
+    modes = [str(name) for name, values in dataset.data_vars.items() if is_mode(values) and values.dims == ("time",)]
+    times = dataset["time"].values
+    staged = "stage" in modes
+    for name in ["stage"] if staged else modes:
+        spans = _spans(dataset, name)
+        shaded = [span for span in spans if (span[2] % 2 if staged else span[2] != spans[0][2])]
+        for (start, end, _), ax in product(shaded if len(shaded) <= MANY else (), axes):
+            ax.axvspan(start, end, color="black", alpha=0.05, linewidth=0)
+        words = dict(re.findall(r"(-?\d+): ([^,)]+)", str(dataset[name].attrs["long_name"])))
+        for start, end, value in spans if staged else ():
+            if end - start > WIDE * float(np.ptp(times)):
+                _write(axes[0], (start + end) / 2, words.get(f"{value:.0f}", ""), ha="center", va="bottom", y=0.02)
+
+
+def _spans(dataset: xarray.Dataset, name: str) -> list[tuple[float, float, float]]:
+    """Start, end and value of a mode between events; what lies between two outputs is too short to be seen."""
+    times, values = dataset["time"].values, dataset[name].values.astype(float)
+    known = dataset["event_time"].values if "event_time" in dataset else np.empty(0)
+    changes = [j for j in range(1, len(values)) if values[j] != values[j - 1]]
+    edges = [float(times[0])]
+    for j in changes:
+        inside = known[(known >= times[j - 1]) & (known <= times[j])]
+        edges.append(float(inside[-1] if len(inside) else times[j]))
+    return list(zip(edges, [*edges[1:], float(times[-1])], values[[0, *changes]].tolist(), strict=True))
+
+
+def _write(ax: Axes, x: float, text: str, y: float, **how: Any) -> None:
+    """A small word at a time, at a height relative to the panel."""
+    if text:
+        ax.text(x, y, text, transform=ax.get_xaxis_transform(), fontsize=7, color="#555555", clip_on=True, **how)
 
 
 def logarithmic(times: Array) -> bool:

@@ -10,13 +10,12 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import NullFormatter
 
 from surfacechem.plots import style
-from surfacechem.plots.style import COLOURS, Array
+from surfacechem.plots.style import COLOURS
 from surfacechem.tolerances import EPS
 
 
@@ -97,25 +96,23 @@ def _draw_solver(ax: Axes, cells: xarray.Dataset, name: str, limit: float, colou
     for below, fill in ((True, "white"), (False, colour)):
         some = shown & ((x < limit) == below)
         ax.plot(x[some], y[some], marker, color=colour, markerfacecolor=fill, markersize=4.5)
-    lost = (cells["status"].values == "failed") & np.isfinite(y)
-    edge = np.full(int(lost.sum()), 0.985)
-    ax.plot(edge, y[lost], "x", color=colour, markersize=5, transform=ax.get_yaxis_transform())
+    lost = y[(cells["status"].values == "failed") & np.isfinite(y)]
+    ax.plot(np.full(len(lost), 0.985), lost, "x", color=colour, markersize=5, transform=ax.get_yaxis_transform())
 
 
 def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2D]:
     status, handles = dataset["status"], []
     for k, (colour, marker) in enumerate(looks[: dataset.sizes["solver"]]):
-        out = bool((status.isel(solver=k) == "omitted").all())
-        label = f"{dataset['solver_name'].values[k]}{' (left out)' if out else ''}"
+        out = " (left out)" if bool((status.isel(solver=k) == "omitted").all()) else ""
+        label = f"{dataset['solver_name'].values[k]}{out}"
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.0, label=label))
-    if bool(np.isfinite(dataset["stepping_seconds"]).any()):
-        handles.append(Line2D([], [], color="0.4", linestyle="--", linewidth=0.8, label=INSIDE))
-    grey: dict[str, Any] = {"color": "0.4", "linestyle": "none"}
-    if bool((status == "failed").any()):
-        handles.append(Line2D([], [], marker="x", label="failed", **grey))
-    if any(bool((dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"]).any()) for kind in ("max", "event")):
-        handles.append(Line2D([], [], marker="o", markerfacecolor="white", label=BELOW, **grey))
-    return handles
+    below = (dataset[f"error_{kind}"] < dataset[f"uncertainty_{kind}"] for kind in ("max", "event"))
+    marks: list[tuple[bool, str, dict[str, Any]]] = [
+        (bool(np.isfinite(dataset["stepping_seconds"]).any()), INSIDE, {"linestyle": "--", "linewidth": 0.8}),
+        (bool((status == "failed").any()), "failed", {"marker": "x", "linestyle": "none"}),
+        (any(bool(b.any()) for b in below), BELOW, {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}),
+    ]
+    return handles + [Line2D([], [], color="0.4", label=label, **how) for there, label, how in marks if there]
 
 
 # -- digits kept -------------------------------------------------------------------------------------------------------
@@ -147,10 +144,11 @@ def stability(dataset: xarray.Dataset) -> Figure:
     height, width, count = (dataset.sizes[name] for name in cell)
     size = 2.2 + 0.23 * width * (count + 1), 1.3 + 0.26 * height
     with style.panels(*size, 1, count + 1, sharey=True) as (plot, (axes,)):
-        image = _heat_map(axes[0], "possible", dataset["possible"].values)
-        for j, ax in enumerate(axes[1:]):
-            digits, outcomes = dataset["digits"].values[:, :, j].copy(), dataset["outcome"].values[:, :, j].astype(str)
-            for i, k in np.argwhere(np.isfinite(digits)):
+        titles = ["possible", *map(str, dataset["solver"].values)]
+        for j, (ax, title) in enumerate(zip(axes, titles, strict=True)):
+            digits = (dataset["digits"].values[:, :, j - 1] if j else dataset["possible"].values).copy()
+            outcomes = dataset["outcome"].values[:, :, j - 1].astype(str)
+            for i, k in np.argwhere(np.isfinite(digits)) if j else ():
                 dark = outcomes[i, k] not in NO_ANSWER and digits[i, k] > DARK
                 how: Any = {"ha": "center", "va": "center", "fontsize": 7, "color": "white" if dark else "black"}
                 ax.text(k, i, MARKS.get(outcomes[i, k], ""), **how)
@@ -158,25 +156,18 @@ def stability(dataset: xarray.Dataset) -> Figure:
                     colour = NO_ANSWER[outcomes[i, k]]
                     ax.add_patch(Rectangle((k - 0.5, i - 0.5), 1.0, 1.0, facecolor=colour, edgecolor="none"))
                     digits[i, k] = np.nan
-            _heat_map(ax, str(dataset["solver"].values[j]), digits)
+            image = ax.imshow(digits, norm=Normalize(0.0, 14.0), cmap="YlGnBu", aspect="auto")
+            ax.set_title(title, fontsize=9)
+            ax.grid(visible=False)
+            ax.set_xticks([])
+            ax.tick_params(length=0)
+            ax.spines[:].set_visible(False)
         axes[0].set_yticks(range(height), dataset["regime"].values.astype(str).tolist())
         axes[(count + 1) // 2].set_xlabel("towards the extreme →")
         plot.colorbar(image, ax=list(axes), label="digits", fraction=0.03, pad=0.01)
-        handles = [
-            Patch(facecolor="none", edgecolor="none", label=f"{MARKS[n]}  {text}") for n, text in MEANING.items()
-        ]
+        nothing: Any = {"facecolor": "none", "edgecolor": "none"}
+        handles = [Patch(label=f"{MARKS[name]}  {text}", **nothing) for name, text in MEANING.items()]
         columns = min(4, max(1, int(size[0] / 1.9)))  # the longest of the texts takes 1.9 inches
         look: Any = {"ncols": columns, "handlelength": 0, "frameon": False, "fontsize": 8}
         plot.legend(handles=handles, loc="outside lower center", **look)
     return plot
-
-
-def _heat_map(ax: Axes, title: str, digits: Array) -> AxesImage:
-    image = ax.imshow(digits, norm=Normalize(0.0, 14.0), cmap="YlGnBu", aspect="auto")
-    ax.set_title(title, fontsize=9)
-    ax.grid(visible=False)
-    ax.set_xticks([])
-    ax.tick_params(length=0)
-    for side in ax.spines.values():
-        side.set_visible(False)
-    return image

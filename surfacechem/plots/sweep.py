@@ -31,18 +31,15 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None) -> F
         raise InputError("the dataset does not hold the parameters of a sweep.")
     style.check(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
     panels = _panels(dataset, variables)
-    with style.panels(6.4, 0.9 + (2.8 if len(panels) == 1 else 1.7) * len(panels), len(panels), sharex=True) as (
-        plot,
-        grid,
-    ):
+    height = 0.9 + (2.8 if len(panels) == 1 else 1.7) * len(panels)
+    with style.panels(6.4, height, len(panels), sharex=True) as (plot, grid):
         for ax, draw in zip(grid[:, 0], panels, strict=True):
             draw(ax)
             style.legend(ax)
+            if recorded_plan(str(dataset.attrs["sweep"])).axes[0].logarithmic:
+                ax.set_xscale("log")
         parameter = dataset[axes[0]]
         grid[-1, 0].set_xlabel(f"{meaning(parameter, ' (')} [{unit_text(unit(parameter))}]")
-        if recorded_plan(str(dataset.attrs["sweep"])).axes[0].logarithmic:
-            for ax in grid[:, 0]:
-                ax.set_xscale("log")
         style.headings(plot, grid[0, 0], dataset)
     return plot
 
@@ -53,29 +50,26 @@ def _axes(dataset: xarray.Dataset) -> list[str]:
 
 
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Callable[[Axes], None]]:
-    known = _numbers(dataset)
+    """What is drawn: the variables, else the load at rupture, else temperatures and bonds that depend on the sweep."""
+    # Numbers that each run has at its end or along it.
+    known = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
     for name in variables or ():
         if name not in known:
             raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
     load = next((name.removesuffix("_mode") for name in known if name.endswith("_mode")), "")
     if not variables and {f"{load}_{which}" for which in STATISTICS} <= set(known):
         return [partial(_draw_spectrum, dataset=dataset, load=load)]
-    groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset, known) or [["time_reached"]]
-    return [partial(_draw_final, dataset=dataset, names=names) for names in groups]
-
-
-def _numbers(dataset: xarray.Dataset) -> list[str]:
-    """Names of the numbers that each run has at its end or along it."""
-    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
-
-
-def _dependent(dataset: xarray.Dataset, known: Sequence[str]) -> list[list[str]]:
-    """Temperatures and bonds whose final values depend on what is swept; each alone where that has several axes."""
-    axes = _axes(dataset)
-    along = [name for name in known if dataset[name].ndim > len(axes)]
-    groups = [of_kind(dataset, along, *kind) for _, *kind in KINDS[:2]]
-    groups = [[name for name in group if varies(_final(dataset, name).ravel())] for group in groups]
-    return [[name] for group in groups for name in group] if len(axes) > 1 else [group for group in groups if group]
+    groups = [[name] for name in dict.fromkeys(variables or ())]
+    if not groups:
+        axes = _axes(dataset)
+        along = [name for name in known if dataset[name].ndim > len(axes)]
+        kinds = [of_kind(dataset, along, *kind) for _, *kind in KINDS[:2]]
+        groups = [[name for name in names if varies(_final(dataset, name).ravel())] for names in kinds]
+        # Each alone where several curves are drawn of it.
+        groups = (
+            [[name] for names in groups for name in names] if len(axes) > 1 else [names for names in groups if names]
+        )
+    return [partial(_draw_final, dataset=dataset, names=names) for names in groups or [["time_reached"]]]
 
 
 def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
@@ -90,9 +84,13 @@ def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:
 
 def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
     """Most probable, median and mean load at rupture, the exact ones as lines."""
-    x, (scale, prefixed) = dataset[_axes(dataset)[0]].values, _prefixed(dataset[f"{load}_mean"])
+    x, mean = dataset[_axes(dataset)[0]].values, dataset[f"{load}_mean"]
+    # A power of a thousand that suits the loads, and their unit with its prefix.
+    largest, own = float(np.nanmax(np.abs(mean.values), initial=0.0)), unit(mean)
+    usable = PREFIXES if own in ("N", "Pa", "m") and largest > 0 else ()
+    scale, prefix = next(((scale, prefix) for scale, prefix in usable if largest >= scale), (1.0, ""))
+    every = max(1, len(x) // 40)
     for (which, word), colour, marker in zip(STATISTICS.items(), COLOURS, "osD", strict=False):
-        every = max(1, len(x) // 40)
         for j, (values, label) in enumerate(_curves(dataset, dataset[f"{load}_{which}"].values)):
             (points,) = ax.plot(x[::every], values[::every] / scale, marker, color=colour, markersize=3.5)
             points.set(label=f"{word} {label}".strip(), alpha=1 / (1 + 0.5 * j))
@@ -100,15 +98,7 @@ def _draw_spectrum(ax: Axes, dataset: xarray.Dataset, load: str) -> None:
             for values, _ in _curves(dataset, dataset[f"{load}_{which}_exact"].values):
                 ax.plot(x, values / scale, color=colour, linewidth=0.9, label="_")
     ax.plot([], [], color="black", linewidth=0.9, label="exact" if f"{load}_mode_exact" in dataset else "_")
-    ax.set_ylabel(f"{symbol(load)} at rupture [{prefixed}]")
-
-
-def _prefixed(values: xarray.DataArray) -> tuple[float, str]:
-    """A power of a thousand that suits the values, and their unit with its prefix."""
-    largest = float(np.nanmax(np.abs(values.values), initial=0.0))
-    if unit(values) not in ("N", "Pa", "m") or largest == 0.0:
-        return 1.0, unit_text(unit(values))
-    return next(((scale, prefix + unit(values)) for scale, prefix in PREFIXES if largest >= scale), (1.0, unit(values)))
+    ax.set_ylabel(f"{symbol(load)} at rupture [{prefix}{unit_text(own)}]")
 
 
 def _draw_final(ax: Axes, dataset: xarray.Dataset, names: Sequence[str]) -> None:
