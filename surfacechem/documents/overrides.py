@@ -67,13 +67,13 @@ def parameter_path(path: str, known: Container[str]) -> str:
 
 
 def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[str, Tree]]:
-    for item in overrides.items() if isinstance(overrides, Mapping) else overrides:
-        if isinstance(item, str):
-            path, equals, value = (part.strip() for part in item.partition("="))
-            if not equals or not path:
-                raise InputError(f"'{item}' is not of the form path=value, for example `run.until=5 s`.", Place(ORIGIN))
-        else:
-            path, value = item
+    given: list[tuple[str, object]] = list(overrides.items()) if isinstance(overrides, Mapping) else []
+    for text in () if isinstance(overrides, Mapping) else overrides:
+        path, equals, after = text.partition("=")
+        if not equals or not path.strip():
+            raise InputError(f"'{text}' is not of the form path=value, for example `run.until=5 s`.", Place(ORIGIN))
+        given.append((path.strip(), after))
+    for path, value in given:
         place = Place(ORIGIN, 0, path)
         try:
             plain = parse(value).plain() if isinstance(value, str) and value.strip() else value
@@ -84,26 +84,30 @@ def _pairs(overrides: Sequence[str] | Mapping[str, object]) -> Iterator[tuple[st
 
 def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     """The tree with a new value below it, or without one where that is none."""
-    if not keys:
-        # A number in place of one that varies keeps its factors.
+    if not keys:  # a number in place of one that varies keeps its factors
         varies = isinstance(tree.value, dict) and {"value", "times"} >= set(tree.value) >= {"value"}
         bare = not isinstance(new.value, dict | list)
         return replace(tree, value={**tree.value, "value": new}) if varies and bare else new
-    (first, *rest), removes = keys, len(keys) == 1 and _removes(new)
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
+    (first, *rest), removes = keys, len(keys) == 1 and _removes(new)
     if not rest and first in WRITTEN_OUT and not (isinstance(tree.value, dict) or removes):
         return new  # a bare value is, for example, the level of a constant history
-    known = {} if tree.value is None else tree.value
-    if isinstance(known, str) and tree.place.path in WHOLE:
-        known = {WHOLE[tree.place.path]: tree}
-    elif not isinstance(known, dict):
-        raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
+    known = _entries(tree, place)
     if not removes:
         return replace(tree, value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
     if first not in known:
         raise InputError(f"there is no '{first}' to remove.{suggestion(first, known)}", place)
     return replace(tree, value={name: child for name, child in known.items() if name != first})
+
+
+def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
+    """The keys of a mapping, also of one that its only value stands for, or of none."""
+    if isinstance(tree.value, str) and tree.place.path in WHOLE:
+        return {WHOLE[tree.place.path]: tree}
+    if tree.value is not None and not isinstance(tree.value, dict):
+        raise InputError(f"{tree.place.path or 'the document'} is a value, not a mapping.", place)
+    return tree.value or {}
 
 
 def _removes(new: Tree) -> bool:

@@ -371,10 +371,8 @@ class Entries(Content):
 
     def read(self, tree: Tree, name: str, context: Context) -> dict[str, Any]:
         """The values by name."""
-        count = len(tree.value) if isinstance(tree.value, dict) else 0 if tree.value is None else 1
-        if self.wanted and not (isinstance(tree.value, dict) and 1 <= count <= (self.at_most or math.inf)):
-            got = "; none is given" if not count else f"; {count} are given" if count > 1 else f", not {tree.shown}"
-            raise tree.error(f"{self.wanted}{got}.")
+        if self.wanted:
+            self._check_count(tree)
         known = [*self.each, *self.names(context)] if self.names else None if self.others else [*self.each]
         units, found = {**self.units, **context.units}, {}
         for key, child in tree.mapping(None if self.by_scene else known, self.what).items():
@@ -384,6 +382,12 @@ class Entries(Content):
             else:
                 found[key] = content.read(child, key, replace(context, x=units.get(key, "1")))
         return found
+
+    def _check_count(self, tree: Tree) -> None:
+        count = len(tree.value) if isinstance(tree.value, dict) else 0 if tree.value is None else 1
+        if not (isinstance(tree.value, dict) and 1 <= count <= (self.at_most or math.inf)):
+            got = "; none is given" if not count else f"; {count} are given" if count > 1 else f", not {tree.shown}"
+            raise tree.error(f"{self.wanted}{got}.")
 
     def schema(self) -> Schema:
         """An object with these names."""

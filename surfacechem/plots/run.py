@@ -71,8 +71,7 @@ class Panel:
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, against: str | None = None) -> Figure:
     """The figure of a run; ``variables`` are shown instead of the usual choice, over ``against`` instead of time."""
     style.check(dataset, {"time": ("time",)})
-    times = dataset["time"].values
-    if not np.isfinite(times).all():
+    if not np.isfinite(dataset["time"].values).all():
         raise InputError("time does not hold finite numbers.", style.place(dataset))
     if variables and any(map(PROFILE.fullmatch, variables)):
         return _across(dataset, variables)
@@ -88,12 +87,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None, agai
         if balances:
             _draw_balances(axes[-1], dataset)
         if against is None:
-            axes[-1].set_xlabel("Time [s]")
-            for ax in axes if logarithmic(times) else ():
-                ax.set(xscale="log", xlim=(times[times > 0][0], times[-1]))
-            if len(times) > 1:
-                _draw_bands(axes, dataset)
-            _draw_events(axes, dataset)
+            _draw_time(axes, dataset)
         else:
             axes[-1].set_xlabel(f"{meaning(dataset[against])} {symbol(against)} [{unit_text(unit(dataset[against]))}]")
             axes[-1].ticklabel_format(axis="x", useOffset=False, scilimits=(-3, 5))
@@ -123,19 +117,29 @@ def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None, against: s
     for name in (*(variables or ()), *([against] if against else ())):
         if name not in known:
             raise InputError(f"no variable '{name}' over time in the dataset.{suggestion(name, known)}")
+    panels = _by_unit(dataset, list(dict.fromkeys(variables))) if variables else _by_kind(dataset, known)
+    panels = [replace(panel, names=[name for name in panel.names if name != against]) for panel in panels]
+    return [panel for panel in panels if panel.names]
+
+
+def _by_unit(dataset: xarray.Dataset, names: Sequence[str]) -> list[Panel]:
     panels = []
-    for wanted in dict.fromkeys(unit(dataset[name]) for name in variables or ()):
-        group = [name for name in dict.fromkeys(variables or ()) if unit(dataset[name]) == wanted]
+    for wanted in dict.fromkeys(unit(dataset[name]) for name in names):
+        group = [name for name in names if unit(dataset[name]) == wanted]
         title = meaning(dataset[group[0]]) if len(group) == 1 else ""
         panels.append(Panel(title if len(title) < TOO_LONG else "", wanted, group))
-    for title, wanted, pattern in () if variables else KINDS:
+    return panels
+
+
+def _by_kind(dataset: xarray.Dataset, known: Sequence[str]) -> list[Panel]:
+    panels = []
+    for title, wanted, pattern in KINDS:
         names = of_kind(dataset, known, wanted, pattern)
         if title == "Heat flux" and {"q_1", "q_2"} & set(names):
             names = [name for name in names if name in ("q_1", "q_2")]
         if any(varies(dataset[name].values) for name in names):
             panels.append(Panel(title, wanted, names))
-    panels = [replace(panel, names=[name for name in panel.names if name != against]) for panel in panels]
-    return [panel for panel in panels if panel.names]
+    return panels
 
 
 def _across(dataset: xarray.Dataset, names: Sequence[str]) -> Figure:
@@ -200,6 +204,17 @@ def _draw_balances(ax: Axes, dataset: xarray.Dataset) -> None:
     low, high = ax.get_ylim()
     ax.set(ylim=(min(low, LEAST), max(high, ROUNDING)), ylabel="Balance residual [1]")
     style.legend(ax)
+
+
+def _draw_time(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:
+    """The axis of time, with bands of modes and lines at events."""
+    times = dataset["time"].values
+    axes[-1].set_xlabel("Time [s]")
+    for ax in axes if logarithmic(times) else ():
+        ax.set(xscale="log", xlim=(times[times > 0][0], times[-1]))
+    if len(times) > 1:
+        _draw_bands(axes, dataset)
+    _draw_events(axes, dataset)
 
 
 def _draw_events(axes: Sequence[Axes], dataset: xarray.Dataset) -> None:

@@ -50,7 +50,7 @@ def _axes(dataset: xarray.Dataset) -> list[str]:
 
 
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Callable[[Axes], None]]:
-    """What is drawn: the variables, else the load at rupture, else temperatures and bonds that depend on the sweep."""
+    """The panels of the variables, else of the load at rupture, else of what depends on the sweep."""
     # Numbers that each run has at its end or along it.
     known = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
     for name in variables or ():
@@ -59,17 +59,18 @@ def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Ca
     load = next((name.removesuffix("_mode") for name in known if name.endswith("_mode")), "")
     if not variables and {f"{load}_{which}" for which in STATISTICS} <= set(known):
         return [partial(_draw_spectrum, dataset=dataset, load=load)]
-    groups = [[name] for name in dict.fromkeys(variables or ())]
-    if not groups:
-        axes = _axes(dataset)
-        along = [name for name in known if dataset[name].ndim > len(axes)]
-        kinds = [of_kind(dataset, along, *kind) for _, *kind in KINDS[:2]]
-        groups = [[name for name in names if varies(_final(dataset, name).ravel())] for names in kinds]
-        # Each alone where several curves are drawn of it.
-        groups = (
-            [[name] for names in groups for name in names] if len(axes) > 1 else [names for names in groups if names]
-        )
-    return [partial(_draw_final, dataset=dataset, names=names) for names in groups or [["time_reached"]]]
+    groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset, known) or [["time_reached"]]
+    return [partial(_draw_final, dataset=dataset, names=names) for names in groups]
+
+
+def _dependent(dataset: xarray.Dataset, known: Sequence[str]) -> list[list[str]]:
+    """Temperatures and bonds whose final values depend on what is swept; each alone where that has several axes."""
+    axes, groups = _axes(dataset), []
+    along = [name for name in known if dataset[name].ndim > len(axes)]
+    for _, *kind in KINDS[:2]:
+        names = [name for name in of_kind(dataset, along, *kind) if varies(_final(dataset, name).ravel())]
+        groups += [[name] for name in names] if len(axes) > 1 else [names] if names else []
+    return groups
 
 
 def _curves(dataset: xarray.Dataset, values: Array) -> list[tuple[Array, str]]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import lcm
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import symengine
@@ -52,8 +52,7 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, InterfaceArrhenius)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
-        mixtures = [law for law in mechanism.potentials if isinstance(law, IdealMixture)]
-        self.species: dict[str, Species] = {item.name: item for law in mixtures for item in law.species}
+        self.species = {item.name: item for item in _species_of(mechanism)}
         springs = {name: item.spring for name, item in self.species.items() if item.spring}
         self.pulled = next((name for name, spring in springs.items() if spring.stiffness), "")
         """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
@@ -63,22 +62,26 @@ class Curves:
         """Sites per reference area [1/m^2]."""
         self._coverages = {name: symengine.Symbol(name) for name in self._amounts}
         self._lengths = lengths(self.laws, self.pairs)
-        # The gap at which the pulled bond carries the force; zero where no bond is elastic.
-        pulled = springs.get(self.pulled)
-        gap = pulled.rest_length + FORCE / pulled.stiffness if pulled else 0.0
-        self._known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": gap}
-        self._known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
-        for name, spring in springs.items():
-            self._known[f"f_{self.species[name].variable}"] = spring.stiffness * (gap - spring.rest_length)
-        self._numbers = {
-            symbol: float(getattr(law, name)) for law in self.laws.values() for name, symbol in _symbols(law).items()
-        }
+        self._known = self._names(springs)
+        self._numbers: dict[Expression, float] = {}
+        for law in self.laws.values():
+            self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in _symbols(law).items()}
         self._psi: Expression = 0
         for potential in mechanism.potentials:
-            if isinstance(potential, IdealMixture):  # without interactions, so that no standard state has a coverage
-                plain = tuple(replace(item, interactions=()) for item in potential.species)
-                potential = potential.bind({"species": plain})
+            if isinstance(potential, IdealMixture):  # without interactions, so that standard states have no coverage
+                species = tuple(replace(item, interactions=()) for item in potential.species)
+                potential = potential.bind({"species": species})
             self._psi += self._call(potential.statement)
+
+    def _names(self, springs: Mapping[str, Any]) -> dict[str, Expression]:
+        """What a law may read; the gap is that at which the pulled bond carries the force."""
+        pulled = springs.get(self.pulled)
+        gap = pulled.rest_length + FORCE / pulled.stiffness if pulled else 0.0
+        known: dict[str, Expression] = {**self._coverages, "T_c": TEMPERATURE, "f": FORCE, "g_n": gap}
+        known |= {f"{letter}_{name}": amount for letter in "Nn" for name, amount in self._amounts.items()}
+        for name, spring in springs.items():
+            known[f"f_{self.species[name].variable}"] = spring.stiffness * (gap - spring.rest_length)
+        return known
 
     @property
     def loaded(self) -> bool:
@@ -142,6 +145,10 @@ class Curves:
         return np.asarray(function(points), dtype=np.float64)[..., 0]
 
 
+def _species_of(mechanism: Mechanism) -> list[Species]:
+    return [item for law in mechanism.potentials if isinstance(law, IdealMixture) for item in law.species]
+
+
 def _symbols(law: InterfaceArrhenius) -> dict[str, Expression]:
     """A symbol for every number of a law: the logarithm of one that is zero is infinite only when it is evaluated."""
     return {name: symengine.Symbol(f"{law.label}.{name}") for name, _ in law.specs()}
@@ -170,20 +177,27 @@ class ReactionCycle:
 
 def cycles(curves: Curves) -> list[ReactionCycle]:
     """Independent cycles that hold at least one pair or one-way reaction; others agree by construction."""
-    from sympy import Matrix  # slow to import
-
     paired = {label for pair in curves.pairs for label in pair.labels}
     steps: list[Step] = [*(label for label in curves.laws if label not in paired), *curves.pairs]
     changes = [curves.laws[step].change if isinstance(step, str) else step.change for step in steps]
+    found = []
+    for row in _null_space(changes):
+        taken = [(step, times) for step, times in zip(steps, row, strict=True) if times]
+        if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
+            found.append(ReactionCycle(taken))
+    return found
+
+
+def _null_space(changes: Sequence[Mapping[str, float]]) -> list[list[int]]:
+    """Integer combinations of changes that are none, one for each change that depends on those before it."""
+    from sympy import Matrix  # type: ignore[import-untyped]  # slow to import
+
     names = dict.fromkeys(name for change in changes for name in change)
     rows = [[Fraction(change.get(name, 0)).limit_denominator(1000) for change in changes] for name in names]
     found = []
-    # Combinations of changes that are none, one for each change that depends on those before it.
     for row in Matrix(rows).nullspace() if rows else ():
         scale = lcm(*(int(value.q) for value in row))
-        taken = [(step, int(value * scale)) for step, value in zip(steps, row, strict=True) if value]
-        if any(isinstance(step, Opposed) or not curves.laws[step].reversible for step, _ in taken):
-            found.append(ReactionCycle(taken))
+        found.append([int(value * scale) for value in row])
     return found
 
 

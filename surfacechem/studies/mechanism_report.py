@@ -84,7 +84,7 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
         balance = verdict(curves, label, temperatures, forces)
         reactions += [f"{label}  {law.equation}  ({law.kind}, {place})", f"    {', '.join(numbers)}", f"    {balance}"]
     types = []
-    for kind in dict.fromkeys(map(type, curves.laws.values())):
+    for kind in dict.fromkeys(type(law) for law in curves.laws.values()):
         text = f"{kind.kind}: {source(kind)}".replace("``", "")
         types += textwrap.wrap(text, WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
     cold, pulled = np.array([shown]), curves.pulled or "a bond"

@@ -112,14 +112,7 @@ def precision(
     """
     check_options(solvers, tolerances, repeat, (1, MOST_REPEAT), ("solvers", "tolerances", "repeat"))
     cases = [cases] if isinstance(cases, str | Path) else cases
-    subjects = [subject(load(name, overrides)) for name in cases]
-    names = [one.case.name for one in subjects]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f"the case {twice} is given twice.")
-    known = {name for one in subjects for name in one.names}
-    for name in variables:
-        if name not in known:
-            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
+    subjects = _subjects(cases, overrides, variables)
     tolerances = sorted(set(map(float, tolerances)), reverse=True)
     solvers, variables = tuple(dict.fromkeys(solvers)), tuple(dict.fromkeys(variables))
     compared = [_compared(one, variables, solvers, tolerances, repeat) for one in subjects]
@@ -128,7 +121,7 @@ def precision(
     status = "finished" if all(case.truth for case in compared) else "failed"
     return Study(
         kind="precision",
-        title=f"Error against run time: {', '.join(names)}",
+        title=f"Error against run time: {', '.join(case.name for case in compared)}",
         arguments=[*map(str, cases), *options, *(word for text in written(overrides) for word in ("--set", text))],
         axes={
             "tolerance": tolerances,
@@ -143,6 +136,21 @@ def precision(
         settings={"repeat": repeat, "status": status},
         status=status,
     )
+
+
+def _subjects(
+    cases: Sequence[str | Path], overrides: Sequence[str] | Mapping[str, object], variables: Sequence[str]
+) -> list[Subject]:
+    """The cases; InputError for one that is given twice, and for a variable that none has."""
+    subjects = [subject(load(name, overrides)) for name in cases]
+    names = [one.case.name for one in subjects]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"the case {twice} is given twice.")
+    known = {name for one in subjects for name in one.names}
+    for name in variables:
+        if name not in known:
+            raise InputError(f"no variable '{name}' in the cases.{suggestion(name, known)}", Place(path="variables"))
+    return subjects
 
 
 def subject(simulation: Simulation) -> Subject:
@@ -234,34 +242,33 @@ def _variables() -> Iterator[Variable]:
 def _sections(compared: Sequence[Compared]) -> Iterator[PageSection]:
     yield PageSection("Run time against error", figure=True, details=True)
     for case in compared:
-        lines = [f"reference  {case.reference}"]
-        if case.truth:
-            uncertain = {kind: case.uncertainty(kind) for kind in KINDS}
-            uncertain |= {"events": case.uncertainty("event")} if case.truth.events else {}
-            lines.append(f"uncertain  {', '.join(f'{kind} {error:.1e}' for kind, error in uncertain.items())}")
-        lines.append(f"variables  {', '.join(case.variables)}")
-        lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
-        points = [point for point in case.points.values() if point.outcome != "omitted"]
-        marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
-        tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
-        failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
-        tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
-        yield PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
-        rows = [
-            (p.solver, f"{p.value:.0e}", name, *(f"{p.error(kind, name):.1e}" for kind in KINDS))
-            for p in points
-            if p.errors
-            for name in case.variables
-        ]
-        heading, caption = (
-            ("solver", "rtol", "variable", "final", "max", "L2"),
-            "; ".join(MEANING[kind] for kind in KINDS),
-        )
-        table = PageTable(heading, rows, caption)
-        yield PageSection(f"{case.name}, variable by variable", tables=[table], details=True)
+        yield from _of_case(case)
     yield PageSection("How it was measured", METHOD.split("\n\n"), details=True)
     for case in compared:
         yield PageSection(f"Case {case.name}", [case.subject.case.text], details=True)
+
+
+def _of_case(case: Compared) -> Iterator[PageSection]:
+    lines = [f"reference  {case.reference}"]
+    if case.truth:
+        uncertain = [f"{kind} {case.uncertainty(kind):.1e}" for kind in KINDS]
+        uncertain += [f"events {case.uncertainty('event'):.1e}"] * bool(case.truth.events)
+        lines.append(f"uncertain  {', '.join(uncertain)}")
+    lines.append(f"variables  {', '.join(case.variables)}")
+    lines.append(f"compile    {duration(case.subject.model.compile_seconds)}")
+    points = [point for point in case.points.values() if point.outcome != "omitted"]
+    marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
+    tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
+    failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
+    tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
+    yield PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
+    rows = [
+        (point.solver, f"{point.value:.0e}", name, *(f"{point.error(kind, name):.1e}" for kind in KINDS))
+        for point in points
+        for name in (case.variables if point.errors else ())
+    ]
+    heading, caption = ("solver", "rtol", "variable", "final", "max", "L2"), "; ".join(MEANING[kind] for kind in KINDS)
+    yield PageSection(f"{case.name}, variable by variable", tables=[PageTable(heading, rows, caption)], details=True)
 
 
 def _row(point: WorkPoint, case: Compared) -> list[str]:

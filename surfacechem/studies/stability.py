@@ -183,25 +183,29 @@ def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory |
         reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
         right = isinstance(expected, Refused) and expected.reason in reason
         return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
-    if isinstance(expected, Stops) and done.status == "stopped" and expected.reason in done.reason:
-        outcome, reason = REFUSED, done.reason
-        digits = digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0))
-    elif done.status == "failed" or (done.status == "stopped" and not isinstance(expected, Stops)):
-        return Attempt(FAILED, done.reason, 0.0, known)
-    elif not isinstance(expected, Exact):
-        return Attempt(WRONG, done.reason, 0.0, known)
-    elif expected.events not in (None, len(done.jumps)):
-        return Attempt(WRONG, f"{len(done.jumps)} events, not {expected.events}", 0.0, known)
-    else:
-        compared = {*expected.also, *(state.name for state in done.model.system.states)}
-        exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in compared}
-        errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
-        kept = {name: digits_of(error) for name, error in errors.items()}
-        worst = min(kept, key=lambda name: (kept[name], not math.isnan(errors[name]), -errors[name]))
-        outcome, digits, reason = SOLVED, kept[worst], f"in {worst}"
-    if digits < LEAST:
+    outcome, digits, reason = WRONG, 0.0, done.reason
+    if done.status == "stopped" and isinstance(expected, Stops):
+        if expected.reason in done.reason:
+            outcome, digits = REFUSED, digits_of(abs(done.result.t - expected.t) / (expected.t or 1.0))
+    elif done.status != "finished":
+        outcome = FAILED
+    elif isinstance(expected, Exact) and expected.events not in (None, len(done.jumps)):
+        reason = f"{len(done.jumps)} events, not {expected.events}"
+    elif isinstance(expected, Exact):
+        error, worst = _largest_error(expected, done)
+        outcome, digits, reason = SOLVED, digits_of(error), f"in {worst}"
+    if digits < LEAST and outcome in (SOLVED, REFUSED):
         outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
     return Attempt(outcome, reason, digits, known)
+
+
+def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:
+    """The largest relative error of a run, and the variable that has it."""
+    compared = {*expected.also, *(state.name for state in done.model.system.states)}
+    exact = {name: np.asarray(v) for name, v in expected.values(done.result.times).items() if name in compared}
+    errors = largest_errors(computed(done), exact, {name: least(true) for name, true in exact.items()})
+    worst = max(errors, key=lambda name: math.inf if math.isnan(errors[name]) else errors[name])
+    return errors[worst], worst
 
 
 def digits_of(error: float) -> float:
@@ -304,38 +308,46 @@ def _sections(
 ) -> Iterator[PageSection]:
     """The report; the terminal shows the summary and the corners."""
     headings = ("condition", "possible", f"at rtol {rtol:g}")
-    lines, details = [], []
+    lines = []
     for regime, values, cells in rows:
         known = [cells[solvers[0], value].condition for value in values]
         worst = max((number for number in known if math.isfinite(number)), default=math.nan)
         span = f"{regime.symbol}: {regime.label(values[0])} .. {regime.label(values[-1])}"
-        kept = []
-        for solver in solvers:  # the least digits of all answers, and how many cells failed or are wrong
-            outcomes = [cells[solver, value].outcome for value in values]
-            answers = [cells[solver, value].digits for value in values if cells[solver, value].outcome not in NO_ANSWER]
-            counts = [f"{outcomes.count(word)} {word}" for word in NO_ANSWER if word in outcomes]
-            kept.append(", ".join([f"{min(answers):.1f}" if answers else "none", *counts]))
+        kept = [_kept([cells[solver, value] for value in values]) for solver in solvers]
         lines.append((regime.name, span, *_condition_texts(worst, rtol), *kept))
-        every = []
-        for value in values:
-            first, *_ = attempts = [cells[solver, value] for solver in solvers]
-            texts = (regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in attempts))
-            every.append((*texts, str(first.counters.steps), first.reason))
-        marked = [i for i, v in enumerate(values) if any(cells[s, v].outcome in NO_ANSWER for s in solvers)]
-        of_first = (f"steps of {solvers[0]}", f"{solvers[0]}: where, or why")
-        details.append(PageTable((regime.symbol, *headings, *solvers, *of_first), every, regime.title, marked))
     caption = f"Least digits kept over all values, at rtol {rtol:g}, and the largest condition number"
     summary = PageTable(("regime", "from .. to", *headings, *solvers), lines, caption)
     yield PageSection("Digits kept", [MEANING], [summary], figure=True)
-    if corners:
-        found = []
-        for corner in corners:
-            where = ", ".join(f"{name} = {value:.3g}" for name, value in corner.point.items())
-            worst_cell = f"{corner.cell.text} {corner.cell.reason}"
-            found.append((corner.regime.name, f"{corner.tried}", f"{corner.unsolved}", worst_cell, where))
+    found = []
+    for corner in corners:
+        where = ", ".join(f"{name} = {value:.3g}" for name, value in corner.point.items())
+        said = f"{corner.cell.text} {corner.cell.reason}"
+        found.append((corner.regime.name, f"{corner.tried}", f"{corner.unsolved}", said, where))
+    if found:
         heading, caption = ("regime", "points", "not solved", "worst", "where"), "Worst corners that a search has found"
         yield PageSection("Corners", tables=[PageTable(heading, found, caption)])
-    yield PageSection("Every cell", tables=details, details=True)
+    every = [_details(row, [*headings, *solvers], rtol) for row in rows]
+    yield PageSection("Every cell", tables=every, details=True)
+
+
+def _details(row: MatrixRow, headings: Sequence[str], rtol: float) -> PageTable:
+    """Every cell of a regime, with what was said of the first solver's."""
+    lines, marked = [], []
+    for i, value in enumerate(row.values):
+        first, *_ = cells = [cell for cell in row.cells.values() if cell.value == value]
+        texts = (row.regime.label(value), *_condition_texts(first.condition, rtol), *(cell.text for cell in cells))
+        lines.append((*texts, str(first.counters.steps), first.reason))
+        marked += [i] if any(cell.outcome in NO_ANSWER for cell in cells) else []
+    of_first = (f"steps of {first.solver}", f"{first.solver}: where, or why")
+    return PageTable((row.regime.symbol, *headings, *of_first), lines, row.regime.title, marked)
+
+
+def _kept(cells: Sequence[Attempt]) -> str:
+    """The least digits of all answers, and how many cells failed or are wrong."""
+    outcomes = [cell.outcome for cell in cells]
+    answers = [cell.digits for cell in cells if cell.outcome not in NO_ANSWER]
+    counts = [f"{outcomes.count(word)} {word}" for word in NO_ANSWER if word in outcomes]
+    return ", ".join([f"{min(answers):.1f}" if answers else "none", *counts])
 
 
 def _condition_texts(number: float, rtol: float) -> Sequence[str]:
