@@ -149,7 +149,7 @@ class Hybrid:
         self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
         index = self._edge(arc, point)
         if index is not None:
-            return self.instant.apply(index, self.jumper.equilibria.in_time(index, point, end), point)
+            return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
         if arc.status in LOST and (across := self._across_touch(point)) is not None:
             return across
         # What time could not resolve any more goes on in a time of its own.
@@ -208,7 +208,7 @@ class Hybrid:
             instant.limits = [int(i) for i in fired if i < instant.first and self.problem.margins[i].terminal]
             index = int(fired[-1]) - instant.first
             return index if index >= 0 else None
-        return self.jumper.equilibria.lost(point, self.problem.rtol) if arc.status in LOST else None
+        return self.jumper.folds.reached(point, self.problem.rtol) if arc.status in LOST else None
 
     def _across_touch(self, point: Point) -> Point | None:
         """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""

@@ -20,6 +20,7 @@ from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
 from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point, compiled
+from surfacechem.solve.folds import Folds
 from surfacechem.solve.jump_heat import JumpHeat
 from surfacechem.solve.load_path import LoadPath, LoadStep
 from surfacechem.tolerances import DIGITS, ROUNDING
@@ -106,11 +107,15 @@ class ImpossibleError(Exception):
 class Release:
     """A jump on its way: the state as modes and bonds have jumped, before gaps and temperatures follow."""
 
+    index: int
     edge: Edge
     start: Point
     energy: float
     """What the jump conserves, before it [J/m^2]."""
-    fold: Lost | None = None
+    fold: Lost | None
+    slack: Slack
+    step: LoadStep | None
+    """Loads that have jumped at this moment."""
 
 
 class Jumper:
@@ -119,7 +124,8 @@ class Jumper:
     def __init__(self, system: System, program: Program) -> None:
         self.system = system
         self.states = [state.name for state in system.states]
-        self.equilibria = Equilibria(system, program)
+        self.equilibria = Equilibria(system)
+        self.folds = Folds(self.equilibria, program)
         memory = {item.symbol for item in system.memory}
         kept = [p.symbol in memory or p.path == RESTS for p in system.parameters]
         self.mode_columns = [j for j, keep in enumerate(kept) if keep]
@@ -223,8 +229,10 @@ class Jumper:
 
     def is_loaded(self, before: Point, point: Point) -> bool:
         """Whether a jump of the loads does work or sets anything in motion."""
-        if self.equilibria.pushed(before, point):
-            return True
+        if self.equilibria.items:
+            (last, sizes), (now, _) = self.equilibria.balance(before), self.equilibria.balance(point)
+            if np.any(np.abs(now - last) > BALANCED * sizes):
+                return True
         if not self.system.pulls:
             return False
         old, new = self._far_field(before), self._far_field(point)
@@ -244,18 +252,17 @@ class Jumper:
         """Carry out an edge, ``since`` the one before [s]. ``last`` is the state before loads jump, or where the
         integration ended close to a fold; ``step`` are loads that have jumped at this moment.
         """
-        edge = self.system.edges[index]
-        fold = self.equilibria.at_fold(index, before) if edge.fold is not None else None
-        before, start = self._reset(index, fold.point if fold is not None else before, fold)
+        edge, fold = self.system.edges[index], self.folds.at(index, before)
+        before, start = self._reset(index, before if fold is None else fold.point, fold)
         jump = Jump(before.t, edge, before, start, 0.0, 0.0, IMPOSSIBLE, since)
         if not np.isfinite(self._books(start.inputs())[0]):
             return replace(jump, obstacle=NO_ENERGY)
         books, lift = self._opened(edge, before, last)
-        release = Release(edge, start, float(books[0]), fold)
+        release = Release(index, edge, start, float(books[0]), fold, slack, step)
         if step is not None:
             self._load_path.reach(index, step, before)
         try:
-            rest, shares = self._equilibrated(index, release, slack, step) if edge.equilibrates else (start, None)
+            rest, shares = self._equilibrated(release) if edge.equilibrates else (start, None)
             after, released, heat_out, entropy_out = self._heated(rest, release, shares)
         except ImpossibleError as obstacle:
             return replace(jump, obstacle=str(obstacle))
@@ -300,34 +307,39 @@ class Jumper:
             books[j] = (F_new * g)[accounts.index(name)] if name in accounts else books[j]
         return books, dict(zip(accounts, lift.tolist(), strict=True))
 
-    def _equilibrated(
-        self, index: int, release: Release, slack: Slack, step: LoadStep | None
-    ) -> tuple[Point, Array | None]:
+    def _equilibrated(self, release: Release) -> tuple[Point, Array | None]:
         """Where the gaps come to rest, and the shares of the heat of friction where its way decides them."""
-        edge, start, shares = release.edge, release.start, None
+        shares: Array | None = None
         for _ in range(ROUNDS):
-            after = self._rested(index, release, shares, slack.balanced)
-            if after is None:
-                raise ImpossibleError(NO_REST)
-            still = edge.measure and abs(after.y[self.states.index(edge.measure)]) <= max(slack.noise, slack.drift)
-            if still and release.fold is None:  # what the guard measures has not moved: the modes of the edge hold
-                slip = self.equilibria.slip
-                sliding = 0.0 if slip is None else after.parameters[slip]
-                after = self.equilibria.with_slip(replace(after, parameters=start.parameters), sliding)
-            found = self._path_shares(step, release, after, slack.rtol)
-            agreed = found is None or (shares is not None and np.allclose(found, shares, rtol=0.0, atol=slack.rtol))
+            after = self._kept(release, self._rested(release, shares))
+            found = self._path_shares(release, after)
+            agreed = found is None or (
+                shares is not None and np.allclose(found, shares, rtol=0.0, atol=release.slack.rtol)
+            )
             shares = found
             if agreed or not self._load_path.warms_itself:
                 break
         else:
             raise ImpossibleError(NO_SHARES)
         # Touch leaves gaps where they are; any other jump may leave the domain of a law.
-        closed = [] if edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
+        closed = [] if release.edge.measure else [why for why, end in self._ends if not end(after.inputs())[0] > 0]
         if closed:
             raise ImpossibleError(f"{NO_DOMAIN}: {closed[0]}")
         return after, shares
 
-    def _rested(self, index: int, release: Release, shares: Array | None, balanced: float) -> Point | None:
+    def _kept(self, release: Release, after: Point | None) -> Point:
+        """The end of a jump; with the modes of its edge where what its guard measures has not moved."""
+        if after is None:
+            raise ImpossibleError(NO_REST)
+        edge, slack, slip = release.edge, release.slack, self.equilibria.slip
+        if not edge.measure or release.fold is not None:
+            return after
+        if abs(after.y[self.states.index(edge.measure)]) > max(slack.noise, slack.drift):
+            return after
+        sliding = 0.0 if slip is None else after.parameters[slip]
+        return self.equilibria.with_slip(replace(after, parameters=release.start.parameters), sliding)
+
+    def _rested(self, release: Release, shares: Array | None) -> Point | None:
         """Where the gaps come to rest. What slides may go on, or sticks: friction never pulls it back."""
 
         def heat(rows: Array) -> Array:
@@ -336,28 +348,27 @@ class Jumper:
         found, start, fold = self.equilibria, release.start, release.fold
         slip = 0.0 if found.slip is None else start.parameters[found.slip]
         if not slip:
-            return found.let_go(fold, start.parameters, heat) if fold else found.settle(start, heat)
-        stuck = None if fold is None else found.held_at(index, fold)
-        at_rest = found.with_slip(start, 0.0)
-        trial = found.let_go(stuck, at_rest.parameters, heat) if stuck else found.settle(at_rest, heat)
+            return found.settle(start, heat, lost=fold)
+        stuck = None if fold is None else self.folds.held_at(release.index, fold)
+        trial = found.settle(found.with_slip(start, 0.0), heat, lost=stuck)
         if trial is None:
             return None
         onward = found.with_slip(trial, slip)
-        if found.is_pushed_back(onward, balanced, heat):
+        if found.is_pushed_back(onward, release.slack.balanced, heat):
             return trial
-        if fold is not None and stuck is None:  # it is sliding that is lost
-            return found.let_go(fold, onward.parameters, heat)
-        return found.settle(onward, heat, balanced)
+        # Where sticking keeps the equilibrium it is sliding that is lost.
+        return found.settle(onward, heat, release.slack.balanced, lost=fold if stuck is None else None)
 
-    def _path_shares(self, step: LoadStep | None, release: Release, after: Point, rtol: float) -> Array | None:
+    def _path_shares(self, release: Release, after: Point) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
-        if step is None or release.edge.heat == "snap" or not self._load_path.slides(after):
+        step, edge = release.step, release.edge
+        if step is None or edge.heat == "snap" or not self._load_path.slides(after):
             return None
-        made = float(self._made(after.inputs()[None], release)[0, -1])
-        local = release.edge.heat == "local"
-        broken = release.energy - float(self._energy(release.start.inputs())[0]) if local else 0.0
-        small = self._rounding(after, release.energy)
-        return self._load_path.shares(step, release.start, after, broken, rtol * made + small) if made > small else None
+        made, small = float(self._made(after.inputs()[None], release)[0, -1]), self._rounding(after, release.energy)
+        if not made > small:
+            return None
+        broken = release.energy - float(self._energy(release.start.inputs())[0]) if edge.heat == "local" else 0.0
+        return self._load_path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
 
     def _made(self, rows: Array, release: Release) -> Array:
         """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).

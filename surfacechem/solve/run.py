@@ -228,7 +228,7 @@ class Model:
     @cached_property
     def equilibria(self) -> Equilibria:
         """The quasi-static gaps, with the code that finds them; one a model."""
-        return self.jumper.equilibria if self.jumper else Equilibria(self.system, self.program)
+        return self.jumper.equilibria if self.jumper else Equilibria(self.system)
 
     @cached_property
     def passing(self) -> Passing:
