@@ -25,6 +25,7 @@ from surfacechem.media.coolprop import COMBINED, CoolPropFluid
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.results.error_estimates import computed
+from surfacechem.results.solution import Solution
 from surfacechem.runs import simulation
 from surfacechem.scene import Body, Interface, Medium, Scene
 from surfacechem.solve.run import Model, Run
@@ -301,6 +302,13 @@ def test_a_liquid_that_boils_ends_the_run():
     trajectory = solved(lubricated(medium(), v=20.0), 0.0, 1.0, 5.0)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith("Water at 100000 Pa boils at T_c = 372.752 K")
+
+
+@pytest.mark.parametrize(("T_1", "told"), [(360.0, False), (400.0, True)])
+def test_a_liquid_that_boils_at_one_wall_is_told(T_1, told):
+    trajectory = solved(lubricated(medium(), v=0.0), 0.0, 1e-3, **{"initial.T_1": T_1})
+    expected = "Water at 100000 Pa boils at the wall of lower, while the film keeps the properties that it has at T_c."
+    assert (expected in Solution(trajectory).warnings) == told
 
 
 # -- what is refused --------------------------------------------------------------------------------------------------

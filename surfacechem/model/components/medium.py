@@ -22,7 +22,7 @@ from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.model.build import Build
 from surfacechem.model.refit import Fit, first_range
-from surfacechem.model.system import Margin
+from surfacechem.model.system import Caution, Margin
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Medium
 
@@ -187,8 +187,20 @@ class FluidFit:
         for end, sign in zip(self.ends, (1, -1), strict=True):
             reason = f"{fluid.name} has no properties beyond its range"
             build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
+        self._watch_walls(fluid)
         low, high = limits
         build.notes.append(Fit(fluid, str(self.T), self.held, self.states, self.coefficients, (low, high)))
+
+    def _watch_walls(self, fluid: Fluid) -> None:
+        """Tell where a wall is beyond the range of a film whose properties are those at its own temperature."""
+        span = fluid.range(self.start)
+        thermal = self.build.thermal
+        for body in self.build.scene.bodies:
+            wall = thermal.nodes[thermal.members[body.name]].T
+            if wall != self.T:
+                rest = f"at the wall of {body.name}, while the film keeps the properties that it has at {self.T}."
+                self.build.notes.append(Caution(span.high - wall, f"{span.reason_high} {rest}"))
+                self.build.notes.append(Caution(wall - span.low, f"{span.reason_low} {rest}"))
 
     def property(self, name: str) -> Expression:
         """A property as a named quantity, constant beyond its range."""
