@@ -15,55 +15,13 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.laws import FAMILIES, laws
 
 WIDTH = 110
-SIGNS = {
-    "alpha": "α",
-    "beta": "β",
-    "delta": "δ",
-    "Delta": "Δ",
-    "eta": "η",
-    "theta": "θ",
-    "kappa": "κ",
-    "lambda": "λ",
-    "mu": "μ",
-    "nu": "ν",
-    "pi": "π",
-    "Pi": "Π",
-    "rho": "ρ",
-    "sigma": "σ",
-    "Sigma": "Σ",
-    "tau": "τ",
-    "phi": "φ",
-    "psi": "ψ",
-    "Psi": "Ψ",
-    "omega": "ω",
-    "varepsilon": "ε",
-    "epsilon": "ε",
-    "chi": "χ",
-    "gamma": "γ",
-    "xi": "ξ",
-    "ge": "≥",
-    "le": "≤",
-    "cdot": "·",
-    "times": "×",
-    "partial": "∂",
-    "infty": "∞",
-    "pm": "±",
-    "to": "→",
-    "int": "∫",
-    "sum": "Σ",
-    "prod": "Π",
-    "approx": "≈",
-    "simeq": "≃",
-    "propto": "∝",
-    "ll": "≪",
-    "gg": "≫",
-    "ne": "≠",
-    "langle": "⟨",
-    "rangle": "⟩",
-    "ell": "ℓ",
-    "Lambda": "Λ",
-    "Phi": "Φ",
-}
+TABLE = """
+alpha α  beta β  delta δ  Delta Δ  eta η  theta θ  kappa κ  lambda λ  mu μ  nu ν  pi π  Pi Π  rho ρ  sigma σ
+Sigma Σ  tau τ  phi φ  psi ψ  Psi Ψ  omega ω  varepsilon ε  epsilon ε  chi χ  gamma γ  xi ξ  ge ≥  le ≤  cdot ·
+times ×  partial ∂  infty ∞  pm ±  to →  int ∫  sum Σ  prod Π  approx ≈  simeq ≃  propto ∝  ll ≪  gg ≫  ne ≠
+langle ⟨  rangle ⟩  ell ℓ  Lambda Λ  Phi Φ
+"""
+SIGN = dict(zip(TABLE.split()[::2], TABLE.split()[1::2], strict=True))
 """LaTeX commands with one character; function names keep their letters."""
 
 FUNCTIONS = r"(?:ln|exp|sin|cos|min|max)"
@@ -83,7 +41,7 @@ def plain(latex: str) -> str:
     """
     text = re.sub(r"\\q?quad", "\0", re.sub(r"\\(?:left|right)\b|\\[,!; ]|&", " ", latex))
     text = re.sub(r"(?<=\w)(?=\\)", " ", text)
-    text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGNS.get(m[1], m[0]), text)
+    text = re.sub(r"\\([A-Za-z]+)", lambda m: SIGN.get(m[1], m[0]), text)
     text = re.sub(rf"\\dot{ONE}", r"d\1\2/dt ", text)
     text = re.sub(rf"\\bar{ONE}", r"\1\2_mean ", text)
     text = re.sub(rf"\\hat{ONE}", r"\1\2_max ", text)
@@ -116,21 +74,11 @@ def law_table() -> str:
     """Every law by contract: what it states, its formula, parameters and source."""
     parts: list[str] = []
     for contract in FAMILIES:
-        parts += [heading(contract), *(summary(law) for law in laws(contract).values())]
+        parts.append(f"{contract.contract.upper()}: {_first_line(contract)}")
+        for law in laws(contract).values():
+            texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
+            parts.append("\n".join([f"  {law.name()}", *map(_filled, texts)]))
     return "\n\n".join(parts)
-
-
-def heading(contract: type[Law]) -> str:
-    """The contract and what a law of it states."""
-    title = contract.contract.upper()
-    return f"{title}: {_first_line(contract)}"
-
-
-def summary(law: type[Law]) -> str:
-    """Name, one line, formula, parameters with units, and source of a law."""
-    lines = [f"  {law.name()}", _filled(_first_line(law)), *(_filled(formula) for formula in formulas(law))]
-    lines += [_filled(text) for text in parameters(law)]
-    return "\n".join([*lines, _filled(f"Source: {source(law)}")])
 
 
 def _filled(text: str) -> str:
@@ -170,15 +118,13 @@ def law_page(name: str) -> str:
     found = [(contract, law) for contract, law in every if law.name() == name]
     if not found:
         raise InputError(f"no law '{name}'.{suggestion(name, {law.name() for _, law in every})}")
-    return "\n\n".join(_page(contract, law) for contract, law in found)
-
-
-def _page(contract: type[Law], law: type[Law]) -> str:
-    doc = FORMULA.sub(lambda m: f"    {plain(' '.join(m[1].split()))}\n", f"{inspect.getdoc(law)}\n")
-    lines = [f"  {line}" for line in parameters(law)]
-    listed = "\n".join(lines) if lines else "  none"
-    text = textwrap.indent(ROLE.sub(lambda m: plain(m[1]), doc).rstrip(), "  ")
-    return f"{law.name()} ({contract.contract})\n\n{text}\n\nParameters\n{listed}"
+    pages = []
+    for contract, law in found:
+        doc = FORMULA.sub(lambda m: f"    {plain(' '.join(m[1].split()))}\n", f"{inspect.getdoc(law)}\n")
+        text = textwrap.indent(ROLE.sub(lambda m: plain(m[1]), doc).rstrip(), "  ")
+        listed = "\n".join(f"  {line}" for line in parameters(law)) or "  none"
+        pages.append(f"{name} ({contract.contract})\n\n{text}\n\nParameters\n{listed}")
+    return "\n\n".join(pages)
 
 
 def case_table() -> str:
