@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
+import pytest
 import tables
 import tables_bonds
 import tables_mechanics as mechanics
@@ -103,7 +104,9 @@ def of_largest(found, exact) -> float:
 def coulomb_stop() -> tuple[mechanics.Solved, float]:
     solved, exact = mechanics.coulomb_stop(), columns("g_coulomb_stop")
     parts = [of_largest(solved[name], exact[column]) for name, column in {"v": "v", "u_t": "x", "T": "T"}.items()]
-    return solved, max(*parts, relative(solved.jumps[0].t, expected("g_coulomb_stop")["t_stop"]))
+    stop = expected("g_coulomb_stop")["t_stop"]
+    assert np.all(solved["v"][exact["t"] > stop * (1 + 1e-3)] == 0.0)
+    return solved, max(*parts, relative(solved.jumps[0].t, stop))
 
 
 def stick_slip(row: dict) -> tuple[mechanics.Solved, float]:
@@ -124,8 +127,9 @@ def rebonding() -> tuple[mechanics.Solved, float]:
     for n, row in enumerate(rows("g_stickslip_rebonding_transient")):
         strength = 1e5 * (0.4 + 0.3 * solved.state(slips[n], "phi", "before"))
         distance = solved.state(stops[n], "u_t") - solved.state(slips[n], "u_t")
-        found = [slips[n].since, strength, stops[n].since, distance]
-        exact = [row[name] for name in ("stick_time", "ts_star", "slip_time", "slip_distance")]
+        heat = solved.account("heat_bonded_coulomb", 2 * n + 1) - solved.account("heat_bonded_coulomb", 2 * n)
+        found = [slips[n].since, strength, stops[n].since, distance, heat]
+        exact = [row[name] for name in ("stick_time", "ts_star", "slip_time", "slip_distance", "heat")]
         worst = max(worst, relative(found, exact))
     return solved, worst
 
@@ -147,12 +151,14 @@ def pull_off(row: dict) -> tuple[mechanics.Solved, float]:
     off, on = solved.of("snap")
     found = [w[0], off.released, solved.state(off, "g_n"), w[1], on.released, solved.state(on, "g_n")]
     exact = [row[name] for name in ("w_off", "release_off", "g_after", "w_on", "release_on", "g_after_on")]
+    assert off.heat_out == pytest.approx(off.released)
     return solved, relative(found, exact)
 
 
 def isentropic() -> tuple[mechanics.Solved, float]:
     solved, exact = mechanics.isentropic(), columns("h_isentropic_cohesive_cooling")
     pairs = {"T": "T", "t_n": "t_n", "W_g_n": "work"}
+    assert np.ptp(solved["S_total"]) < 1e-12
     return solved, max(of_largest(solved[name], exact[column]) for name, column in pairs.items())
 
 
@@ -164,7 +170,8 @@ def penalty(row: dict) -> tuple[mechanics.Solved, float]:
 def debonded(row: dict) -> tuple[mechanics.Solved, float]:
     solved = mechanics.debonded(row)
     (jump,) = solved.jumps
-    return solved, relative([solved.state(jump, "T"), jump.released], [row["T_f"], row["Ediss"]])
+    found = [solved.state(jump, "T"), jump.released, jump.entropy]
+    return solved, relative(found, [row["T_f"], row["Ediss"], row["dS"]])
 
 
 MOTION: dict[str, Callable[[], tuple[mechanics.Solved, float]]] = {

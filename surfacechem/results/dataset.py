@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
-from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, save
+from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, package_version, save
 from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
@@ -63,12 +62,8 @@ def quantity_columns(
 
 def profile_values(trajectory: Trajectory, profile: Profile) -> Array:
     """Temperatures across a body at the output times, shape (times, points)."""
-    system, outputs = trajectory.model.system, trajectory.result.outputs
-    states = {state.name: j for j, state in enumerate(system.states)}
-    named = {item.name: j for j, item in enumerate(system.outputs)}
     names = [profile.surface, *profile.states, *([profile.far] if profile.far else [])]
-    parts = [outputs[:, states[n]] if n in states else trajectory.outputs[:, named[n]] for n in names]
-    return np.stack(parts, axis=1)
+    return np.stack([trajectory.everywhere[name][: len(trajectory.result.times)] for name in names], axis=1)
 
 
 def profile_columns(trajectory: Trajectory) -> list[Column]:
@@ -110,7 +105,7 @@ class Results(ABC):
             "Conventions": CONVENTIONS,
             "title": self.title,
             "source": self.source or "surfacechem",
-            "history": f"made by surfacechem {version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
+            "history": f"made by surfacechem {package_version('surfacechem')} with {run.solver} at rtol {run.rtol:g}",
             "case": self.case,
             **({"mechanism": self.mechanism} if self.mechanism else {}),
         }

@@ -83,10 +83,14 @@ def cf_unit(unit: str) -> str:
 
 
 @cache
+def package_version(name: str) -> str:
+    """Version of an installed package, read once a process."""
+    return version(name)
+
+
 def versions() -> str:
     """Versions of what a result depends on."""
-    names = ("surfacechem", "numpy", "numba", "symengine")
-    return ", ".join(f"{name} {version(name)}" for name in names)
+    return ", ".join(f"{name} {package_version(name)}" for name in ("surfacechem", "numpy", "numba", "symengine"))
 
 
 def dataset_path(path: str | Path) -> Path:
@@ -122,7 +126,11 @@ def replacing(target: Path) -> Iterator[Path]:
     replaced = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
     temporary = target.with_name(f".surfacechem-{secrets.token_hex(8)}{target.suffix}")
     try:  # from here on, so that no signal finds a file that nobody removes
-        _create(temporary, 0o666 if replaced is None else replaced, place)
+        try:  # an empty file of these permissions without those that the user's umask takes away
+            mode = 0o666 if replaced is None else replaced
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror or error}.", place) from error
         try:
             yield temporary
         except OSError as error:
@@ -132,14 +140,6 @@ def replacing(target: Path) -> Iterator[Path]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def _create(path: Path, mode: int, place: Place) -> None:
-    """An empty file of these permissions without those that the user's umask takes away."""
-    try:
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}.", place) from error
 
 
 def _reason(path: Path, error: OSError) -> str:
@@ -178,9 +178,10 @@ def write_netcdf(path: Path, columns: Sequence[Column], attributes: Mapping[str,
 
     try:
         with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-            for dimension, size in _dimensions(columns).items():
-                file.createDimension(dimension, size)
             for column in columns:
+                for dimension, size in zip(column.dimensions, np.shape(column.values), strict=True):
+                    if dimension not in file.dimensions:
+                        file.createDimension(dimension, size)
                 kind = str if np.asarray(column.values).dtype == object else np.float64
                 variable = file.createVariable(column.name, kind, column.dimensions, fill_value=False)
                 variable.setncatts(column.attributes)
@@ -215,11 +216,3 @@ def _try_elsewhere(path: Path, seconds: float) -> None:
         raise TimeoutError(f"no answer in {seconds:g} s") from None
     if done.returncode not in (0, 1):  # 1 is that of an exception, which is met again here
         raise OSError(f"a process that reads it crashes (exit code {done.returncode})")
-
-
-def _dimensions(columns: Sequence[Column]) -> dict[str, int]:
-    sizes: dict[str, int] = {}
-    for column in columns:
-        for axis, dimension in enumerate(column.dimensions):
-            sizes[dimension] = np.shape(column.values)[axis]
-    return sizes

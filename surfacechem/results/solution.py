@@ -78,20 +78,18 @@ class Solution(Results):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the results has to know, in words."""
-        system = self.trajectory.model.system
-        jumps = event_findings(self.trajectory.jumps)
-        unbalanced = (str(verdict) for verdict in self.verdicts if not verdict.consistent)
+        trajectory = self.trajectory
         return (
             *self.audit.findings,
-            *unbalanced,
-            *jumps,
-            *event_waits(self.trajectory),
+            *(str(verdict) for verdict in self.verdicts if not verdict.consistent),
+            *event_findings(trajectory.jumps),
+            *event_waits(trajectory),
             *self._extrapolations(),
-            *capped_rates(self.trajectory),
-            *cautions(self.trajectory),
+            *capped_rates(trajectory),
+            *cautions(trajectory),
             *self._lost_fluxes(),
             *self._inaccurate(),
-            *system.warnings,
+            *trajectory.model.system.warnings,
             *self.notes,
         )
 

@@ -5,17 +5,29 @@ import math
 import numpy as np
 import pytest
 import tables_mechanics as scenes
+from asked import MOTION
 from scipy.special import lambertw
-from tables_mechanics import Solved, columns, expected, parameters, rows, solve
+from tables_mechanics import Solved, columns, parameters, rows, solve
 
 from surfacechem.errors import InputError
-from surfacechem.laws.bulk import Constant, Quadratic
 from surfacechem.model.assemble import assemble
 from surfacechem.runs.check import consistent_start, rates
 from surfacechem.solve.jumps import ADMISSIBLE, IMPOSSIBLE, VIOLATES
 from surfacechem.solve.run import Model
 
 SMOOTH, EVENTS = 1e-8, 1e-6
+TOLERANCES = {
+    "S63_debonding": 1e-11,
+    "g_coulomb_stop": 1e-12,
+    "g_stickslip_V": 1e-9,
+    "g_stickslip_rebonding_transient": 1e-10,
+    "h_pulloff_dynamic": SMOOTH,
+    "h_pulloff_k": EVENTS,
+    "h_pulloff_heating": EVENTS,
+    "h_isentropic": SMOOTH,
+    "x09_penalty": 1e-12,
+}
+"""Relative errors of the tables."""
 VERDICTS = {"ok": ADMISSIBLE, "entropy-violating": VIOLATES, "impossible": IMPOSSIBLE}
 
 
@@ -39,18 +51,16 @@ def assert_closed(solved: Solved, status: str = "finished") -> None:
     assert solved.energy_error < 1e-9
 
 
-class TestDebonding:
-    @pytest.mark.parametrize("row", rows("S63_debonding"))
-    def test_temperatures_and_energies(self, row):
-        solved = scenes.debonded(row)
-        (jump,) = solved.jumps
-        assert jump.t == pytest.approx(1.0, rel=1e-12)
-        assert_each(
-            [solved.state(jump, "T"), jump.entropy, jump.released], [row["T_f"], row["dS"], row["Ediss"]], 1e-11
-        )
-        assert jump.verdict == (ADMISSIBLE if row["dS"] >= 0 else VIOLATES)
+@pytest.mark.parametrize("name", MOTION)
+def test_exact_values_are_met(name):
+    solved, error = MOTION[name]()
+    assert error < TOLERANCES[name.partition("-")[0]]
+    assert {jump.verdict for jump in solved.jumps} <= ({ADMISSIBLE, VIOLATES} if "S63" in name else {ADMISSIBLE})
+    if "x09" not in name:  # energies of so stiff a contact are rounding
         assert_closed(solved)
 
+
+class TestDebonding:
     @each_row("x14_debonding_gate", "kappa")
     @pytest.mark.parametrize("violation", ["warn", "accept", "refuse"])
     def test_verdicts(self, row, violation):
@@ -69,16 +79,6 @@ class TestDebonding:
 
 
 class TestFriction:
-    def test_coulomb_stop(self):
-        solved, exact = scenes.coulomb_stop(), columns("g_coulomb_stop")
-        for name, column in {"v": "v", "u_t": "x", "T": "T"}.items():
-            assert_close(solved[name], exact[column], 1e-12)
-        stop = expected("g_coulomb_stop")["t_stop"]
-        assert np.all(solved["v"][exact["t"] > stop] == 0.0)
-        assert [jump.edge.name for jump in solved.jumps] == ["stop"]
-        assert solved.jumps[0].t == pytest.approx(stop, rel=1e-13)
-        assert_closed(solved)
-
     def test_stick_slip_motion(self):
         """A thousand cycles: the time of a slip is known to 1e-10 of a cycle, its velocity accordingly."""
         exact = columns("g_stickslip_motion")
@@ -93,42 +93,12 @@ class TestFriction:
         assert np.all(solved["v"][rest:][exact["phase"][first] == "stick"] == 0.0)
         assert_closed(solved)
 
-    @each_row("g_stickslip_period_vs_V", "V")
-    def test_stick_slip_over_nineteen_decades_of_speed(self, row):
-        p = parameters("g_stickslip_period_vs_V")
-        onset = p["mu_s"] * p["p"] / (p["k"] * row["V"])
-        solved = solve(scenes.slider(), (0.0, onset + 3.5 * row["period"]), {"loading.w_t.rate": row["V"]})
-        names = [jump.edge.name for jump in solved.jumps]
-        assert names[:6] == ["slip forward", "stop"] * 3
-        assert set(names[6:]) <= {"slip forward", "stop"}
-        stick, slip = solved.jumps[2].since, solved.jumps[1].since
-        heat = solved.account("heat_coulomb", 3) - solved.account("heat_coulomb", 1)
-        assert_each(
-            [solved.jumps[0].t, slip, stick + slip, heat],
-            [onset, row["slip_time"], row["period"], row["heat_per_cycle"]],
-            1e-9,
-        )
-        assert_closed(solved)
-
     @pytest.mark.parametrize("row", [row for row in rows("g_stickslip_period_vs_V") if row["V"] >= 1e-3])
     def test_largest_velocity(self, row):
         p = parameters("g_stickslip_period_vs_V")
         middle = p["mu_s"] * p["p"] / (p["k"] * row["V"]) + row["slip_time"] / 2
         solved = solve(scenes.slider(), (0.0, middle), {"loading.w_t.rate": row["V"]})
         assert_each(solved["v"][-1], row["v_max"], SMOOTH)
-
-    def test_bonds_that_form_again_from_the_start(self):
-        solved = solve(scenes.rebonding_slider(), (0.0, 170.0))
-        slips, stops = solved.of("slip"), solved.of("stop")
-        for n, row in enumerate(rows("g_stickslip_rebonding_transient")):
-            strength = 1e5 * (0.4 + 0.3 * solved.state(slips[n], "phi", "before"))
-            distance = solved.state(stops[n], "u_t") - solved.state(slips[n], "u_t")
-            heat = solved.account("heat_bonded_coulomb", 2 * n + 1) - solved.account("heat_bonded_coulomb", 2 * n)
-            found = [slips[n].since, strength, stops[n].since, distance, heat]
-            exact = [row[name] for name in ("stick_time", "ts_star", "slip_time", "slip_distance", "heat")]
-            assert_each(found, exact, 1e-10)
-            assert solved.state(slips[n], "phi") == 0.0
-        assert_closed(solved)
 
     @each_row("g_stickslip_rebonding_steady", "V_over_Vc")
     def test_bonds_that_form_again_in_the_steady_cycle(self, row):
@@ -145,32 +115,6 @@ class TestFriction:
 
 
 class TestCohesion:
-    def test_dynamic_pull_off(self):
-        solved, exact = scenes.dynamic(), columns("h_pulloff_dynamic")
-        names = {"g_n": "g", "v_n": "gdot", "t_n": "t_n", "heat_bulk_damper_n": "heat", "T": "T"}
-        for name, column in names.items():
-            assert_close(solved[name][1:], exact[column], SMOOTH)
-        assert_closed(solved)
-
-    @each_row("h_pulloff_vs_stiffness", "k_g0_over_tmax")
-    def test_pull_off_and_pull_on(self, row):
-        solved, w = scenes.pull_off(row)
-        off, on = solved.of("snap")
-        found = [solved.state(off, "g_n", "before"), w[0], solved.state(off, "g_n"), off.released]
-        assert_each(found, [row[name] for name in ("g_off", "w_off", "g_after", "release_off")], EVENTS)
-        found = [solved.state(on, "g_n", "before"), w[1], solved.state(on, "g_n"), on.released]
-        assert_each(found, [row[name] for name in ("g_on", "w_on", "g_after_on", "release_on")], EVENTS)
-        assert (off.verdict, on.verdict) == (ADMISSIBLE, ADMISSIBLE)
-        assert off.heat_out == pytest.approx(off.released)
-        assert_closed(solved)
-
-    @pytest.mark.parametrize(("energy", "column"), [(Quadratic, "T_quadratic"), (Constant, "T_constC")])
-    def test_heating_by_cycles(self, energy, column):
-        solved = scenes.heating(energy)
-        temperatures = [solved.state(jump, "T") for jump in solved.of("snap")]
-        assert_each([*temperatures[:2], *temperatures[3::2]], columns("h_pulloff_heating")[column], EVENTS)
-        assert_closed(solved)
-
     @each_row("h_overdamped_bottleneck", "w_over_woff_minus_1")
     def test_overdamped_passage_of_the_fold(self, row):
         p = parameters("h_overdamped_bottleneck")
@@ -180,13 +124,6 @@ class TestCohesion:
         solved = solve(scenes.overdamped(), (0.0, 2 * row["t"]), level)
         # The distance from the fold is known to the rounding of w.
         assert_each(solved.jumps[0].t, row["t"], max(SMOOTH, 1e-15 / row["w_over_woff_minus_1"]))
-        assert_closed(solved)
-
-    def test_isentropic_cooling(self):
-        solved, exact = scenes.isentropic(), columns("h_isentropic_cohesive_cooling")
-        for name, column in {"T": "T", "t_n": "t_n", "W_g_n": "work"}.items():
-            assert_close(solved[name], exact[column], SMOOTH)
-        assert_close(solved["S_total"] - solved["S_total"][0] + 1.0, np.ones(len(solved["T"])), 1e-12)
         assert_closed(solved)
 
     def test_bonds_in_equilibrium_until_none_is_left(self):
