@@ -11,7 +11,7 @@ EVERY_CASE = ("test_zoo", "test_cases", "test_dataset", "test_scene_view")
 """Files of tests that ask for a run of every shipped case, which case_runs.py keeps for all in a worker."""
 
 
-LONG = (*EVERY_CASE, "test_docs", "test_random_scenes", "test_jump_heat", "test_conduction", "test_reversals")
+LONG = (*EVERY_CASE, "test_docs", "test_random_scenes", "test_jump_heat", "test_conduction")
 """Files that take longest: they go first, so that no worker is left alone with one of them at the end."""
 
 

@@ -34,16 +34,16 @@ LONGEST = 600
 
 OF_BALANCES = [
     ["balances"],
-    ["zoo", "constraints", "heat_paths", "jumps", "threshold", "pairs", "friction_memory", "chemistry"],
+    ["zoo", "constraints", "heat_paths", "jumps", "pairs", "rate_and_state", "chemistry"],
     ["tables", "tables_bonds", "tables_mechanics"],
     ["start", "hybrid", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
     ["fold", "breaking", "bound", "pulled", "media", "instant", "reactor", "evaluated"],
-    ["unilateral", "plane", "rate_and_state", "load_path", "neighbours"],
+    ["unilateral", "plane", "load_path", "neighbours"],
 ]
 OF_LAWS = [
     ["laws", "tabulated"],
-    ["chemistry", "friction_memory", "heat_paths", "threshold"],
+    ["chemistry", "rate_and_state", "plane", "heat_paths"],
     ["tables_bonds", "tables_mechanics", "contact_laws", "media", "segments"],
 ]
 

@@ -57,3 +57,8 @@ def test_maxwell_relations():
     for left, right in [(t_n.diff(phi), M.diff(g)), (S.diff(g), -t_n.diff(T)), (S.diff(phi), -M.diff(T))]:
         assert laws.number(left, point) != 0
         assert laws.closes([left], [right], point)
+
+
+def test_what_is_no_polynomial_is_left_alone():
+    for expression in (symengine.exp(X), X**9, 1 / X):
+        assert conditioned(expression, {X: symengine.Integer(1)}) == expression

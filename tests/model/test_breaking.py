@@ -141,6 +141,12 @@ def test_sliding_breaks_the_bonds_of_a_mechanism(two_bonds):
     assert coverages(trajectory, "after")["theta_free_s"] == pytest.approx(1.0, rel=1e-14)
 
 
+def test_a_bond_that_several_reactions_break_goes_the_first_way(two_bonds):
+    loads, limits = {"w_n": Hold(level=1e-6)}, [TensileStrength(t_max=1e6)]
+    given = scene(two_bonds, ["weak(s)"], {"free(s)": 1.0}, loads, limits=limits, normal=Mounting(k=K))
+    assert any("by the first of the reactions that break it" in text for text in assemble(given).warnings)
+
+
 def test_a_limit_names_its_bonds_or_is_refused(two_bonds):
     with pytest.raises(InputError, match=r"no bond is called 'weka\(s\)'.*weak\(s\)"):
         pulled(two_bonds, {"free(s)": 1.0}, breaks="weka(s)")

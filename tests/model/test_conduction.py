@@ -462,3 +462,14 @@ def test_random_slabs_are_as_accurate_as_they_say():
 @pytest.mark.parametrize("seed", range(2, 8))
 def test_many_random_slabs_are_as_accurate_as_they_say(seed):
     assert_known(seed, scenes=60)
+
+
+def test_a_very_good_conductor_is_a_lump():
+    changes = [
+        f"bodies.{body}.conduction={{thickness: 1 mm, conductivity: 1e7 W/m/K, cells: 8}}"
+        for body in ("lower", "upper")
+    ]
+    lumped, divided = surfacechem.run("three-temperatures"), surfacechem.run("three-temperatures", changes)
+    for name in ("T_1", "T_2", "T_c", "U_1", "heat_into_1"):
+        size = abs(lumped.dataset[name]).max()
+        assert abs(divided.dataset[name] - lumped.dataset[name]).max() < 1e-6 * size

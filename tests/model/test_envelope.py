@@ -6,11 +6,17 @@ by side, lengths in micrometres, tractions in MPa.
 
 import numpy as np
 import pytest
+from scenes import bodies, together
+from solved import solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
+from surfacechem.laws.cohesive import CompliantDebonding
+from surfacechem.laws.contact import BondStiffness
+from surfacechem.laws.loading import Ramp
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.runs.simulation import Simulation
+from surfacechem.scene import Mounting
 
 CASE = """
 T_0: 300
@@ -285,3 +291,12 @@ run: {until: 10, outputs: 101}
     np.testing.assert_allclose(phi[softened], left[softened], atol=2e-9)
     np.testing.assert_allclose(1e12 * (data.w_n.values - g), phi * 1e12 * g, atol=1e-8 * 5e6)
     assert solution.audit.energy_error < 1e-9
+
+
+def test_a_soft_mounting_tears_the_interface_open():
+    laws = [BondStiffness(E_b=1e14, E_n=1e14)], [CompliantDebonding(t_max=1e6, E_b=1e14, g_f=5e-8)]
+    pull = {"loading": {"w_n": Ramp(rate=2e-7)}, "normal": Mounting(k=1e13), "initial": {"phi": 1.0}}
+    trajectory = solve(together(laws[0], reactions=laws[1], pair=bodies("T", "T", C_1=0.1, C_2=0.1), **pull), 1.0)
+    soften, tear = trajectory.jumps[-2:]
+    assert (soften.edge.name, tear.edge.name, tear.verdict) == ("soften", "tear", "admissible")
+    assert tear.released == pytest.approx(0.5 * 1e6**2 * (1 / 1e13 + 1 / 1e14), rel=1e-9)

@@ -18,6 +18,7 @@ from surfacechem.laws.factors import Power
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
+from surfacechem.solve.branches import come_to_rest
 
 PHI, G_N, G_T = 0.1, 1e-8, 2e-8
 ZONE = XuNeedleman(Phi_n=PHI, g_0=G_N, g_t0=G_T)
@@ -284,3 +285,16 @@ def test_a_symmetric_balance_is_left_as_the_loads_go_on(rate):
     expected = damped(np.array([k_n, k_t]), np.array([-6e-6, 0.0]), begin, tractions)
     assert data.g_n_after[0] == pytest.approx(expected[0], rel=1e-8)
     assert data.u_t_after[0] == pytest.approx(np.sign(rate) * abs(expected[1]), rel=1e-8)
+
+
+def test_motion_that_nothing_bears_is_given_up_soon():
+    """One gap has a spring, the other is pushed on for ever."""
+    seen = 0
+
+    def driving(ways):
+        nonlocal seen
+        seen += len(ways)
+        return np.column_stack([1.0 - 1e10 * ways[:, 0], np.full(len(ways), -1.4)])
+
+    assert come_to_rest(driving, np.full(2, 1e-9), np.zeros(2), np.zeros(2)) is None
+    assert 0 < seen < 10_000

@@ -290,13 +290,20 @@ def test_initial_velocities_can_be_changed():
     assert solved.jumps[0].t == pytest.approx(5.0 * 2.0 / 7500, rel=1e-12)
 
 
-def test_isotropic_friction_opposes_a_prescribed_velocity():
-    times = [0.0, 1.0]
-    dry = run(scene([Coulomb(mu=0.3)], None, p=1e2, v=3.0, v_2=-4.0), times)
-    assert (dry["t_coulomb"][0], dry["t_2_coulomb"][0]) == pytest.approx((18.0, -24.0), rel=1e-14)
-    assert dry["D_coulomb"][-1] == pytest.approx(150.0, rel=1e-14)
-    film = run(scene([Viscous(eta=0.5)], None, g_n=1e-2, v=3.0, v_2=-4.0), times)
-    assert film["D_viscous"][-1] == pytest.approx(50 * 25.0, rel=1e-14)
+@pytest.mark.parametrize(
+    ("law", "along", "across"),
+    [
+        (Coulomb(mu=0.3), 0.3 * 1e2 * 0.6, 0.3 * 1e2 * 0.8),
+        (AnisotropicCoulomb(mu_1=0.3, mu_2=0.6), 0.3 * 1e2 * 0.6, 0.6 * 1e2 * 0.8),
+        (Viscous(eta=0.5), 50 * 3.0, 50 * 4.0),
+        (AnisotropicViscous(eta_1=0.5, eta_2=0.2), 50 * 3.0, 20 * 4.0),
+    ],
+)
+def test_friction_opposes_a_prescribed_velocity(law, along, across):
+    given = {"g_n": 1e-2} if "viscous" in law.name() else {"p": 1e2}
+    found, name = run(scene([law], None, v=3.0, v_2=-4.0, **given), [0.0, 1.0]), law.name().replace("-", "_")
+    assert (found[f"t_{name}"][0], found[f"t_2_{name}"][0]) == pytest.approx((along, -across), rel=1e-14)
+    assert found[f"D_{name}"][-1] == pytest.approx(3.0 * along + 4.0 * across, rel=1e-14)
 
 
 @pytest.mark.parametrize(("c", "c_2"), [(1e6, 1e6), (1e5, 1e6), (3e3, 1e3)])
@@ -370,3 +377,15 @@ def test_what_is_refused_in_two_directions(refused, reason):
     with pytest.raises(InputError) as error:
         assemble(refused)
     assert reason in str(error.value)
+
+
+def test_films_relax_at_their_own_rates():
+    k, g, times = 1e6, 1e-6, np.linspace(0, 1, 21)
+    for law, (along, across) in (
+        (AnisotropicViscous(eta_1=0.5, eta_2=0.2), (0.5, 0.2)),
+        (Viscous(eta=0.4), (0.4, 0.4)),
+    ):
+        solved = run(scene([law], Mounting(k=k), g_n=g, w_t=1e-3, w_t2=-2e-3), times)
+        close(solved["u_t"], 1e-3 * (1 - np.exp(-k * g / along * times)))
+        close(solved["u_t2"], -2e-3 * (1 - np.exp(-k * g / across * times)))
+        close(solved["t_t2"], k * (-2e-3 - solved["u_t2"]), 1e-9)

@@ -1,17 +1,23 @@
-"""Sliding with inertia against rate-and-state friction: it sticks, creeps, slips and swings."""
+"""Rate-and-state friction, with inertia and without: it sticks, creeps, slips, swings and turns round.
+
+At a reversal the velocity passes within no time through all decades down to its zero, 1e-60 m/s and less.
+"""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from solved import solve
 
 import surfacechem
+from surfacechem.contracts.terms import Varying
 from surfacechem.errors import InputError
+from surfacechem.laws.contact import TangentialStiffness
+from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.friction import Coulomb, RateAndStateAging, RateAndStateSlip
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
+from surfacechem.runs.check import consistent_start, rates
 from surfacechem.scene import Body, Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
 
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 P, K, M = 5e6, 2e9, 1e4
@@ -20,30 +26,22 @@ WEAKENING = {"mu_0": 0.6, "a": 0.01, "b": 0.014, "L": 5e-5, "v_0": 1e-6}
 LAWS = [RateAndStateAging, RateAndStateSlip]
 
 
-def scene(law, mount, loading, parameters=STEADIED, initial=None, p=None, others=()):
-    interface = Interface(Hold(level=300.0), (), [law(**parameters), *others])
+def scene(law, mount, loading, parameters=STEADIED, initial=None, p=None, others=(), potentials=()):
+    interface = Interface(Hold(level=300.0), potentials, [law(**parameters), *others])
     loading = {"p": p or Hold(level=P), **loading}
     return Scene(COLD, interface, (), loading, None, 300.0, {"theta": 1.0, **(initial or {})}, tangential=mount)
 
 
-def solved(item, until, rtol=1e-11, outputs=81):
-    trajectory = Model(assemble(item)).solve(Run(np.linspace(0.0, until, outputs).tolist(), rtol))
+def solved(item, until, outputs=81):
+    trajectory = solve(item, until, outputs=outputs)
     assert trajectory.status == "finished", trajectory.reason
-    assert audit(trajectory).findings == ()
-    assert audit(trajectory).energy_error < 1e-9
+    assert trajectory.findings == ()
+    assert trajectory.energy_error < 1e-9
     return trajectory
-
-
-def state(trajectory, name):
-    return trajectory.result.outputs[:, [s.name for s in trajectory.model.system.states].index(name)]
 
 
 def velocity(trajectory):
     return trajectory.everywhere["v"][: len(trajectory.result.times)]
-
-
-def happened(trajectory):
-    return [jump.edge.name for jump in trajectory.jumps]
 
 
 def plain(law, pull, m, times, y, p=lambda t: P, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6, turn=0.0):
@@ -94,6 +92,35 @@ def forward(law, pull, m, times, y, mu_0=0.6, a=0.01, b=0.014, L=5e-5, v_0=1e-6)
     return found.y[0], np.exp(found.y[1]), found.y[2]
 
 
+@np.errstate(over="ignore", invalid="ignore")
+def massless(law, pull, resistance, times, mu_0=0.6, a=0.014, b=0.008, L=5e-5, v_0=1e-6):
+    """Displacement, logarithm of the age and velocity where pull(t, u) = a p s + resistance v, by SciPy."""
+
+    def velocity(t, u, ln_theta):
+        strength = (mu_0 + b * (np.log(v_0 / L) + ln_theta)) / a
+
+        def of(s):
+            return np.sign(s) * v_0 * -np.expm1(-2 * abs(s)) * np.exp(abs(s) - strength)
+
+        s = pull(t, u) / (a * P)
+        if resistance and s:
+            s = brentq(lambda x: a * P * (x - s) + resistance * of(x), 0.0, s, xtol=1e-15 * abs(s), rtol=1e-15)
+        return of(s)
+
+    def rates(t, y):
+        v = velocity(t, *y)
+        x = abs(v) / L * np.exp(y[1])
+        return [v, np.exp(-y[1]) * (1 - x if law is RateAndStateAging else -x * np.log(x) if x else 0.0)]
+
+    found = solve_ivp(rates, (0.0, times[-1]), [0.0, 0.0], "Radau", times, rtol=1e-11, atol=[1e-16, 1e-11]).y
+    return found, np.array([velocity(t, *y) for t, y in zip(times, found.T, strict=True)])
+
+
+def reversals(trajectory):
+    v = trajectory.everywhere["v"][len(trajectory.result.times) :]
+    return int(np.sum(np.diff(np.sign(v[v != 0])) != 0))
+
+
 @pytest.mark.parametrize(
     ("law", "V", "reference"),
     [(law, V, reference) for law, slow, fast in zip(LAWS, (1e-9, 1e-8), (1e-3, 1e-6), strict=True)
@@ -110,8 +137,8 @@ def test_stick_slip_is_that_of_the_plain_equations(law, V, reference):
     found = trajectory.everywhere["v"]
     assert found.max() > 20 * V
     assert found.min() < 0.1 * V
-    np.testing.assert_allclose(state(trajectory, "u_t"), u, rtol=0, atol=1e-8 * np.max(u))
-    np.testing.assert_allclose(state(trajectory, "ln_theta"), ln_theta, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
+    np.testing.assert_allclose(trajectory["ln_theta"], ln_theta, rtol=0, atol=1e-7)
     np.testing.assert_allclose(velocity(trajectory), v, rtol=1e-7)
     assert trajectory.result.counters.steps < 1000
 
@@ -123,9 +150,9 @@ def test_a_block_swings_through_its_turning_points(law):
     trajectory = solved(item, 0.3, outputs=31)
     assert np.sum(np.diff(np.sign(velocity(trajectory))) != 0) >= 3
     u, v, _ = plain(law, lambda t, u: -K * u, 1e6, trajectory.result.times, [0.0, 1.0, 0.0], turn=1e-10)
-    np.testing.assert_allclose(state(trajectory, "u_t"), u, rtol=0, atol=1e-8 * np.max(u))
+    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=1e-8 * np.max(u))
     np.testing.assert_allclose(velocity(trajectory), v, rtol=0, atol=1e-8)
-    assert happened(trajectory) == []
+    assert trajectory.events == []
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -143,9 +170,9 @@ def test_friction_that_sticks_beside_it():
     others = [Coulomb(mu=0.1)]
     load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}
     trajectory = solved(scene(RateAndStateAging, Mounting(k=K, m=M), load, others=others), 40.0)
-    assert happened(trajectory)[:4] == ["slip forward", "stop", "slip backward", "stop"]
+    assert trajectory.events[:4] == ["slip forward", "stop", "slip backward", "stop"]
     without = solved(scene(RateAndStateAging, Mounting(k=K), load, others=others), 40.0)
-    np.testing.assert_allclose(state(trajectory, "u_t"), state(without, "u_t"), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(trajectory["u_t"], without["u_t"], rtol=0, atol=1e-7)
 
 
 def test_the_velocity_at_the_start_is_given_as_such():
@@ -158,3 +185,95 @@ def test_the_velocity_at_the_start_is_given_as_such():
     np.testing.assert_allclose(data["v"].values[:, 0], given, rtol=1e-13)
     with pytest.raises(InputError, match=r"no parameter 'initial\.drive'"):
         simulation.run({"initial.drive": 1.0})
+
+
+def test_parameters_that_vary_with_temperature():
+    """The rate of temperature has no part in that of the velocity."""
+    warm = Body("lower", Hold(level=300.0)), Body("upper", Ramp(start=300.0, rate=1.0))
+    vary = Varying(0.014, (LinearInTemperature(of="T_2", slope=1e-3),))
+    load = {"w_t": Harmonic(amplitude=5e-3, frequency=0.05), "p": Hold(level=P)}
+    found = []
+    for m in (0.0, 1.0):
+        interface = Interface(Hold(level=300.0), (), [RateAndStateAging(**{**STEADIED, "a": vary})])
+        item = Scene(warm, interface, (), load, None, 300.0, {"theta": 1.0}, tangential=Mounting(k=K, m=m))
+        found.append(solved(item, 40.0)["u_t"])
+    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("law", "mount"), [(LAWS[0], Mounting(k=K, c_g=1e9)), (LAWS[1], Mounting(k=K))])
+def test_sliding_follows_a_load_that_swings(law, mount):
+    trajectory = solved(scene(law, mount, {"w_t": Harmonic(amplitude=5e-3, frequency=0.05)}), 40.0)
+    assert reversals(trajectory) == 4
+    assert trajectory.result.counters.steps < 4000
+
+    def pull(t, u):
+        return mount.k * (5e-3 * np.sin(0.1 * np.pi * t) - u)
+
+    (u, ln_theta), v = massless(law, pull, mount.c_g, trajectory.result.times)
+    np.testing.assert_allclose(trajectory["u_t"], u, rtol=0, atol=5e-11)
+    np.testing.assert_allclose(trajectory["ln_theta"], ln_theta, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(velocity(trajectory)[1:], v[1:], rtol=1e-5, atol=1e-60)
+
+
+@pytest.mark.parametrize(
+    ("mount", "elastic"), [(Mounting(k=K, c_b=5e6), 0.0), (Mounting(k=K, c_g=5e6), 0.0), (Mounting(k=K, c_b=5e6), 1e13)]
+)
+@pytest.mark.parametrize("law", LAWS)
+def test_creep_reverses_a_hundred_times(law, mount, elastic):
+    """Below what it takes to slide: velocities from 1e-17 m/s through zero and back, in a few steps each."""
+    load, potentials = (
+        {"w_t": Harmonic(amplitude=1e-3, frequency=0.05)},
+        [TangentialStiffness(E_t=elastic)] * bool(elastic),
+    )
+    trajectory = solved(scene(law, mount, load, WEAKENING | {"a": 0.008}, potentials=potentials), 1000.0)
+    assert reversals(trajectory) >= 99
+    assert trajectory.result.counters.steps < 100 * 60
+
+
+def test_the_age_at_the_start_is_changed_in_seconds():
+    """What is solved for is its logarithm, which is nothing that a case gives."""
+    simulation = surfacechem.load("rate-and-state-velocity-steps")
+    assert "initial.theta" in simulation.system.changeable
+    data = simulation.sweep({"initial.theta": ["5 s", 10.0]}).dataset
+    np.testing.assert_allclose(data["theta"].values[:, 0], [5.0, 10.0], rtol=1e-14)
+    np.testing.assert_array_equal(data["initial_theta"].values, [5.0, 10.0])
+    assert data["initial_theta"].attrs["units"] == "s"
+    assert data["theta"].values[1].tobytes() == simulation.run().dataset["theta"].values.tobytes()
+    assert data.attrs["error"] < 1e-8
+    for value, message in ((0.0, "outside its range: > 0"), ("1 m", "needs a time")):
+        with pytest.raises(InputError, match=message):
+            simulation.run({"initial.theta": value})
+    with pytest.raises(InputError, match=r"no parameter 'initial\.ln_theta'"):
+        simulation.run({"initial.ln_theta": 1.0})
+
+
+@pytest.mark.parametrize("ratio", [0.9, 1.0, 1.1])
+def test_growth_rates_are_those_of_linear_stability(ratio):
+    """About steady sliding B x'' + (k - k_c) x' + k V x / L = 0, B = a p / V + c_b, k_c = [(b - a) p - c_b V] / L."""
+    p, V, c_b, L = 5e6, 1e-6, 5e6, 1e-5
+    critical = (0.005 * p - c_b * V) / L
+    k = ratio * critical
+    ramp = {"ramp": {"start": 0.6 * p / k, "rate": V}}
+    changes = {"mechanics.tangential.k": k, "initial.theta": L / V, "loading.w_t": ramp}
+    simulation = surfacechem.load("rate-and-state-stick-slip", changes)
+    start = consistent_start(simulation.model, simulation.model.values())
+    expected = np.roots([0.01 * p / V + c_b, k - critical, k * V / L])
+    np.testing.assert_allclose(sorted(rates(start), key=np.imag), sorted(expected, key=np.imag), rtol=1e-8)
+    assert np.all((rates(start).real > 1e-12) == (ratio < 1))
+
+
+def test_sticking_needs_no_pressure():
+    """What nothing presses yet rests until its load begins, though it could not slide in balance."""
+    load, others = {"w_t": Table(times=[0.0, 2.0, 4.0], values=[0.0, 0.0, 1e-6])}, [Coulomb(mu=0.2, mu_s=0.8)]
+    given = scene(RateAndStateAging, Mounting(k=1e10), load, WEAKENING, p=Hold(level=0.0), others=others)
+    trajectory = solve(given, [0.0, 1.0, 3.0])
+    assert trajectory.status == "stopped", trajectory.reason
+    assert trajectory.reason.startswith("no steady sliding velocity: nothing resists it")
+    assert trajectory.result.t == pytest.approx(2.0, rel=1e-9)
+
+
+def test_an_extreme_direct_effect_does_not_overflow():
+    law = RateAndStateAging(mu_0=0.6, a=1e-4, b=1.5e-4, L=1e-5, v_0=1e-6)
+    assert law.traction(p=1e6, v=1e-6, ln_theta=np.log(10.0)) == pytest.approx(6e5, rel=1e-12)
+    assert law.traction(p=1e6, v=-1e-6, ln_theta=np.log(10.0)) == pytest.approx(-6e5, rel=1e-12)
+    assert law.traction(p=1e6, v=0.0, ln_theta=np.log(10.0)) == 0.0

@@ -376,3 +376,10 @@ def test_rebounds_that_use_up_the_steps_are_named():
     trajectory = solve(given, 1e3, max_steps=5000)
     assert trajectory.status == "failed"
     assert trajectory.reason.startswith("the number of steps allowed was used up by rebounds")
+
+
+@pytest.mark.parametrize(("speed", "e"), [(1e-20, 0.5), (1e-15, 0.9), (1e-24, 0.99)])
+def test_rebounds_that_are_nothing_from_the_start(speed, e):
+    trajectory = closed(scene(Mounting(m=M, e=e), PRESSED, {"g_n": 0.0, "v_n": -speed}), 3.0)
+    assert trajectory.events[-1] == "rest"
+    assert len(trajectory.jumps) < 200

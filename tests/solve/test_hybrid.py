@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tables_mechanics as scenes
-from scenes import SITES, bodies, perfect_contact, varying
-from tables_mechanics import solve
+from scenes import bodies, perfect_contact, together, varying
+from solved import Solved, closed, solve
 
 from surfacechem.format import load_text
 from surfacechem.laws.bonding import BondEnergy
@@ -17,201 +17,137 @@ from surfacechem.laws.contact import BondedContact, NormalStiffness, Penalty, Ta
 from surfacechem.laws.factors import LinearInTemperature
 from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Harmonic, Hold, Ramp, Table
-from surfacechem.model.assemble import assemble
-from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
-from surfacechem.solve.run import Model, Run
 
 COLD = Body("lower", Hold(level=300.0)), Body("upper", Hold(level=300.0))
 
 
-def slider(friction, mounting, drive, p=1e5, potentials=(), programme=(), **initial) -> Model:
+def slider(friction, mounting, drive, p=1e5, potentials=(), programme=(), **initial) -> Scene:
     """Reservoirs about a contact that sticks and slides."""
-    loading = {} if drive is None else {"w_t": drive}
-    loading |= {"p": p if not isinstance(p, float) else Hold(level=p)}
-    scene = Scene(
-        COLD,
-        Interface(Hold(level=300.0), potentials, [friction]),
-        loading=loading,
-        T_0=300.0,
-        initial=initial,
-        tangential=mounting,
-        programme=programme,
-    )
-    return Model(assemble(scene))
+    loading = ({} if drive is None else {"w_t": drive}) | {"p": Hold(level=p)}
+    interface = Interface(Hold(level=300.0), potentials, [friction])
+    return Scene(COLD, interface, (), loading, None, 300.0, initial, programme=programme, tangential=mounting)
 
 
-def names(solved) -> list[str]:
-    return [jump.edge.name for jump in solved.jumps]
+# -- when and how often -----------------------------------------------------------------------------------------------
 
 
-class TestTime:
-    def test_limit_exceeded_from_the_start(self):
-        """A spring stretched beyond the limit starts to slide at once, in its own direction."""
-        for u, word in ((-1e-3, "forward"), (1e-3, "backward")):
-            solved = solve(
-                slider(Coulomb(mu=0.4, mu_s=0.6), Mounting(k=1e8, m=10.0), Hold(level=0.0), u_t=u), (0.0, 1e-2)
-            )
-            assert solved.jumps[0].t == 0.0
-            assert names(solved)[:2] == [f"slip {word}", "stop"]
-            assert solved["v"][-1] == 0.0
-
-    def test_two_transitions_at_the_same_time(self):
-        """A stage that ends just as sticking gives way: both happen, once."""
-        stages = (Stage("pull", {"w_t": 1e-3}, duration=0.6), Stage("rest", {}))
-        model = slider(Coulomb(mu=0.6), Mounting(k=1e8), None, programme=stages, w_t=0.0)
-        solved = solve(model, (0.0, 1.0))
-        assert names(solved).count("end of pull") == 1
-        assert solved.status == "finished"
-        assert solved["u_t"][-1] == pytest.approx(0.0, abs=1e-12)
+@pytest.mark.parametrize(("u", "word"), [(-1e-3, "forward"), (1e-3, "backward")])
+def test_a_limit_that_is_exceeded_from_the_start(u, word):
+    """A spring stretched beyond the limit starts to slide at once, in its own direction."""
+    solved = solve(slider(Coulomb(mu=0.4, mu_s=0.6), Mounting(k=1e8, m=10.0), Hold(level=0.0), u_t=u), 1e-2)
+    assert solved.jumps[0].t == 0.0
+    assert solved.events[:2] == [f"slip {word}", "stop"]
+    assert solved["v"][-1] == 0.0
 
 
-class TestChatter:
-    @pytest.mark.parametrize("mounting", [Mounting(k=1e8), Mounting(k=1e8, c_b=1e5), Mounting(k=1e8, m=0.1, c_b=1e3)])
-    @pytest.mark.parametrize("elastic", [False, True])
-    def test_drive_that_swings_about_the_limit(self, mounting, elastic):
-        drive = Table(times=np.arange(41.0).tolist(), values=[(6e-4 + 1e-5 * (-1) ** n) * (n > 0) for n in range(41)])
-        potentials = [TangentialStiffness(E_t=1e10)] if elastic else []
-        solved = solve(slider(Coulomb(mu=0.6), mounting, drive, potentials=potentials), (0.0, 40.0))
-        assert solved.status == "finished", solved.reason
-        assert len(solved.jumps) < 200
-        assert solved.energy_error < 1e-7
-
-    def test_friction_that_fades_with_temperature(self):
-        """The limit itself falls below the traction as the bodies warm up."""
-        mu = varying(0.6, LinearInTemperature(slope=-1e-2))
-        scene = perfect_contact(
-            [],
-            frictions=[Coulomb(mu=mu)],
-            energy=Constant,
-            loading={"p": Hold(level=1e5), "w_t": Hold(level=3e-4), "Q_1": Hold(level=100.0)},
-            tangential=Mounting(k=1e8, c_b=1e4),
-        )
-        solved = solve(Model(assemble(scene)), np.linspace(0.0, 1.9, 20))
-        assert names(solved)[0] == "slip forward"
-        # mu p = 3e4 Pa where T - T_0 = 50 K; two bodies of 1 J/(m^2 K) are warmed by 100 W/m^2.
-        assert solved.jumps[0].t == pytest.approx(1.0, rel=1e-9)
-        assert solved.energy_error < 1e-9
+@pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9])
+def test_a_brief_pulse_is_never_missed(width):
+    pulse = Table(times=[0.0, 0.3, 0.3 + width, 0.3 + 2 * width], values=[0.0, 0.0, 1e-3, 0.0])
+    solved = solve(slider(Coulomb(mu=0.6), Mounting(k=1e8), pulse), (0.0, 1.0))
+    assert solved.events[0] == "slip forward"
+    assert solved.jumps[0].t == pytest.approx(0.3 + 0.6 * width, abs=2e-16 + 1e-9 * width)
 
 
-class TestJumps:
-    def test_reservoirs_pass_the_heat_on(self):
-        solved, _ = scenes.pull_off(scenes.rows("h_pulloff_vs_stiffness")[5])
-        for jump in solved.jumps:
-            assert jump.heat_out == pytest.approx(jump.released, rel=1e-14)
-            assert jump.entropy_out == pytest.approx(jump.released / 300.0, rel=1e-14)
-        assert solved["H_events"][-1] == pytest.approx(-sum(jump.released for jump in solved.jumps), rel=1e-12)
-        assert solved.energy_error < 1e-12
+def test_two_transitions_at_the_same_time():
+    """A stage that ends just as sticking gives way: both happen, once."""
+    stages = (Stage("pull", {"w_t": 1e-3}, duration=0.6), Stage("rest", {}))
+    solved = solve(slider(Coulomb(mu=0.6), Mounting(k=1e8), None, programme=stages, w_t=0.0), (0.0, 1.0))
+    assert solved.events.count("end of pull") == 1
+    assert solved.status == "finished"
+    assert solved["u_t"][-1] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("p", [6559.108123501283, 6015.564932235646, 8743.24723568622, 4958.0812951006765])
+@pytest.mark.parametrize("mounting", [Mounting(k=1e8), Mounting(k=1e8, c_b=1e5), Mounting(k=1e8, m=0.1, c_b=1e3)])
+@pytest.mark.parametrize("elastic", [False, True])
+def test_a_drive_that_swings_about_the_limit(mounting, elastic):
+    drive = Table(times=np.arange(41.0).tolist(), values=[(6e-4 + 1e-5 * (-1) ** n) * (n > 0) for n in range(41)])
+    potentials = [TangentialStiffness(E_t=1e10)] if elastic else []
+    solved = closed(slider(Coulomb(mu=0.6), mounting, drive, potentials=potentials), 40.0, exact=1e-7)
+    assert len(solved.jumps) < 200
+
+
+def test_friction_that_fades_with_temperature():
+    """mu p = 3e4 Pa where T - T_0 = 50 K; two bodies of 1 J/(m^2 K) are warmed by 100 W/m^2."""
+    mu = varying(0.6, LinearInTemperature(slope=-1e-2))
+    loading = {"p": Hold(level=1e5), "w_t": Hold(level=3e-4), "Q_1": Hold(level=100.0)}
+    mount = Mounting(k=1e8, c_b=1e4)
+    scene = perfect_contact([], frictions=[Coulomb(mu=mu)], energy=Constant, loading=loading, tangential=mount)
+    solved = closed(scene, 1.9)
+    assert solved.events[0] == "slip forward"
+    assert solved.jumps[0].t == pytest.approx(1.0, rel=1e-9)
+
+
+def test_reservoirs_pass_the_heat_of_jumps_on():
+    solved, _ = scenes.pull_off(scenes.rows("h_pulloff_vs_stiffness")[5])
+    for jump in solved.jumps:
+        assert jump.heat_out == pytest.approx(jump.released, rel=1e-14)
+        assert jump.entropy_out == pytest.approx(jump.released / 300.0, rel=1e-14)
+    assert solved["H_events"][-1] == pytest.approx(-sum(jump.released for jump in solved.jumps), rel=1e-12)
+    assert solved.energy_error < 1e-12
+
+
+@pytest.mark.parametrize("p", [6559.108123501283, 8743.24723568622])
 def test_sliding_that_only_dampers_resist_begins_from_rest(p):
     """Its velocity is nothing but rounding of tractions at first; then u relaxes to the drive."""
     k, c, rate, mu = 1e13, 1e9, 1e-6, 0.3
-    drive, onset = Ramp(rate=rate), (mu * p - c * rate) / (k * rate)
-    solved = solve(slider(Coulomb(mu=mu), Mounting(k=k, c_b=c), drive, p=p), np.linspace(0.0, 4.0, 41))
-    assert solved.status == "finished", solved.reason
-    assert names(solved) == ["slip forward"]
+    onset = (mu * p - c * rate) / (k * rate)
+    solved = closed(slider(Coulomb(mu=mu), Mounting(k=k, c_b=c), Ramp(rate=rate), p), 4.0, outputs=41)
+    assert solved.events == ["slip forward"]
     assert solved.jumps[0].t == pytest.approx(onset, rel=1e-9)
     after = np.linspace(0.0, 4.0, 41)[1:] - onset
-    slid = rate * (after - c / k * -np.expm1(-k / c * after))
-    np.testing.assert_allclose(solved["u_t"][1:], slid, rtol=1e-8)
+    np.testing.assert_allclose(solved["u_t"][1:], rate * (after - c / k * -np.expm1(-k / c * after)), rtol=1e-8)
 
 
-# -- scenes that one tries first, against closed forms worked out by hand ---------------------------------------------
-
-P, MU, K = 1e5, 0.5, 1e10
-"""A slider of stiffness K sticks up to MU P."""
-
-DIGITS = 65.0 * 300.0 * float(np.finfo(float).eps)
-"""Heat that the last digit of the temperature of both bodies stands for [J/m^2]."""
-
-
-def finished(
-    until, potentials=(), frictions=(), limits=(), initial=None, loading=None, closed=1e-9, rtol=1e-11, **scene
-):
-    interface = Interface("T", potentials, frictions, sites=SITES if limits else None, limits=limits)
-    start = {"T": 300.0} | (initial or {})
-    whole = Scene(bodies("T", "T"), interface, loading=loading or {}, T_0=300.0, initial=start, **scene)
-    trajectory = Model(assemble(whole)).solve(Run(times=np.linspace(0.0, until, 21), rtol=rtol))
-    assert trajectory.status == "finished", trajectory.reason
-    books = audit(trajectory)
-    assert np.max(np.abs(books.energy)) < closed * books.energy_scale + DIGITS
-    assert books.violations == ()
-    return trajectory
+# -- against closed forms worked out by hand --------------------------------------------------------------------------
 
 
 def events(trajectory):
     return [(jump.edge.name, jump.t) for jump in trajectory.jumps]
 
 
-def final(trajectory, name):
-    return trajectory.result.y[[state.name for state in trajectory.model.system.states].index(name)]
-
-
-def block(history, until=1.0, initial=None, closed=1e-9, **mount):
-    loading = {"p": Hold(level=P), "w_t": history}
-    mounting = Mounting(k=K, **mount)
-    return finished(until, (), [Coulomb(mu=MU)], initial=initial, loading=loading, closed=closed, tangential=mounting)
-
-
 def test_a_free_body_leaves_a_zone_with_the_energy_it_brought():
     zone, m, v, g = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14), 1e-2, -5.0, 1e-7
-    start = {"g_n": g, "v_n": v}
-    trajectory = finished(1e-6, [zone], initial=start, loading={"F_n": Hold(level=0.0)}, normal=Mounting(m=m))
-    assert [name for name, _ in events(trajectory)] == ["touch", "release"]
-    left = v**2 + 2 / m * (zone.energy(g_n=g) - zone.energy(g_n=float(final(trajectory, "g_n"))))
-    assert final(trajectory, "v_n") == pytest.approx(math.sqrt(left), rel=1e-10)
+    scene = together([zone], (), {"F_n": Hold(level=0.0)}, {"g_n": g, "v_n": v}, normal=Mounting(m=m))
+    trajectory = closed(scene, 1e-6)
+    assert trajectory.events == ["touch", "release"]
+    left = v**2 + 2 / m * (zone.energy(g_n=g) - zone.energy(g_n=trajectory.end("g_n")))
+    assert trajectory.end("v_n") == pytest.approx(math.sqrt(left), rel=1e-10)
 
 
 def test_two_strengths_reached_at_once_break_the_interface_once():
-    limits = [TensileStrength(t_max=1e6), TensileStrength(t_max=1e6)]
-    trajectory = finished(
-        2.0,
-        [BondEnergy(K_0=0.01)],
-        limits=limits,
-        initial={"phi": 1.0},
-        loading={"w_n": Ramp(rate=1e-6)},
-        normal=Mounting(k=1e12),
-    )
+    given = {"limits": [TensileStrength(t_max=1e6), TensileStrength(t_max=1e6)], "initial": {"phi": 1.0}}
+    scene = together([BondEnergy(K_0=0.01)], loading={"w_n": Ramp(rate=1e-6)}, normal=Mounting(k=1e12), **given)
+    trajectory = closed(scene, 2.0)
     assert events(trajectory) == [("debond", pytest.approx(1.0, rel=1e-12))]
     assert trajectory.jumps[0].released == pytest.approx(0.5 - 0.005, rel=1e-12)
 
 
 def test_sliding_begins_before_the_interface_debonds():
-    loading = {"w_n": Ramp(rate=1e-6), "w_t": Ramp(rate=1e-6)}
-    trajectory = finished(
-        2.0,
-        [BondedContact(E_n=1e13), BondEnergy(K_0=0.01)],
-        [MohrCoulomb(mu=0.5, c=5e5)],
-        [TensileStrength(t_max=5e5)],
-        {"phi": 1.0},
-        loading,
-        normal=Mounting(k=1e12),
-        tangential=Mounting(k=1e12),
-    )
-    # 1/k + 1/E = 1.1e-12 m/Pa; joint release of both springs less the bonds
-    assert events(trajectory) == [
-        ("slip forward", pytest.approx(0.5, rel=1e-12)),
-        ("debond", pytest.approx(0.55, rel=1e-12)),
-    ]
+    """1/k + 1/E = 1.1e-12 m/Pa; joint release of both springs less the bonds."""
+    mounts = {"normal": Mounting(k=1e12), "tangential": Mounting(k=1e12)}
+    loading, frictions = {"w_n": Ramp(rate=1e-6), "w_t": Ramp(rate=1e-6)}, [MohrCoulomb(mu=0.5, c=5e5)]
+    given = {"limits": [TensileStrength(t_max=5e5)], "initial": {"phi": 1.0}}
+    scene = together([BondedContact(E_n=1e13), BondEnergy(K_0=0.01)], frictions, loading, **given, **mounts)
+    slip, debond = events(trajectory := closed(scene, 2.0))
+    assert slip == ("slip forward", pytest.approx(0.5, rel=1e-12))
+    assert debond == ("debond", pytest.approx(0.55, rel=1e-12))
     assert trajectory.jumps[1].released == pytest.approx(0.5 * 5e5**2 * 1.1e-12 - 0.005, rel=1e-9)
 
 
-PULSE = Table(times=[0.0, 0.5, 0.5 + 5e-10, 0.5 + 1e-9, 1.0], values=[0.0, 0.0, 2 * MU * P / K, 0.0, 0.0])
-"""A billionth of the run, to twice the limit."""
-
-
-def test_a_brief_pulse_makes_a_slider_slip():
-    """Twice the limit forward, then back until the spring holds the limit the other way, which it does not pass."""
-    trajectory = block(PULSE, closed=1e-6)  # the pulse lasts ten million last digits of its time
-    times = [0.5 + 2.5e-10, 0.5 + 5e-10]
-    assert [name for name, _ in events(trajectory)] == ["slip forward", "stop"]
-    assert [t for _, t in events(trajectory)] == pytest.approx(times, abs=3e-16)
+def test_a_brief_pulse_makes_a_slider_slip_and_stop():
+    """A billionth of the run, to twice the limit, then back until the spring holds the limit the other way."""
+    reach = 0.5 * 1e5 / 1e10
+    pulse = Table(times=[0.0, 0.5, 0.5 + 5e-10, 0.5 + 1e-9, 1.0], values=[0.0, 0.0, 2 * reach, 0.0, 0.0])
+    scene = together([], [Coulomb(mu=0.5)], {"p": Hold(level=1e5), "w_t": pulse}, tangential=Mounting(k=1e10))
+    trajectory = closed(scene, 1.0, exact=1e-6)  # the pulse lasts ten million last digits of its time
+    assert trajectory.events == ["slip forward", "stop"]
+    assert [jump.t for jump in trajectory.jumps] == pytest.approx([0.5 + 2.5e-10, 0.5 + 5e-10], abs=3e-16)
 
 
 def test_stages_that_end_at_forces_times_and_events():
+    """p = 1e5 Pa at w = -1.1e-7 m, sliding at 0.3 p / k = 3e-8 m; released 1.1 s after the pull begins."""
     stages = (
         Stage("approach", {"w_n": -1e-7}, event="touch"),
         Stage("press", {"w_n": -1e-7}, variable="p", value=1e5),
@@ -221,18 +157,10 @@ def test_stages_that_end_at_forces_times_and_events():
         Stage("pull", {"w_n": 1e-7}, event="release"),
         Stage("leave", {"w_n": 1e-7}),
     )
-    trajectory = finished(
-        20.0,
-        [Penalty(E_n=1e13)],
-        [Coulomb(mu=0.3)],
-        initial={"w_n": 1e-7, "w_t": 0.0, "g_n": 1e-7},
-        normal=Mounting(k=1e12),
-        tangential=Mounting(k=1e12),
-        programme=stages,
-        rtol=1e-12,
-    )
-    # p = 1e5 Pa at w = -1.1e-7 m, sliding at 0.3 p / k = 3e-8 m; released 1.1 s after the pull begins
-    found = dict(reversed(events(trajectory)))
+    mounts = {"normal": Mounting(k=1e12), "tangential": Mounting(k=1e12)}
+    initial = {"w_n": 1e-7, "w_t": 0.0, "g_n": 1e-7}
+    scene = together([Penalty(E_n=1e13)], [Coulomb(mu=0.3)], {}, initial, programme=stages, **mounts)
+    found = dict(reversed(events(closed(scene, 20.0, rtol=1e-12))))
     names = ("touch", "end of press", "end of hold", "slip forward", "end of further", "release")
     assert [found[name] for name in names] == pytest.approx([1.0, 2.1, 3.1, 3.4, 3.9, 5.0], rel=1e-9)
 
@@ -241,120 +169,80 @@ def test_a_contact_that_softens_with_temperature_cools_as_it_is_loaded():
     """S = C (T / T_0 - 1) + 1/2 E_0 a g^2 stays, with the stiffness E_0 [1 - a (T - T_0)] and C = 3 J/(m^2 K)."""
     contact = NormalStiffness(E_n=varying(1e13, LinearInTemperature(slope=-1e-3)))
     load = Harmonic(amplitude=-1e-6, frequency=0.1)
-    trajectory = finished(20.0, [contact], loading={"w_n": load}, normal=Mounting(k=1e13))
-    values = trajectory.everywhere
+    trajectory = closed(together([contact], loading={"w_n": load}, normal=Mounting(k=1e13)), 20.0)
     capacity = sum(body.energy.C for body in bodies())
-    T = 300.0 * (1 - 0.5 * 1e10 * values["g_n"] ** 2 / capacity)
-    assert values["T"] == pytest.approx(T, rel=1e-10)
-    assert np.ptp(values["T"]) > 1e-3
+    T = 300.0 * (1 - 0.5 * 1e10 * trajectory["g_n"] ** 2 / capacity)
+    assert trajectory["T"] == pytest.approx(T, rel=1e-10)
+    assert np.ptp(trajectory["T"]) > 1e-3
 
 
 # -- a thousand events and more lose nothing: every jump is exact to rounding, and none is told that does not happen --
 
-BODIES = bodies("T", "T", C_1=1.0, C_2=1.0)
+LIGHT = {"pair": bodies("T", "T", C_1=1.0, C_2=1.0)}
 
 
-def solved(interface, loading, mounts, end, rtol, initial=None):
-    scene = Scene(BODIES, interface, (), loading, None, 300.0, {"T": 300.0, **(initial or {})}, **mounts)
-    return Model(assemble(scene)).solve(Run(np.linspace(0.0, end, 11).tolist(), rtol, max_steps=10**6))
-
-
-@pytest.mark.parametrize(("rtol", "lost"), [(1e-11, 1e-9), (1e-13, 1e-11)])
-def test_a_mass_bounces_a_thousand_times(rtol, lost):
+def test_a_mass_bounces_a_thousand_times():
     """Nothing takes energy from a mass that falls on a spring: it comes back to where it was let go."""
-    height = 1e-3
-    trajectory = solved(
-        Interface("T", [Penalty(E_n=1e8)]),
-        {"F_n": Hold(level=-10.0)},
-        {"normal": Mounting(k=0.0, m=1.0)},
-        20.0,
-        rtol,
-        {"g_n": height},
-    )
+    fall = {"loading": {"F_n": Hold(level=-10.0)}, "initial": {"g_n": 1e-3}, "normal": Mounting(m=1.0)}
+    trajectory = closed(together([Penalty(E_n=1e8)], **fall, **LIGHT), 20.0, max_steps=10**6)
     assert len(trajectory.jumps) > 1000
-    assert audit(trajectory).energy_error < lost
     energy = {float(0.5 * jump.before.y[1] ** 2) for jump in trajectory.jumps}
-    np.testing.assert_allclose(sorted(energy), 10.0 * height, rtol=10 * lost)
+    np.testing.assert_allclose(sorted(energy), 10.0 * 1e-3, rtol=1e-8)
 
 
 def swung(friction, V, end, rtol):
     loading = {"p": Hold(level=1e3), "w_t": Ramp(rate=V)}
-    return solved(Interface("T", frictions=[friction]), loading, {"tangential": Mounting(k=1e5, m=1.0)}, end, rtol)
+    scene = together([], [friction], loading, tangential=Mounting(k=1e5, m=1.0), **LIGHT)
+    return closed(scene, end, exact=max(rtol, 1e-11), rtol=rtol, max_steps=10**6)
 
 
 def test_a_mass_sticks_and_slips_a_thousand_times():
     """Period and slip of each cycle are the same to rounding, and all work is heat."""
     V, omega, drop = 5e-3, np.sqrt(1e5), (0.4 - 0.2) * 1e3 / 1e5
     trajectory = swung(Coulomb(mu=0.2, mu_s=0.4), V, 500.0, 1e-11)
-    begun = [jump for jump in trajectory.jumps if jump.edge.name == "slip forward"]
     assert len(trajectory.jumps) > 1000
     period = 2 * drop / V + 2 * (np.pi - np.arctan(omega * drop / V)) / omega
-    np.testing.assert_allclose(np.diff([jump.t for jump in begun]), period, rtol=1e-9)
-    assert audit(trajectory).energy_error < 1e-12
+    np.testing.assert_allclose(np.diff([jump.t for jump in trajectory.of("slip forward")]), period, rtol=1e-9)
     assert all(abs(jump.before.y[1]) < 1e-11 * V for jump in trajectory.jumps)
 
 
-@pytest.mark.parametrize("rtol", [1e-9, 1e-11, 1e-13])
+@pytest.mark.parametrize("rtol", [1e-9, 1e-13])
 def test_sliding_that_only_just_stops_does_so_at_rest(rtol):
     """Static and kinetic friction alike and no damper: the velocity touches zero once in each of 1000 periods."""
     V, omega = 1e-3, np.sqrt(1e5)
     trajectory = swung(Coulomb(mu=0.3), V, 3.0 + 1000 * 2 * np.pi / omega, rtol)
     assert all(abs(jump.before.y[1]) < 1e-9 * V for jump in trajectory.jumps)
     assert all(jump.released < 1e-18 for jump in trajectory.jumps)
-    assert audit(trajectory).energy_error < max(rtol, 1e-11)
 
 
 # -- output times have no part in a run: steps, events and states are the same to the last bit whatever is asked for --
 
-LUMPS = """
+COHESIVE = """
+title: A mass that bounces against a cohesive zone
 T_0: 300 K
 bodies:
   a: {temperature: T, capacity: constant, C: 2 J/m^2/K, stiffness: 2e12 Pa/m}
   b: {temperature: T, capacity: constant, C: 1 J/m^2/K, stiffness: 6e12 Pa/m}
-"""
-
-COHESIVE = f"""
-title: A mass that bounces against a cohesive zone
-{LUMPS}
 interface:
   temperature: T
   potential:
     - exponential-cohesive-zone:
-        t_max: {{value: 2 MPa, times: [power: {{exponent: -1}}]}}
+        t_max: {value: 2 MPa, times: [power: {exponent: -1}]}
         g_0: 300 nm
         E_n: 3e13 Pa/m
 mechanics:
-  normal: {{m: 0.2 kg/m^2, c_b: 2e4 Pa s/m, c_g: 1e4 Pa s/m, beta_1: 0.3}}
-loading: {{w_n: {{harmonic: {{mean: 0.2 um, amplitude: 1 um, frequency: 60 kHz}}}}}}
-initial: {{T: 280 K, g_n: 100 nm, v_n: 5 mm/s}}
-run: {{until: 400 us}}
-"""
-
-RINGING = f"""
-title: Debonding that rings
-{LUMPS}
-interface:
-  temperature: T
-  sites: 1e18 1/m^2
-  potential:
-    - bonded-contact: {{E_n: 1.5e13 Pa/m}}
-    - bond-energy: {{K_0: 2 J/m^2}}
-  limits:
-    - tensile-strength: {{t_max: {{value: 9 MPa, times: [power: {{exponent: -1}}]}}}}
-mechanics: {{normal: {{m: 5 kg/m^2, c_b: 1e5 Pa s/m}}}}
-loading: {{w_n: {{harmonic: {{amplitude: 6 um, frequency: 2 kHz}}}}}}
-initial: {{T: 300 K, phi: 1, g_n: 0}}
-run: {{until: 3 ms}}
+  normal: {m: 0.2 kg/m^2, c_b: 2e4 Pa s/m, c_g: 1e4 Pa s/m, beta_1: 0.3}
+loading: {w_n: {harmonic: {mean: 0.2 um, amplitude: 1 um, frequency: 60 kHz}}}
+initial: {T: 280 K, g_n: 100 nm, v_n: 5 mm/s}
+run: {until: 400 us}
 """
 
 
-@pytest.mark.parametrize("text", [COHESIVE, RINGING])
-def test_outputs_change_nothing(text):
-    simulation = Simulation(load_text(text))
+def test_outputs_change_nothing():
+    simulation = Simulation(load_text(COHESIVE))
     run, found = simulation.case.run, []
-    for n in (2, 31, 301, 777):
-        times = np.linspace(0.0, run.times[-1], n).tolist()
-        trajectory = simulation.model.solve(replace(run, times=times))
+    for n in (2, 31, 777):
+        trajectory = Solved(simulation.model.solve(replace(run, times=np.linspace(0.0, run.times[-1], n).tolist())))
         assert trajectory.status == "finished"
         result, jumps = trajectory.result, trajectory.jumps
         events = np.array([[jump.t, jump.released, *jump.after.y] for jump in jumps])

@@ -436,3 +436,8 @@ def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
     assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
     for name in ("u_t", "T_1", "T_2", "T_c"):
         np.testing.assert_allclose(runs[1].dataset[name][-1], runs[0].dataset[name][-1], rtol=1e-8)
+
+
+def test_where_a_way_has_no_numbers_nothing_is_shared():
+    found = shared(lambda ways, _: (ways, np.full((len(ways), 2), np.nan)), 2, 1e-9, feeds_back=False)
+    assert np.all(np.isnan(found))

@@ -335,3 +335,28 @@ def test_a_late_pulse_is_as_sharp_as_an_early_one(begin):
     books = audit(trajectory)
     assert books.energy_scale == pytest.approx(0.5 * 1e18 / 1e15, rel=1e-5)
     assert books.energy_error < 1e-11
+
+
+def test_a_gap_that_snaps_off_does_not_pull_back_what_is_dragged():
+    text = """
+T_0: 300 K
+bodies:
+  a: {temperature: T, capacity: constant, C: 10 J/m^2/K, stiffness: 4e16 Pa/m}
+  b: {temperature: T, capacity: constant, C: 10 J/m^2/K}
+interface:
+  temperature: T
+  potential:
+    - van-der-waals-flat-flat: {A_H: 1.2e-19 J}
+    - penalty: {E_n: 8e19 Pa/m}
+  friction:
+    - mohr-coulomb: {mu: 0.3, t_n_max: 50 MPa, c: 1 kPa}
+mechanics: {tangential: {k: 1e13 Pa/m}}
+loading: {w_n: {table: {times: [0, 5, 12], values: [10 nm, 0.5 nm, 80 nm]}}, w_t: {ramp: {rate: 1 um/s}}}
+initial: {T: 300 K, g_n: 10 nm}
+run: {until: 12 s}
+"""
+    solution = solved(text, exact=1e-8)
+    states = [state.name for state in solution.trajectory.model.system.states]
+    for jump in solution.trajectory.jumps:
+        assert jump.after.y[states.index("u_t")] >= jump.before.y[states.index("u_t")] * (1 - 1e-9)
+        assert jump.verdict == "admissible"

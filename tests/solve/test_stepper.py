@@ -413,3 +413,11 @@ def test_a_rate_that_is_noise_does_not_hold_up_a_run():
     _, counters = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0)
     _, alone = booked(lambda t, x, dx: ((x + 1e6) - 1e6) - x, 5.0, group=-1)
     assert counters.steps < 10 * alone.steps + 100
+
+
+def test_singular_capacity() -> None:
+    t, x, y, dx, dy = se.symbols("t x y dx dy")
+    program = compile_program(t, [x, y], [dx, dy], [], [dx + dy - 1, 2 * dx + 2 * dy - 1])
+    result = radau.solve(problem(program, [0.0, 0.0], [0.0, 1.0], 1e-6))
+    assert result.status == Status.SINGULAR
+    assert "singular" in result.message
