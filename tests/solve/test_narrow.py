@@ -165,7 +165,7 @@ def test_a_sweep_ends_pieces_where_each_run_needs_it():
     rates = [-10e-6, -7e-6, -4e-6, -20e-6]
     swept = simulation.sweep({"loading.g_n.ramp.rate": rates})
     singly = [simulation.run({"loading.g_n.ramp.rate": rate}).trajectory.result.y for rate in rates]
-    np.testing.assert_array_equal([run.result.y for run in swept.sweep], singly)
+    np.testing.assert_array_equal([run.result.y for run in swept.runs], singly)
 
 
 @pytest.mark.parametrize("h", [0.02, 0.2])
