@@ -22,20 +22,14 @@ import symengine
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.mechanism.keys import REACTION
-from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
-from surfacechem.mechanism.source import sides
-from surfacechem.mechanism.thermo import KILO
-from surfacechem.mechanism.values import converted, own_parameters
-from surfacechem.quantities import BOLTZMANN, VARIABLES
+from surfacechem.mechanism.source import converted, own_parameters, sides
+from surfacechem.quantities import BOLTZMANN, KILO, MOLECULAR, VARIABLES
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import TINY
 
 __all__ = ["LoadedInterface"]
-
-MOLECULAR = KILO * AVOGADRO
-"""Molecules in a kmol."""
 
 PER_KMOL = {"J/mol": KILO, "J": MOLECULAR}
 """Energies that may be per amount, and how many make one per kmol."""

@@ -17,6 +17,15 @@ BOLTZMANN = 1.380649e-23
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant [J/(mol K)] (exact, SI 2019)."""
 
+AVOGADRO = 6.02214076e23
+"""Avogadro constant [1/mol] (exact, SI 2019)."""
+
+KILO = 1000.0
+"""Moles in a kmol, in which Cantera counts."""
+
+MOLECULAR = KILO * AVOGADRO
+"""Molecules in a kmol."""
+
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant [W/(m^2 K^4)] (SI 2019, rounded)."""
 

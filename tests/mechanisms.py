@@ -14,8 +14,8 @@ from surfacechem.contracts.terms import reads
 from surfacechem.documents.shipped import mechanisms
 from surfacechem.expressions import derivative
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rate_types import LoadedReaction, kind_of
+from surfacechem.quantities import AVOGADRO
 
 KMOL = 1000 * AVOGADRO
 SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))

@@ -156,8 +156,9 @@ class RateType:
     names: tuple[str, ...] = ()
     """Parameters of the law that a reaction has by the same names, and with the same defaults."""
     renamed: Mapping[str, str] = field(default_factory=dict)
-    """Parameters that every reaction gives, by names of its own, each with that in the law. Rate constants among them
-    count in the Arrhenius coefficient."""
+    """Parameters that every reaction gives, by names of its own, each with that in the law."""
+    ratios: Mapping[str, str] = field(default_factory=dict)
+    """The same for rate constants, which count in the Arrhenius coefficient."""
     distance: str = ""
     """Parameter of the law whose work against the force per bond is the whole factor, if it is."""
 

@@ -223,7 +223,7 @@ class TwoPathway(StatedBothWays):
 
     off = "k_slip"
     rate_types = (
-        RateType("two-pathway", "log_off", {"k_slip": 1.0}, ("x_slip", "x_catch"), {"catch_ratio": "k_catch"}),
+        RateType("two-pathway", "log_off", {"k_slip": 1.0}, ("x_slip", "x_catch"), ratios={"catch_ratio": "k_catch"}),
     )
 
     k_slip: float = parameter("1/s", "rate of the slip pathway at no force", above=0)

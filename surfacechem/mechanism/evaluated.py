@@ -17,12 +17,9 @@ import numpy as np
 from surfacechem.contracts.terms import option, parameter
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression
-from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
+from surfacechem.mechanism.mixture import Formula, Species
 from surfacechem.mechanism.rates import MechanismReaction
-from surfacechem.mechanism.thermo import KILO
-
-MOLECULAR = KILO * AVOGADRO
-"""Molecules in a kmol."""
+from surfacechem.quantities import MOLECULAR
 
 GASES = frozenset(("ideal-gas", "Redlich-Kwong", "Peng-Robinson", "plasma"))
 """Cantera's models of phases whose pressure matters."""

@@ -25,7 +25,7 @@ from typing import Any
 
 from surfacechem.expressions import Expression, log, where
 from surfacechem.mechanism.source import Source
-from surfacechem.mechanism.thermo import KILO
+from surfacechem.quantities import KILO
 
 REFERENCE = 298.15
 """Temperature [K] at which heat capacities begin to count."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from surfacechem.contracts.terms import Potential, RateLaw
 from surfacechem.documents import document
@@ -26,12 +26,12 @@ from surfacechem.mechanism.evaluated import (
 )
 from surfacechem.mechanism.interaction import KEY, interactions
 from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
-from surfacechem.mechanism.mixture import AVOGADRO, IdealMixture, Species, Spring, unpaired
-from surfacechem.mechanism.rate_types import kind_of, names
+from surfacechem.mechanism.mixture import IdealMixture, Species, Spring, unpaired
+from surfacechem.mechanism.rate_types import kind_of
 from surfacechem.mechanism.rates import plain
-from surfacechem.mechanism.source import LIMITS, Source, sides
-from surfacechem.mechanism.thermo import KILO, lower
-from surfacechem.mechanism.values import number, own_parameters
+from surfacechem.mechanism.source import LIMITS, Source, own_parameters, sides
+from surfacechem.mechanism.thermo import lower
+from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
 
 NONE: Mapping[str, Neighbour] = {}
@@ -102,7 +102,7 @@ def load_mechanism(
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
     chosen = _bonds(species, bonds or (), place)
-    density = surface.site_density * KILO * AVOGADRO
+    density = surface.site_density * MOLECULAR
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
     temperatures = (float(surface.min_temp), float(surface.max_temp))
@@ -192,8 +192,9 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
         title, spring = f"species {item.name}", None
         if "bond" in entry:
             bond, keys = entry["bond"], {name.replace("_", "-"): name for name, _ in Spring.specs()}
-            read = partial(number, source, entry, bond, title=f"{title}: bond: ")
-            spring = Spring(**cast(dict[str, Any], own_parameters(Spring, keys, bond, f"{title}: bond", read)))
+            read, place = partial(source.number, entry, bond, title=f"{title}: bond: "), source.place(entry, "bond")
+            own: dict[str, Any] = own_parameters(Spring, keys, bond, f"{title}: bond", read, place)
+            spring = Spring(**own)
         try:
             gibbs = lower(item.thermo)
         except InputError as error:  # a number that Cantera's units take out of range
@@ -203,8 +204,8 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
         # Cantera's standard state is at that coverage, ours at full coverage: R T ln of it lies between.
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
-        own = interactions(source, entry, names)
-        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, own, fixed))
+        around = interactions(source, entry, names)
+        result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, around, fixed))
     odd = unpaired(result)
     if odd is not None:
         name, other = odd
@@ -285,15 +286,13 @@ def _lowered(
 ) -> RateLaw:
     """The law of a reaction as a formula."""
     title, variables = f"reaction {reaction.equation}", {item.name: item.variable for item in species}
-    law = kind_of(str(entry.get("type") or reaction.rate.type))
-    if law is None:
-        guess = suggestion(reaction.rate.type, names())
-        raise InputError(f"{title}: rate type '{reaction.rate.type}' is not lowered.{guess}", place)
+    law = kind_of(str(entry.get("type", "Arrhenius")))
+    assert law is not None, "what is not lowered is evaluated, or was refused"
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     if any(order < 0 for order in forward.values()):
         raise InputError(f"{title}: a negative order is infinite where the coverage vanishes; remove it.", place)
     who = f"a rate of type {law.kind.removeprefix('interface-')}"
-    read = partial(number, source, entry, entry)
+    read = partial(source.number, entry, entry)
     taking_part = {*reaction.reactants, *reaction.products, *reaction.orders}
     try:
         own: dict[str, Any] = {

@@ -11,10 +11,7 @@ from surfacechem.contracts.terms import Law, Potential, option, parameter
 from surfacechem.expressions import Expression, mixing
 from surfacechem.mechanism.interaction import SAME, Interaction
 from surfacechem.mechanism.thermo import Bind, StandardGibbs
-from surfacechem.quantities import BOLTZMANN
-
-AVOGADRO = 6.02214076e23
-"""Avogadro constant [1/mol] (exact, SI 2019)."""
+from surfacechem.quantities import AVOGADRO, BOLTZMANN
 
 
 class Formula:

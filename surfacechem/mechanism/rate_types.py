@@ -32,18 +32,19 @@ class LoadedReaction(InterfaceArrhenius):
     law: ClassVar[type[RateLaw]]
     rate_type: ClassVar[RateType]
 
+    parameters: ClassVar[Mapping[str, str]]
+    """Parameters of the law by their names in a mechanism."""
+
     @classmethod
     def own_keys(cls) -> dict[str, str]:
         """Keys of the reaction in a mechanism file: the parameters of the law, but for its rate constants."""
-        return {name.replace("_", "-"): name for name in (*cls.rate_type.renamed, *cls.rate_type.names)}
+        return {name.replace("_", "-"): name for name in cls.parameters}
 
     @property
     def stated(self) -> RateLaw:
         """The law with the numbers of this reaction, and a rate constant of one."""
-        names = {name: name for name in self.rate_type.names} | dict(self.rate_type.renamed)
-        own = {name: getattr(self, own) for own, name in names.items()}
-        values: dict[str, Any] = {**self.rate_type.constants, **own}
-        return self.law(**values)
+        own: dict[str, Any] = {name: getattr(self, own) for own, name in self.parameters.items()}
+        return self.law(**own | dict(self.rate_type.constants))
 
     @property
     def log_factor(self) -> Callable[..., Expression]:
@@ -87,13 +88,15 @@ class LoadedReaction(InterfaceArrhenius):
 
 def _loaded(law: type[RateLaw], rate_type: RateType) -> type[LoadedReaction]:
     """The reaction of a rate type: its parameters are fields of the law, its documentation that of the factor."""
+    renamed = {**rate_type.renamed, **rate_type.ratios}
+    parameters = {**renamed, **{name: name for name in rate_type.names}}
     given = {item.name: item for item in fields(law)}
     own: dict[str, Any] = {}
-    for name, source in (*rate_type.renamed.items(), *zip(rate_type.names, rate_type.names, strict=True)):
-        spec, default = given[source].metadata["spec"], given[source].default
-        if spec.unit == "1/s":
+    for name, source in parameters.items():
+        spec = given[source].metadata["spec"]
+        if name in rate_type.ratios:
             spec = replace(spec, unit="1", text=f"{spec.text}, over the rate constant")
-        own[name] = field(default=MISSING if name in rate_type.renamed else default, metadata={"spec": spec})
+        own[name] = field(default=MISSING if name in renamed else given[source].default, metadata={"spec": spec})
     text = inspect.getdoc(getattr(law, rate_type.factor)) or ""
     namespace = {
         "__doc__": text.partition("\n\n>>>")[0],  # the worked number is that of the law
@@ -102,6 +105,7 @@ def _loaded(law: type[RateLaw], rate_type: RateType) -> type[LoadedReaction]:
         "kind": PREFIX + rate_type.name,
         "law": law,
         "rate_type": rate_type,
+        "parameters": parameters,
         **own,
     }
     name = "Interface" + rate_type.name.replace("-", " ").title().replace(" ", "")

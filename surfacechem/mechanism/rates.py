@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Self
 
 from surfacechem.contracts.terms import RateLaw, Spec, option, parameter
 from surfacechem.expressions import Expression, log, log_fraction, power, scaled_exp, where
-from surfacechem.mechanism.mixture import AVOGADRO, Formula, Species
-from surfacechem.mechanism.thermo import KILO, Bind
-from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
+from surfacechem.mechanism.mixture import Formula, Species
+from surfacechem.mechanism.thermo import Bind
+from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT, KILO, MOLECULAR
 
 NO_COVERAGES: Mapping[str, Expression] = {}
 
@@ -134,7 +134,7 @@ class InterfaceArrhenius(MechanismReaction):
             terms.append(CoverageTerm(variables[name], float(term["a"]), float(term["m"]), E))
         return {
             # One kmol^(1 - n) for a reaction of order n, whose rate counts kmol too.
-            "A": rate.pre_exponential_factor * (KILO * AVOGADRO) ** (1 - order),
+            "A": rate.pre_exponential_factor * MOLECULAR ** (1 - order),
             "b": rate.temperature_exponent,
             "Ea": rate.activation_energy / KILO,
             "coverage": tuple(terms),

@@ -1,15 +1,21 @@
-"""The text of a mechanism file with the line of every entry, and what of it belongs to a phase."""
+"""The text of a mechanism file with the line of every entry, what of it belongs to a phase, and its own numbers.
+
+Numbers that Cantera reads are converted by Cantera; those of this package only, such as the length of a bond, here.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
 from difflib import get_close_matches
 from typing import Any
 
+from surfacechem.contracts.terms import Law, Spec
 from surfacechem.documents import document
 from surfacechem.documents.document import Limits, Tree
 from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.quantities import AVOGADRO, KILO
 
 LIMITS = Limits(largest=10_000_000, most=200_000)
 """A mechanism may be that of a large gas beside the surface."""
@@ -23,6 +29,17 @@ WRITER = "YamlWriter"
 CANTERA_UNITS = {"length": "m", "quantity": "kmol", "energy": "J", "activation-energy": "J/kmol"}
 """What numbers in such a file count in where it does not say otherwise."""
 
+ENERGY = ("activation-energy", "quantity")
+OWN = {
+    "m": (("length",), "0.4 nm"),
+    "N/m": (("length",), "1 pN/nm"),
+    "J": (ENERGY, "10 kJ/mol"),
+    "J/mol": (ENERGY, "50 kJ/mol"),
+}
+"""Units of numbers that Cantera does not read: what in `units` gives a bare one a meaning, and an example."""
+
+LONGEST = 1e-5
+"""Lengths [m] above this are not those of molecules, not even of tethers."""
 
 NUMBER, NAME = (int, float), (str, int, float)
 ENTRY: Mapping[str, tuple[type, ...]] = {"units": (dict,), "name": NAME, "thermo": (str, dict)}
@@ -109,6 +126,31 @@ class Source:
     def error(self, message: str, node: Any, key: Any = None) -> InputError:
         """An error at a mapping or list of the file, or at one of its entries."""
         return InputError(message, self.place(node, key))
+
+    def number(self, entry: Any, node: Any, key: str, spec: Spec, title: str = "") -> float:
+        """A number that Cantera does not read, in its SI unit and range; it has a unit, or the file says which."""
+        import cantera
+
+        value, (wanted, example) = node[key], OWN.get(spec.unit, ((), ""))
+        declared: Any = self.defaults(entry)
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            raise self.error(f"{title}{key} must be a number, not {value!r}.", node, key)
+        if wanted and unitless(value, declared, wanted):
+            message = (
+                f"{title}{key}: {value:g} has no unit, and `units` says nothing about it; write it in {spec.unit}, "
+                f"such as `{key}: {example}`."
+            )
+            raise self.error(message, node, key)
+        try:
+            units = cantera.UnitSystem(declared)
+            found = converted(units, value if isinstance(value, str) else float(value), spec.unit)
+            spec.check(key, found)
+        except InputError as error:
+            named = error.message if error.message.startswith(key) else f"{key}: {error.message}"
+            raise self.error(f"{title}{named}", node, key) from None
+        except (cantera.CanteraError, ValueError):
+            raise self.error(f"{title}{key} = {value} is not a quantity in {spec.unit}.", node, key) from None
+        return found
 
     def _check(self, node: Any, kinds: Mapping[str, tuple[type, ...]]) -> None:
         """InputError where a key does not hold the kind of value that it must."""
@@ -213,6 +255,66 @@ def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
                 side[word] = side.get(word, 0.0) + factor
                 factor = 1.0
     return found[0], found[1], arrow != "=>"
+
+
+def leading(value: Any) -> float:
+    """The number with which a value begins; nan where there is none.
+
+    >>> leading("-1e-9 mol/m^2"), leading(2)
+    (-1e-09, 2.0)
+    """
+    if isinstance(value, int | float):
+        return float(value)
+    found = re.match(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)", str(value))
+    return float(found[1]) if found else float("nan")
+
+
+def own_parameters(
+    law: type[Law],
+    keys: Mapping[str, str],
+    node: Any,
+    who: str,
+    read: Callable[[str, Spec], float],
+    place: Place | None = None,
+) -> dict[str, float]:
+    """Parameters of a law from an entry that has them by these keys, each ``read`` as it is specified.
+
+    InputError at a ``place`` where one that has no default is not there.
+    """
+    specs = dict(law.specs())
+    optional = {item.name for item in fields(law) if item.default is not MISSING}
+    for key, name in keys.items():
+        if key not in node and name not in optional:
+            raise InputError(f"{who} needs `{key}`: {specs[name].text} [{specs[name].unit}].", place)
+    return {name: read(key, specs[name]) for key, name in keys.items() if key in node}
+
+
+def unitless(value: Any, given: Mapping[str, Any], wanted: Iterable[str]) -> float:
+    """The first number other than zero without a unit; zero where ``given`` units have a ``wanted`` dimension."""
+    if any(item in given for item in wanted):
+        return 0
+    numbers = value if isinstance(value, list) else [value]
+    return next((x for x in numbers if isinstance(x, int | float) and x), 0)
+
+
+def converted(units: Any, value: str | float, unit: str) -> float:
+    """A number in an SI unit; energies may be per molecule or per mole, as Cantera's activation energies."""
+    import cantera
+
+    if unit == "1":
+        return float(value)
+    if unit == "J" and isinstance(value, str):
+        try:
+            return float(units.convert_to(value, "J"))
+        except cantera.CanteraError:
+            pass  # an energy per amount
+    if unit in ("J", "J/mol"):
+        return float(units.convert_activation_energy_to(value, "J/kmol")) / (KILO * (AVOGADRO if unit == "J" else 1))
+    number = float(units.convert_to(value, unit))
+    # A number in metres that was meant in nanometres is not caught by its unit.
+    if unit == "m" and abs(number) > LONGEST:
+        raise InputError(f"{value} is a length of {number:g} m, which no bond has; write it as `0.4 nm`.")
+    return number
 
 
 def _shown(value: Any) -> str:

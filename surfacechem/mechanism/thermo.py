@@ -13,7 +13,7 @@ from typing import Any, Self, cast
 
 from surfacechem.contracts.terms import Law, option, parameter
 from surfacechem.expressions import Expression, log, where
-from surfacechem.quantities import GAS_CONSTANT
+from surfacechem.quantities import GAS_CONSTANT, KILO
 
 Bind = Callable[[Law, str, str], Any]
 """Puts symbols for the parameters of a law, which gets its path in a case and the end of their names."""
@@ -163,9 +163,6 @@ class StandardGibbs:
         pairs = zip(self.pieces, forms, strict=True)
         return replace(self, pieces=tuple(replace(piece, form=form) for piece, form in pairs))
 
-
-KILO = 1000.0
-"""Moles in a kmol, in which Cantera counts."""
 
 TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 8, 1), "ShomatePoly2": (Shomate, 1, 8)}
 """Cantera's models with two ranges: the form, and where the coefficients of the lower and of the upper range begin."""

@@ -17,10 +17,9 @@ from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttac
 from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
 from surfacechem.laws.loading import Hold, Ramp
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rate_types import LoadedReaction, names
 from surfacechem.model.assemble import assemble
-from surfacechem.quantities import BOLTZMANN
+from surfacechem.quantities import AVOGADRO, BOLTZMANN
 from surfacechem.results.audit import audit
 from surfacechem.scene import Body, Interface, Scene, Sites
 from surfacechem.solve.run import Model, Run

@@ -22,9 +22,9 @@ from mechanisms import (
     values,
 )
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.mixture import AVOGADRO
 from surfacechem.mechanism.rate_types import kinds
 from surfacechem.mechanism.rates import InterfaceArrhenius
+from surfacechem.quantities import AVOGADRO
 
 TOLERANCE = 1e-12
 KT = 1.380649e-23 * 298.15
