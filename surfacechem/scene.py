@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from surfacechem.contracts import grids
-from surfacechem.contracts.substances import Fluid, Property
 from surfacechem.contracts.terms import (
     BodyEnergy,
+    Fluid,
     Friction,
     HeatTransfer,
     Law,
     Limit,
     Load,
     Potential,
+    Property,
     RateLaw,
     option,
     parameter,

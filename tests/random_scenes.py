@@ -5,7 +5,6 @@ from functools import cache
 
 from random_laws import T_0, Dice, laws
 
-from surfacechem.contracts.substances import Property
 from surfacechem.contracts.terms import (
     BodyEnergy,
     Friction,
@@ -13,6 +12,7 @@ from surfacechem.contracts.terms import (
     Law,
     Limit,
     Potential,
+    Property,
     RateLaw,
     Varying,
     reads,

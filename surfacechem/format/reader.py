@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.substances import Property
+from surfacechem.contracts.terms import Property
 from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 
 from surfacechem import laws
-from surfacechem.contracts.substances import Property
-from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, RateLaw
+from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, Property, RateLaw
 from surfacechem.format.csvtable import TEXTS
 from surfacechem.format.declarations import NODE, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document

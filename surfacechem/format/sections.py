@@ -13,8 +13,17 @@ from typing import Any, cast
 
 from surfacechem import laws, references
 from surfacechem import solve as solvers
-from surfacechem.contracts.substances import Property
-from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Limit, Load, Potential, RateLaw, Spec
+from surfacechem.contracts.terms import (
+    BodyEnergy,
+    Friction,
+    HeatTransfer,
+    Limit,
+    Load,
+    Potential,
+    Property,
+    RateLaw,
+    Spec,
+)
 from surfacechem.contracts.units import quotient
 from surfacechem.documents.document import Tree
 from surfacechem.format.declarations import (

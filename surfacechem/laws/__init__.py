@@ -6,7 +6,6 @@ import importlib
 import inspect
 from collections.abc import Iterator
 
-from surfacechem.contracts.substances import Property
 from surfacechem.contracts.terms import (
     BodyEnergy,
     Factor,
@@ -16,6 +15,7 @@ from surfacechem.contracts.terms import (
     Limit,
     Load,
     Potential,
+    Property,
     RateLaw,
 )
 from surfacechem.errors import InputError, suggestion

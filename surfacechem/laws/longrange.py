@@ -10,19 +10,33 @@ Derjaguin's approximation drops the second term.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
+from typing import ClassVar
 
-from surfacechem.contracts.terms import Law, Potential, parameter
+from surfacechem.contracts.terms import Potential, parameter
 from surfacechem.expressions import Expression, is_symbolic, log, where
 
+WALL = 0.01
+"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
 
-class InteractingSites(Law):
-    """Densities of sites on both surfaces, strength and range of the interaction of a pair.
+ATOMIC = 1.65e-10
+"""Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
+
+
+class LennardJones(Potential):
+    """Sites on two surfaces that attract and, nearer, repel each other; subclasses sum up all pairs.
 
     The sites stay with the surfaces: their densities are those on the reference area.
     """
 
     positive = ("g_n",)
+    repelling: ClassVar[tuple[int, int]]
+    """Divisor and power of the repulsion."""
+    attracting: ClassVar[tuple[int, int]]
+    """Divisor and power of the attraction."""
+    strongest: ClassVar[float]
+    """Gap over g_0 at the largest tension."""
 
     n_1: float = parameter("1/m^2", "density of interacting sites on body 1", at_least=0, stretch=-1)
     n_2: float = parameter("1/m^2", "density of interacting sites on body 2", at_least=0, stretch=-1)
@@ -34,15 +48,25 @@ class InteractingSites(Law):
         """A = 2 pi n_1 n_2 psi_0 [Pa/m]."""
         return 2 * math.pi * self.n_1 * self.n_2 * self.psi_0
 
+    @property
+    def peaks(self) -> Mapping[str, Expression]:
+        """The gap at which the attraction is strongest."""
+        return {"g_n": self.g_0 * self.strongest}
 
-WALL = 0.01
-"""Gap over g_0 below which a Lennard-Jones repulsion, then 1e16 times the adhesion energy, goes on as its parabola."""
+    def energy(self, g_n: Expression) -> Expression:
+        """Free energy [J/m^2]."""
+        return self._sum(g_n, self.repelling, self.attracting)
 
-ATOMIC = 1.65e-10
-"""Distance [m] of surfaces in contact that gives measured surface energies (Israelachvili 2011, ch. 13)."""
+    def repulsion(self, g_n: Expression) -> Expression:
+        """Energy of the repulsion [J/m^2]."""
+        return self._sum(g_n, self.repelling)
+
+    @abstractmethod
+    def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
+        """Energy of terms of the pair potential [J/m^2]."""
 
 
-class LennardJonesFlatFlat(InteractingSites, Potential):
+class LennardJonesFlatFlat(LennardJones):
     r"""Lennard-Jones type attraction and repulsion between sites on two flats.
 
     .. math::
@@ -61,22 +85,13 @@ class LennardJonesFlatFlat(InteractingSites, Potential):
     """
 
     per = "current"
+    repelling, attracting, strongest = (360, 8), (-6, 2), 5 ** (-1 / 6)
 
-    @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """The gap at the strength."""
-        return {"g_n": self.g_0 * 5 ** (-1 / 6)}
-
-    def energy(self, g_n: Expression) -> Expression:
-        """Free energy [J/m^2]."""
-        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8), (-6, 2))
-
-    def repulsion(self, g_n: Expression) -> Expression:
-        """Energy of the repulsion [J/m^2]."""
-        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, (360, 8))
+    def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
+        return self.stiffness * self.g_0**2 * _repelling(g_n / self.g_0, *terms)
 
 
-class LennardJonesSpherePlane(InteractingSites, Potential):
+class LennardJonesSpherePlane(LennardJones):
     r"""Lennard-Jones type attraction and repulsion between sites on a sphere and on a plane, exact.
 
     .. math::
@@ -93,28 +108,17 @@ class LennardJonesSpherePlane(InteractingSites, Potential):
     '-0.0206974228'
     """
 
+    repelling, attracting, strongest = (2520, 7), (-6, 1), 15 ** (-1 / 6)
+
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
-
-    @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """The gap at which the attraction is strongest."""
-        return {"g_n": self.g_0 * 15 ** (-1 / 6)}
-
-    def energy(self, g_n: Expression) -> Expression:
-        """Free energy [J/m^2]."""
-        return self._sum(g_n, (2520, 7), (-6, 1))
-
-    def repulsion(self, g_n: Expression) -> Expression:
-        """Energy of the repulsion [J/m^2]."""
-        return self._sum(g_n, (2520, 7))
 
     def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
         near, far = (_repelling(gap / self.g_0, *terms) for gap in (g_n, g_n + 2 * self.R))
         return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * (near - far)
 
 
-class LennardJonesDerjaguin(InteractingSites, Potential):
+class LennardJonesDerjaguin(LennardJones):
     r"""Lennard-Jones type attraction and repulsion between a large sphere and a plane.
 
     .. math::
@@ -132,26 +136,28 @@ class LennardJonesDerjaguin(InteractingSites, Potential):
     '-0.0213183455'
     """
 
+    repelling, attracting, strongest = (2520, 7), (-6, 1), 15 ** (-1 / 6)
+
     R: float = parameter("m", "radius of the sphere", above=0)
     area: float = parameter("m^2", "reference area", above=0)
 
-    @property
-    def peaks(self) -> Mapping[str, Expression]:
-        """The gap at which the attraction is strongest."""
-        return {"g_n": self.g_0 * 15 ** (-1 / 6)}
+    def _sum(self, g_n: Expression, *terms: tuple[int, int]) -> Expression:
+        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * _repelling(g_n / self.g_0, *terms)
 
+
+class Attraction(Potential):
+    """A potential that bears no contact, however near the surfaces are."""
+
+    @abstractmethod
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
-        shape = _repelling(g_n / self.g_0, (2520, 7), (-6, 1))
-        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
 
-    def repulsion(self, g_n: Expression) -> Expression:
-        """Energy of the repulsion [J/m^2]."""
-        shape = _repelling(g_n / self.g_0, (2520, 7))
-        return 2 * math.pi * self.R / self.area * self.stiffness * self.g_0**3 * shape
+    def repulsion(self) -> Expression:
+        """None."""
+        return 0.0
 
 
-class VanDerWaalsFlatFlat(Potential):
+class VanDerWaalsFlatFlat(Attraction):
     r"""Van der Waals attraction between two half-spaces.
 
     .. math:: \Psi = -\frac{A_H}{12 \pi (g_n + D_0)^2}, \quad t_n = \frac{A_H}{6 \pi (g_n + D_0)^3}
@@ -178,12 +184,8 @@ class VanDerWaalsFlatFlat(Potential):
         contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
         return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
 
-    def repulsion(self) -> Expression:
-        """None: it bears no contact."""
-        return 0.0
 
-
-class VanDerWaalsSpherePlane(Potential):
+class VanDerWaalsSpherePlane(Attraction):
     r"""Van der Waals attraction between a sphere and a half-space, exact.
 
     .. math::
@@ -210,16 +212,12 @@ class VanDerWaalsSpherePlane(Potential):
         apart, contact = self._shape(_outside(g_n) + self.D_0), self._shape(self.D_0)
         return self.A_H / (6 * self.area) * where(g_n > 0, apart, contact + slope * g_n)
 
-    def repulsion(self) -> Expression:
-        """None: it bears no contact."""
-        return 0.0
-
     def _shape(self, h: Expression) -> Expression:
         far = h + 2 * self.R
         return -self.R / h - self.R / far - log(h / far)
 
 
-class ElectrostaticFlatFlat(Potential):
+class ElectrostaticFlatFlat(Attraction):
     r"""Coulomb interaction of two charged flats.
 
     .. math:: \Psi = -\frac{s_1 s_2}{2 \varepsilon} g_n, \quad t_n = -\frac{s_1 s_2}{2 \varepsilon}
@@ -242,12 +240,8 @@ class ElectrostaticFlatFlat(Potential):
         """Free energy [J/m^2]."""
         return -self.s_1 * self.s_2 / (2 * self.epsilon) * g_n
 
-    def repulsion(self) -> Expression:
-        """None: it bears no contact."""
-        return 0.0
 
-
-class ElectrostaticSpherePlane(Potential):
+class ElectrostaticSpherePlane(Attraction):
     r"""Coulomb interaction of a sphere, charged on its surface, with a charged plane.
 
     .. math:: \Psi = -\frac{2 \pi R^2 s_1 s_2}{\varepsilon\,a} g_n
@@ -268,10 +262,6 @@ class ElectrostaticSpherePlane(Potential):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         return -2 * math.pi * self.R**2 * self.s_1 * self.s_2 / (self.epsilon * self.area) * g_n
-
-    def repulsion(self) -> Expression:
-        """None: it bears no contact."""
-        return 0.0
 
 
 def _outside(g_n: Expression) -> Expression:

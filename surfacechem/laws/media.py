@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from surfacechem.contracts.substances import Property
-from surfacechem.contracts.terms import parameter
+from surfacechem.contracts.terms import Property, parameter
 from surfacechem.expressions import Expression, exp, log, power
 
 

@@ -8,7 +8,7 @@ take from them, or give to them, leaves them as they are, and brings its enthalp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from surfacechem.contracts.terms import option, parameter
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.expressions import Expression
 from surfacechem.mechanism.mixture import Formula, Species
 from surfacechem.mechanism.rates import MechanismReaction
 from surfacechem.quantities import MOLECULAR
@@ -44,31 +43,6 @@ class Neighbour:
     place: Place | None = None
 
 
-class HeldPhase:
-    """Phases beside a surface at their given states, and what reactions take from them."""
-
-    def __init__(self, surface: Any, reactions: Sequence[int]) -> None:
-        self.phases = list(surface.adjacent.values())
-        self._pressures = [float(phase.P) for phase in self.phases]
-        rows = [surface.kinetics_species_index(name) for phase in self.phases for name in phase.species_names]
-        lost = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
-        self._taken = np.asarray(lost)[np.ix_(rows, list(reactions))].T if rows else np.zeros((len(reactions), 0))
-        self._charged = [FARADAY * phase.electric_potential * phase.charges for phase in self.phases]
-
-    def warm(self, T: float) -> None:
-        """Bring the phases to a temperature [K]."""
-        for phase, pressure in zip(self.phases, self._pressures, strict=True):
-            phase.TP = T, pressure
-
-    def taken(self) -> list[float]:
-        """Enthalpy, then Gibbs energy, that each reaction takes, electric energy included [J/kmol]."""
-        found: list[float] = []
-        for energy in ("partial_molar_enthalpies", "chemical_potentials"):
-            own = [getattr(x, energy) + charged for x, charged in zip(self.phases, self._charged, strict=True)]
-            found.extend(self._taken @ np.concatenate(own))
-        return found
-
-
 def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> None:
     """Bring the neighbours of a surface to their states; InputError where one is missing, unknown or odd."""
     for name, state in given.items():
@@ -76,32 +50,25 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> N
             message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
             raise InputError(message, state.place)
     for name, phase in surface.adjacent.items():
-        _hold(phase, given.get(name, Neighbour(place=place)))
-
-
-def _hold(phase: Any, state: Neighbour) -> None:
-    """Bring a phase to its state."""
-    gas, name, known = phase.thermo_model in GASES, phase.name, phase.species_names
-    missing = "composition" if len(known) > 1 and not state.composition else ""
-    if gas and state.pressure is None:
-        missing = "pressure"
-    if missing:
-        example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
-        message = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
-        raise InputError(message, state.place)
-    for species in state.composition:
-        if species not in known:
-            message = f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
-            raise InputError(message, state.place)
-    total = sum(state.composition.values())
-    if state.composition and abs(total - 1) > SUM_TOLERANCE:
-        message = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
-        raise InputError(message, state.place)
-    if state.composition:
-        phase.X = dict(state.composition)
-    if state.pressure is not None:
-        phase.TP = phase.T, state.pressure
-    phase.electric_potential = state.electric_potential
+        state = given.get(name, Neighbour(place=place))
+        gas, known = phase.thermo_model in GASES, phase.species_names
+        unknown = [species for species in state.composition if species not in known]
+        total, problem = sum(state.composition.values()), ""
+        if (gas and state.pressure is None) or (len(known) > 1 and not state.composition):
+            missing = "pressure" if gas and state.pressure is None else "composition"
+            example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
+            problem = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
+        elif unknown:
+            problem = f"the neighbour {name} has no species '{unknown[0]}'.{suggestion(unknown[0], known)}"
+        elif state.composition and abs(total - 1) > SUM_TOLERANCE:
+            problem = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
+        if problem:
+            raise InputError(problem, state.place)
+        if state.composition:
+            phase.X = dict(state.composition)
+        if state.pressure is not None:
+            phase.TP = phase.T, state.pressure
+        phase.electric_potential = state.electric_potential
 
 
 def remarks(surface: Any) -> tuple[str, ...]:
@@ -114,14 +81,12 @@ def remarks(surface: Any) -> tuple[str, ...]:
         for name, part in zip(phase.species_names, phase.X, strict=True)
     )
     found = [name for name, part in there if part == 0 and made[surface.kinetics_species_index(name)] > 0]
-    if not found:
-        return ()
     names = ", ".join(found[:6]) + (f" and {len(found) - 6} more" if len(found) > 6 else "")
     text = (
         f"the neighbours hold no {names}, which reactions make: what they release is diluted without end, and its "
         "entropy is counted as at a mole fraction of 1e-300."
     )
-    return (text,)
+    return (text,) if found else ()
 
 
 class EvaluatedReaction(MechanismReaction):
@@ -134,7 +99,7 @@ class EvaluatedReaction(MechanismReaction):
     @property
     def rate(self) -> Formula:  # type: ignore[override]
         """Net rate [1/(m^2 s)]."""
-        return _given(lambda: self.value)
+        return Formula((), lambda _: self.value)
 
     @property
     def one_way(self) -> bool:
@@ -155,11 +120,7 @@ class NeighbourReaction(EvaluatedReaction):
     @property
     def taken(self) -> tuple[Formula, Formula]:
         """Enthalpy and Gibbs energy [J] that one reaction takes from the neighbours."""
-        return _given(lambda: self.enthalpy), _given(lambda: self.gibbs)
-
-
-def _given(value: Callable[[], Expression]) -> Formula:
-    return Formula((), lambda _: value())
+        return Formula((), lambda _: self.enthalpy), Formula((), lambda _: self.gibbs)
 
 
 class SurfaceEngine:
@@ -172,16 +133,18 @@ class SurfaceEngine:
         self.surface = surface
         self.positions = list(reactions)
         open_ones = [i for i, law in reactions.items() if isinstance(law, NeighbourReaction)]
-        self.held = HeldPhase(surface, open_ones) if open_ones else None
-        paths = [reactions[i].path for i in open_ones]
-        self.gives = (
-            *(f"{law.path}.value" for law in reactions.values()),
-            *(f"{path}.enthalpy" for path in paths),
-            *(f"{path}.gibbs" for path in paths),
-        )
+        energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
+        self.gives = (*(f"{law.path}.value" for law in reactions.values()), *energies)
         first = species[0]
         self.reads = ("T_c", first.concentration, *(item.variable for item in species))
         self._sites = first.sites
+        self._phases = list(surface.adjacent.values()) if open_ones else []
+        self._pressures = [float(phase.P) for phase in self._phases]
+        # Amount of each neighbour's species that a reaction takes, and the electric energy that comes with it.
+        rows = [surface.kinetics_species_index(name) for phase in self._phases for name in phase.species_names]
+        lost = surface.reactant_stoich_coeffs - surface.product_stoich_coeffs
+        self._taken = np.asarray(lost)[np.ix_(rows, open_ones)].T
+        self._charged = [FARADAY * phase.electric_potential * phase.charges for phase in self._phases]
         self._last: tuple[Sequence[float], Sequence[float]] = (), ()
 
     def __call__(self, values: Sequence[float]) -> Sequence[float]:
@@ -196,14 +159,15 @@ class SurfaceEngine:
         found = [math.nan] * len(self.gives)
         if T > 0 and amount > 0:
             self.surface.TP = T, None
-            if self.held is not None:
-                self.held.warm(T)
+            for phase, pressure in zip(self._phases, self._pressures, strict=True):
+                phase.TP = T, pressure
             # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
             self.surface.set_unnormalized_coverages(coverages)
             rates = self.surface.net_rates_of_progress
             found = [float(rates[i]) * MOLECULAR for i in self.positions]
-            if self.held is not None:
-                found += [float(energy) / MOLECULAR for energy in self.held.taken()]
+            for energy in ("partial_molar_enthalpies", "chemical_potentials") if self._phases else ():
+                own = [getattr(x, energy) + charged for x, charged in zip(self._phases, self._charged, strict=True)]
+                found += [float(energy) / MOLECULAR for energy in self._taken @ np.concatenate(own)]
         self._last = values, found
         return found

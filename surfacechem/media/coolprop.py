@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.contracts import fits
-from surfacechem.contracts.substances import Fluid, FluidRange
+from surfacechem.contracts.terms import Fluid, FluidRange
 from surfacechem.errors import InputError
 
 Array = NDArray[np.float64]

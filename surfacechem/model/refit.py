@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surfacechem.contracts.substances import Fluid
+from surfacechem.contracts.terms import Fluid
 from surfacechem.errors import InputError
 from surfacechem.tolerances import SQRT_EPS
 

@@ -12,7 +12,7 @@ import pytest
 import symengine
 import thermodynamics
 
-from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Load, RateLaw, Varying, reads
+from surfacechem.contracts.terms import Friction, HeatTransfer, Law, Load, RateLaw, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.laws import FAMILIES, find, laws
@@ -179,10 +179,3 @@ def test_a_table_of_time_holds_its_ends():
     table = find(Load, "table")(times=(0.0, 1.0, 3.0), values=(1.0, 2.0, 5.0))
     found = [table.bind(table.piece(t)).value(t) for t in (-1.0, 0.5, 2.0, 3.0, 9.0)]
     assert found == [1.0, 1.5, 3.5, 5.0, 5.0]
-
-
-def test_a_parameter_that_varies_is_its_value_times_factors():
-    factor = find(Factor, "linear")(of="phi", slope=0.5)
-    law = find(Friction, "coulomb")(mu=Varying(0.3, (factor,)))
-    assert law.mu.value == 0.3
-    assert law.mu.factors[0].factor(x=1.0) == 1.5

@@ -8,8 +8,6 @@ import pytest
 
 import surfacechem
 from surfacechem.errors import InputError
-from surfacechem.reactor import InterfaceReactor, ReactorNet
-from surfacechem.runs import rerun
 
 pytestmark = pytest.mark.around
 
@@ -126,15 +124,6 @@ def test_blowers_masel_at_constant_temperature(case):
     np.testing.assert_allclose(solution.dataset["phi"].values, exact, atol=1e-6, rtol=0)
 
 
-def test_in_a_network(case):
-    solution = surfacechem.run(case(FOREIGN))
-    interface = InterfaceReactor(case(FOREIGN))
-    net = ReactorNet([interface])
-    net.advance(0.03)
-    for state, value in zip(solution.trajectory.model.system.states, outputs(solution)[-1], strict=True):
-        assert interface[state.name] == pytest.approx(value, rel=1e-6)
-
-
 def test_a_compiled_solver_cannot_ask(case):
     with pytest.raises(InputError, match=r"film\.yaml:15: .*'Blowers-Masel' is not lowered.*solver: cantera"):
         surfacechem.load(case(BLOWERS_MASEL), {"run.solver": "radau"})
@@ -165,11 +154,6 @@ def test_an_interface_without_capacity(case):
     film.write_text(film.read_text().replace(", cp0: 30 J/mol/K", "").replace(", cp0: 25 J/mol/K", ""))
     with pytest.raises(InputError, match="T_c has no heat capacity, so it would have to be found together"):
         surfacechem.load(path).system  # noqa: B018
-
-
-def test_a_run_again_from_its_file(case, tmp_path):
-    record = rerun.read(surfacechem.run(case(FOREIGN)).write(tmp_path / "run.nc"))
-    assert rerun.differences(record, rerun.run_again(record)) == []
 
 
 def test_the_precision_of_a_case_that_only_cantera_can_run(case):

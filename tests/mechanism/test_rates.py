@@ -22,8 +22,6 @@ from mechanisms import (
     values,
 )
 from surfacechem.mechanism import load_mechanism
-from surfacechem.mechanism.rate_types import kinds
-from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.quantities import AVOGADRO
 
 TOLERANCE = 1e-12
@@ -112,21 +110,6 @@ def test_random_mechanisms_agree_with_cantera(file, data):
     compare(mechanism, *data.draw(states(len(mechanism.variables))))
 
 
-@pytest.mark.parametrize("name", SHIPPED)
-@given(stretch=st.floats(0.5, 2.0), data=st.data(), under=loads)
-@settings(max_examples=10)
-def test_a_stretched_surface_is_one_with_fewer_sites(name, stretch, data, under):
-    mechanism = load(name)
-    T, coverages = data.draw(states(len(mechanism.variables)))
-    surface = pulled(mechanism, T, **under)
-    surface.site_density = surface.site_density / stretch
-    surface.coverages = coverages
-    point = values(mechanism, T, surface.coverages.tolist(), stretch, **under)
-    for i, law in enumerate(mechanism.reactions):
-        assert call(law.forward, point) == pytest.approx(surface.forward_rates_of_progress[i] * KMOL, rel=TOLERANCE)
-        assert call(law.reverse, point) == pytest.approx(surface.reverse_rates_of_progress[i] * KMOL, rel=TOLERANCE)
-
-
 def test_densities_count_molecules():
     film = load("dna-film.yaml", ["AB(s)"])
     by_name = {variable.name: variable.density for variable in film.variables}
@@ -139,11 +122,6 @@ def test_densities_count_molecules():
     assert film.species["AB(s)"] == "theta_AB_s"
 
 
-def test_bond_of_one_site_is_counted_by_the_site_density():
-    tethers = load("dna-tethers.yaml", ["bond(s)"])
-    assert tethers.sites.density == pytest.approx(5e-5 * AVOGADRO)
-
-
 def test_parameters_have_paths_places_and_units():
     (law,) = load("dna-film.yaml").reactions
     assert law.path == "interface.mechanism.reactions.R1"
@@ -151,10 +129,6 @@ def test_parameters_have_paths_places_and_units():
     specs = {name: law.refine(name, spec).unit for name, spec in law.specs()}
     assert specs == {"A": "m^2/s", "b": "1", "Ea": "J/mol"}
     assert pytest.approx(5.13e8 / AVOGADRO) == law.A
-
-
-def test_rate_types_are_found_by_their_name():
-    assert kinds()["interface-Arrhenius"] is InterfaceArrhenius
 
 
 def test_literature_numbers_come_back():
@@ -184,8 +158,3 @@ def test_measured_rates_under_force_come_back(name, rate, length, f):
     if law.reversible:
         constant = 10 * math.exp(-(f**2) / (2 * 5.3e-3 * KT))
         assert call(law.reverse, point) == pytest.approx(constant * call(law.forward, point), rel=1e-6)
-
-
-def test_coverages_sum_to_one():
-    mechanism = load("dna-tethers.yaml")
-    assert mechanism.coverages({"free(s)": 1}) == {"theta_free_s": 1.0, "theta_bond_s": 0.0}

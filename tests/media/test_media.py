@@ -6,8 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson, solve_bvp
-from scipy.optimize import brentq
 
 import surfacechem
 from surfacechem import format as case
@@ -200,39 +198,6 @@ def couette_flow(beta: float, v: float) -> dict[str, float]:
 
     mean, top = float(weights @ temperature((nodes + 1) / 2)) / 2, float(temperature(0.0))
     return {"T_c": mean, "T_max": top, "t_t": float(ETA * v / D_M * 2 * lam / np.sinh(2 * lam))}
-
-
-@pytest.mark.parametrize("Na", [0.01, 1.0, 18.2, 1e4])
-def test_couette_flow_solves_its_boundary_value_problem(Na):
-    """By SciPy, with the temperature in 1/beta, the velocity in v and the traction in eta v / d."""
-    beta, T_w = 0.04, 300.0
-    v = np.sqrt(Na * K_M / (beta * ETA))
-    exact = couette_flow(beta, v)
-
-    def film(_, z):
-        shear = z[3] * np.exp(z[0])
-        return np.vstack([z[1], -Na * z[3] * shear, shear, 0 * shear])
-
-    y = np.linspace(0.0, 1.0, 401)
-    rise, traction = beta * (exact["T_max"] - T_w), exact["t_t"] * D_M / (ETA * v)
-    start = np.vstack([4 * rise * y * (1 - y), 4 * rise * (1 - 2 * y), y, 0 * y + traction])
-    ends = lambda a, b: np.array([a[0], b[0], a[2], b[2] - 1])  # noqa: E731
-    found = solve_bvp(film, ends, y, start, tol=1e-9, max_nodes=200000)
-    assert found.success
-    fine = np.linspace(0.0, 1.0, 8001)
-    assert traction == pytest.approx(found.sol(0.5)[3], rel=1e-7)
-    assert rise == pytest.approx(found.sol(0.5)[0], rel=1e-7)
-    assert beta * (exact["T_c"] - T_w) == pytest.approx(simpson(found.sol(fine)[0], x=fine), rel=1e-6)
-
-
-def test_couette_flow_bears_most_at_the_nahme_fold():
-    """At the fold lambda tanh lambda = 1, beta (tau d)^2 / (k eta) = 8 lambda^2 / cosh^2 lambda."""
-    fold = brentq(lambda x: x * np.tanh(x) - 1, 1.0, 2.0)
-    v = np.sqrt(8 * K_M / (0.04 * ETA)) * np.sinh(fold) * np.array([0.99, 1.0, 1.01])
-    before, most, beyond = (couette_flow(0.04, x)["t_t"] for x in v)
-    assert before < most > beyond
-    assert 0.04 * ETA * v[1] ** 2 / K_M == pytest.approx(18.2, abs=0.02)
-    assert 0.04 * (most * D_M) ** 2 / (K_M * ETA) == pytest.approx(8 * fold**2 / np.cosh(fold) ** 2, rel=1e-13)
 
 
 @pytest.mark.parametrize(("Na", "rise", "traction"), [(1e-3, 2e-5, 1e-8), (1.0, 0.014, 0.0017), (18.2, 0.043, 0.097)])

@@ -8,8 +8,7 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 from random_scenes import random_scene
 
-from surfacechem.contracts.substances import Property
-from surfacechem.contracts.terms import BodyEnergy, Factor, Load, reads
+from surfacechem.contracts.terms import BodyEnergy, Factor, Load, Property, reads
 from surfacechem.errors import InputError
 from surfacechem.laws import FAMILIES, laws
 from surfacechem.model.assemble import assemble

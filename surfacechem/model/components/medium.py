@@ -16,8 +16,7 @@ import numpy as np
 import symengine
 
 from surfacechem.contracts.fits import DEGREE, NoFitError, Piece, divided
-from surfacechem.contracts.substances import Fluid, Property
-from surfacechem.contracts.terms import Load, Spec
+from surfacechem.contracts.terms import Fluid, Load, Property, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.model.build import Build
