@@ -123,12 +123,17 @@ class LoadedRate(cantera.ExtensibleRate):
         _check_keys(node, {*REACTION, *self.law.keys, *own}, f"a rate of type {self.kind}")
         constant = node.get("rate-constant")
         _check_all(constant, self.law.keys["rate-constant"], "rate-constant")
-        coverage = node.get("coverage-dependencies") or {}
+        coverage = []
+        for name, item in sorted((node.get("coverage-dependencies") or {}).items()):
+            _check_all(item, self.law.keys["coverage-dependencies"], f"coverage-dependencies: {name}")
+            energies = item["E"] if isinstance(item["E"], list | tuple) else [item["E"]]
+            E = tuple(_number(node.units, "E", energy, "J/mol") for energy in energies)
+            coverage.append(CoverageTerm(name, float(item["a"]), float(item["m"]), E))
         values: dict[str, Any] = {
             "A": float(constant.convert_rate_coeff("A", units)),
             "b": float(constant["b"]),
             "Ea": _number(node.units, "Ea", constant["Ea"], "J/mol"),
-            "coverage": tuple(_coverage_term(node.units, name, item) for name, item in sorted(coverage.items())),
+            "coverage": tuple(coverage),
         }
         who = f"a rate of type {self.kind}"
         values |= own_parameters(
@@ -267,14 +272,6 @@ def _check_all(node: Any, keys: Collection[str], title: str) -> None:
         raise InputError(f"{title}: {key} is missing.")
 
 
-def _coverage_term(units: Any, name: str, entry: Any) -> CoverageTerm:
-    _check_all(entry, InterfaceArrhenius.keys["coverage-dependencies"], f"coverage-dependencies: {name}")
-    energies = entry["E"]
-    listed = energies if isinstance(energies, list | tuple) else [energies]
-    E = tuple(_number(units, "E", energy, "J/mol") for energy in listed)
-    return CoverageTerm(name, float(entry["a"]), float(entry["m"]), E)
-
-
 def _number(units: Any, key: str, value: Any, unit: str) -> float:
     try:
         return converted(units, value, unit)
@@ -282,14 +279,9 @@ def _number(units: Any, key: str, value: Any, unit: str) -> float:
         raise InputError(f"{key} = {value} is not a quantity in {unit}.") from None
 
 
-def _register() -> None:
-    """A rate of Cantera for every rate type that it does not know itself."""
-    for kind, law in kinds().items():
-        if law.native:
-            continue
-        rate, data = (AffinityRate, ByAffinity) if issubclass(law, AffinityReaction) else (LoadedRate, Surroundings)
-        made = type(law.__name__, (rate,), {"law": law, "__module__": __name__, "__doc__": law.__doc__})
-        globals()[law.__name__] = cantera.extension(name=kind, data=data)(made)
-
-
-_register()
+# A rate of Cantera for every rate type that it does not know itself.
+for _kind, _law in kinds().items():
+    if not _law.native:
+        _rate, _data = (AffinityRate, ByAffinity) if issubclass(_law, AffinityReaction) else (LoadedRate, Surroundings)
+        _made = type(_law.__name__, (_rate,), {"law": _law, "__module__": __name__, "__doc__": _law.__doc__})
+        globals()[_law.__name__] = cantera.extension(name=_kind, data=_data)(_made)

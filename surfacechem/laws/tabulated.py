@@ -41,19 +41,15 @@ class Curve:
         """Value at x; beyond the ends constant, or continued by the end slopes."""
         from scipy.interpolate import PchipInterpolator
 
-        cubics = PchipInterpolator(self.at, self.values).c.T.tolist()
-        slopes = (cubics[0][2], self._end_slope(cubics[-1])) if linear else (0.0, 0.0)
+        interpolation = PchipInterpolator(self.at, self.values)
+        cubics = interpolation.c.T.tolist()
+        slopes = interpolation((self.at[0], self.at[-1]), 1).tolist() if linear else (0.0, 0.0)
         result = self.values[-1] + slopes[1] * (x - self.at[-1])
         for (low, high), (a, b, c, d) in reversed(list(zip(pairwise(self.at), cubics, strict=True))):
             z = x - low
             result = where(x < high, d + z * (c + z * (b + z * a)), result)
         result = where(x < self.at[0], self.values[0] + slopes[0] * (x - self.at[0]), result)
         return positive(result) if linear else result
-
-    def _end_slope(self, cubic: Sequence[float]) -> float:
-        a, b, c, _ = cubic
-        z = self.at[-1] - self.at[-2]
-        return c + z * (2 * b + 3 * z * a)
 
 
 class ConductanceTable(HeatTransfer):

@@ -101,7 +101,11 @@ def load_mechanism(
     hold(surface, neighbours, place)
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
-    chosen = _bonds(species, bonds or (), place)
+    by_name = {item.name: item for item in species}
+    for bond in bonds or ():
+        if bond not in by_name:
+            raise InputError(f"bonds: no species '{bond}' in the mechanism.{suggestion(bond, by_name)}", place)
+    chosen = [by_name[bond] for bond in dict.fromkeys(bonds or ())]
     density = surface.site_density * MOLECULAR
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
@@ -150,7 +154,13 @@ def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:
             warnings.simplefilter("always")
             surface = cantera.Interface(yaml=_plain_text(source, phase), name=str(phase["name"]))
     except cantera.CanteraError as error:
-        raise _translated(str(error), source, phase) from None
+        # Its message without its frame, at the line that it names, else at that of the phase.
+        found = re.search(r"[Ee]rror on lines? (\d+)", str(error))
+        noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
+        lines = dict.fromkeys(line.strip() for line in str(error).splitlines())
+        message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
+        place = Place(source.file, int(found[1]) if found else source.place(phase).line)
+        raise InputError(f"Cantera: {message}", place) from None
     said = dict.fromkeys(" ".join(str(item.message).split()) for item in caught)
     return surface, tuple(f"{source.file}: Cantera: {text}" for text in said)
 
@@ -174,15 +184,6 @@ def _plain_text(source: Source, phase: Any) -> str:
     return text
 
 
-def _translated(text: str, source: Source, phase: Any) -> InputError:
-    """Cantera's message without its frame, at the line that it names, else at that of the phase."""
-    found = re.search(r"[Ee]rror on lines? (\d+)", text)
-    noise = re.compile(r"^(\*+|\^|)$|^[|>]|thrown by|[Ee]rror on lines?")
-    lines = dict.fromkeys(line.strip() for line in text.splitlines())
-    message = " ".join(line for line in lines if not noise.search(line)) or "the mechanism cannot be read"
-    return InputError(f"Cantera: {message}", Place(source.file, int(found[1]) if found else source.place(phase).line))
-
-
 def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Species, ...]:
     entries = {str(entry["name"]): entry for entry in source.species(phase)}
     names = identifiers(surface.species_names)
@@ -199,15 +200,12 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
             gibbs = lower(item.thermo)
         except InputError as error:  # a number that Cantera's units take out of range
             raise source.error(f"{title}: thermo: {error.message}", entry, "thermo") from None
-        if gibbs is None:
-            raise source.error(f"{title}: thermo of type {type(item.thermo).__name__} is not lowered.", entry)
         # Cantera's standard state is at that coverage, ours at full coverage: R T ln of it lies between.
         if "reference-state-coverage" in phase:
             gibbs = replace(gibbs, shift=-math.log(float(phase["reference-state-coverage"])))
         around = interactions(source, entry, names)
         result.append(Species(item.name, names[item.name], float(item.size), gibbs, spring, around, fixed))
-    odd = unpaired(result)
-    if odd is not None:
+    if (odd := unpaired(result)) is not None:
         name, other = odd
         message = (
             f"species {name}: coverage-dependencies: {other}: this belongs to no free energy, so that energy would "
@@ -216,15 +214,6 @@ def _species(surface: Any, source: Source, phase: Any, fixed: bool) -> tuple[Spe
         )
         raise source.error(message, entries[name].get(KEY), other)
     return tuple(result)
-
-
-def _bonds(species: tuple[Species, ...], bonds: Sequence[str], place: Place | None) -> list[Species]:
-    """The species that count as bonds, once each."""
-    by_name = {item.name: item for item in species}
-    for name in bonds:
-        if name not in by_name:
-            raise InputError(f"bonds: no species '{name}' in the mechanism.{suggestion(name, by_name)}", place)
-    return [by_name[name] for name in dict.fromkeys(bonds)]
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:

@@ -134,24 +134,18 @@ class IdealMixture(Potential):
             # Mixing in proportion to T is a term of its own: it drops out of the internal energy as a whole.
             total += amount * theta * (BOLTZMANN * species.gibbs(T) + elastic)
             total += amount * BOLTZMANN * T * (mixing(theta) - theta)
-        if any(species.interactions for species in self.species):
-            total += self._interactions(values)
-        return total
-
-    def _interactions(self, values: Mapping[str, Expression]) -> Expression:
-        """Free energy of all interactions [J/m^2], each pair counted once."""
-        total: Expression = 0
+        around: Expression = 0
         seen: set[frozenset[str]] = set()
-        for item in self.species:
-            for interaction in item.interactions:
-                theta, other = values[item.variable], values[interaction.variable]
-                pair = frozenset((item.name, interaction.on))
-                if interaction.on == item.name:
-                    total += values[item.amount] * interaction.integral(values["T_c"], theta)
-                elif pair not in seen:
-                    total += values[item.amount] * theta * interaction.gibbs(values["T_c"], other)
+        for species in self.species:
+            theta, amount = values[species.variable], values[species.amount]
+            for interaction in species.interactions:
+                other, pair = values[interaction.variable], frozenset((species.name, interaction.on))
+                if interaction.on == species.name:
+                    around += amount * interaction.integral(T, theta)
+                elif pair not in seen:  # each pair counts once
+                    around += amount * theta * interaction.gibbs(T, other)
                 seen.add(pair)
-        return total / AVOGADRO
+        return total + around / AVOGADRO if seen else total
 
 
 def unpaired(species: Sequence[Species]) -> tuple[str, str] | None:

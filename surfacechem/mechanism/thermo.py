@@ -57,6 +57,12 @@ class Series(GibbsForm):
 
     free: frozenset[str] = option("coefficients that are parameters", default=frozenset())
 
+    @classmethod
+    def of(cls, coefficients: Sequence[float]) -> Self:
+        """The form of these coefficients, in the order of its parameters."""
+        names = (name for name, _ in cls.specs())
+        return cls(**cast(dict[str, Any], dict(zip(names, coefficients, strict=True))))
+
     def given(self, numbers: Mapping[str, float]) -> Self:
         """The same form with other coefficients."""
         return replace(super().given(numbers), free=self.free | set(numbers))
@@ -168,23 +174,16 @@ TWO_RANGES: Mapping[str, tuple[type[Series], int, int]] = {"NasaPoly2": (Nasa7, 
 """Cantera's models with two ranges: the form, and where the coefficients of the lower and of the upper range begin."""
 
 
-def lower(thermo: Any) -> StandardGibbs | None:
-    """Standard Gibbs energy of a Cantera species thermo object; None where its model is not known here."""
+def lower(thermo: Any) -> StandardGibbs:
+    """Standard Gibbs energy of a Cantera species thermo object."""
     model, top, c = type(thermo).__name__, float(thermo.max_temp), [float(x) for x in thermo.coeffs]
     if model == "ConstantCp":
         h0, s0, cp0 = (x / KILO for x in c[1:])
         return StandardGibbs((ThermoRange(top, ConstantCp(T0=c[0], h0=h0, s0=s0, cp0=cp0)),))
     if model == "Nasa9PolyMultiTempRegion":
         regions = [c[1 + 11 * i : 12 + 11 * i] for i in range(int(c[0]))]
-        return StandardGibbs(tuple(ThermoRange(r[1], _filled(Nasa9, r[2:]), closed=False) for r in regions))
-    if model in TWO_RANGES:
-        form, *starts = TWO_RANGES[model]
-        low, high = (c[start : start + 7] for start in starts)
-        below = () if low == high else (ThermoRange(c[0], _filled(form, low)),)
-        return StandardGibbs((*below, ThermoRange(top, _filled(form, high))))
-    return None
-
-
-def _filled(form: type[Series], coefficients: Sequence[float]) -> Series:
-    names = (name for name, _ in form.specs())
-    return form(**cast(dict[str, Any], dict(zip(names, coefficients, strict=True))))
+        return StandardGibbs(tuple(ThermoRange(r[1], Nasa9.of(r[2:]), closed=False) for r in regions))
+    form, *starts = TWO_RANGES[model]
+    low, high = (c[start : start + 7] for start in starts)
+    below = () if low == high else (ThermoRange(c[0], form.of(low)),)
+    return StandardGibbs((*below, ThermoRange(top, form.of(high))))

@@ -91,22 +91,19 @@ class CoolPropFluid(Fluid):
         return COMBINED[quantity](lambda letter: self._properties(letter, T), T)
 
     def _properties(self, letter: str, T: Array) -> Array:
+        call = _coolprop().PropsSI
         try:
-            found = np.asarray(_coolprop().PropsSI(letter, "T", T, "P", self.pressure, self.name), dtype=float)
+            found = np.asarray(call(letter, "T", T, "P", self.pressure, self.name), dtype=float)
         except ValueError:
             found = np.full(T.shape, np.inf)
         for bad in T[~np.isfinite(found)]:
-            raise InputError(f"{self.title}: {self._refusal(letter, float(bad))}")
+            try:  # CoolProp says why there is none only of a single value
+                value = call(letter, "T", float(bad), "P", self.pressure, self.name)
+                reason = f"no finite value at {bad:g} K, but {value}."
+            except ValueError as error:
+                reason = _reason(error)
+            raise InputError(f"{self.title}: {reason}")
         return found
-
-    def _refusal(self, letter: str, T: float) -> str:
-        """Why there is no property at T [K]; CoolProp tells only of a single value."""
-        try:
-            return (
-                f"no finite value at {T:g} K, but {_coolprop().PropsSI(letter, 'T', T, 'P', self.pressure, self.name)}."
-            )
-        except ValueError as error:
-            return _reason(error)
 
     def _call(self, letter: str) -> float:
         try:
