@@ -382,6 +382,18 @@ class System:
         return {item.name: j for j, item in enumerate(self.outputs)}
 
     @cached_property
+    def account_columns(self) -> dict[str, list[int]]:
+        """Columns of the accounts of each kind."""
+        kinds = [account.kind for account in self.ledger]
+        return {kind: [j for j, each in enumerate(kinds) if each == kind] for kind in kinds}
+
+    @cached_property
+    def energy_has_histories(self) -> bool:
+        """Whether the total energy depends on time by itself, as under a load with a history."""
+        total = next((item.expression for item in self.named if item.name == "E_total"), 0)
+        return self.t in self.expand(total).free_symbols
+
+    @cached_property
     def paths_by_symbol(self) -> dict[str, str]:
         """Paths of the parameters, by the names of their symbols."""
         return {str(parameter.symbol): parameter.path for parameter in self.parameters}

@@ -130,19 +130,19 @@ def _resolved(residual: Array, scale: float, stored: float, rounding: float) -> 
 def audit(trajectory: Trajectory) -> Audit:
     """Audit of a trajectory."""
     model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
-    names = [item.name for item in model.system.outputs]
-    E, S = outputs[:, names.index("E_total")], outputs[:, names.index("S_total")]
+    system, column = model.system, model.system.output_columns
+    E, S = outputs[:, column["E_total"]], outputs[:, column["S_total"]]
     # Transitions at the very start come before the first output.
     ledger = result.ledger_outputs - result.ledger_outputs[:1]
 
     def booked(*kinds: str, table: Array = ledger) -> Array:
         """Columns of the ledger, of accounts of these kinds."""
-        return table[:, [j for j, account in enumerate(model.system.ledger) if account.kind in kinds]]
+        return table[:, [j for kind in kinds for j in system.account_columns.get(kind, ())]]
 
     def changes(prefix: str) -> Array:
         """Changes of totals of bodies and interface since the start."""
-        columns = [j for j, name in enumerate(names) if name.startswith(prefix) and name[2:] in ("1", "2", "c")]
-        return outputs[:, columns] - outputs[:1, columns]
+        totals = outputs[:, [column[name] for end in "12c" if (name := f"{prefix}{end}") in column]]
+        return totals - totals[:1]
 
     # A brief load may come and go between outputs; the ends of the steps have seen it.
     exchanged = [changes("U_"), booked("energy supply", "dissipation")]
@@ -153,14 +153,18 @@ def audit(trajectory: Trajectory) -> Audit:
     roundings, untimed = ROUNDINGS, 0.0
     if steps and len(steps.t):
         roundings += len(steps.t)
-        # Of a history that is steep no more is known than within the last digits of time.
-        later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
-        untimed = _largest(later[:, names.index("E_total")] - trajectory.everywhere["E_total"][len(result.times) :])
+        if system.energy_has_histories:  # of one that is steep no more is known than within the last digits of time
+            later = model.evaluate(result, steps.t * (1 + EPS), steps.y, steps.ydot, steps.segment)
+            untimed = _largest(later[:, column["E_total"]] - trajectory.everywhere["E_total"][len(result.times) :])
+    sites = np.zeros(len(ledger))
+    for j in system.account_columns.get("bonds", ()):
+        bonds = trajectory.everywhere[system.ledger[j].law][: len(ledger)]
+        sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     least, destroyed, together = _production(trajectory, entropy_stored)
     return Audit(
         energy=E - E[:1] - booked("energy supply").sum(axis=1),
         entropy=S - S[:1] - booked("entropy supply").sum(axis=1) - booked("entropy production").sum(axis=1),
-        sites=_sites(trajectory, ledger),
+        sites=sites,
         energy_scale=_largest(*exchanged),
         entropy_scale=turned,
         rtol=trajectory.run.rtol,
@@ -174,26 +178,15 @@ def audit(trajectory: Trajectory) -> Audit:
     )
 
 
-def _sites(trajectory: Trajectory, ledger: Array) -> Array:
-    """Largest residual of the site balances at each output."""
-    system, values = trajectory.model.system, trajectory.everywhere
-    worst = np.zeros(len(ledger))
-    for j, account in enumerate(system.ledger):
-        if account.kind == "bonds":
-            bonds = values[account.law][: len(ledger)]
-            worst = np.maximum(worst, np.abs(bonds - bonds[:1] - ledger[:, j]))
-    return worst
-
-
 def _production(trajectory: Trajectory, stored: float) -> tuple[dict[str, float], dict[str, float], float]:
     """Least entropy production of each law over outputs and steps, and the part that it destroys, and all do."""
-    values, least = trajectory.within_bounds, {}
-    for account in trajectory.model.system.ledger:
-        rates = values.get(f"sigma_{account.law}", np.empty(0))
-        if account.kind == "entropy production" and len(rates):
+    values, least, system = trajectory.within_bounds, {}, trajectory.model.system
+    for j in system.account_columns.get("entropy production", ()):
+        rates = values.get(f"sigma_{system.ledger[j].law}", np.empty(0))
+        if len(rates):
             # A law that ends the run may have no value there.
             ended = trajectory.status == "stopped" and len(rates) > 1 and not np.isfinite(rates[-1])
-            least[account.law] = float(np.min(rates[:-1] if ended else rates))
+            least[system.ledger[j].law] = float((rates[:-1] if ended else rates).min())
     destroyed = {law: 0.0 if low >= 0 else _destroyed(trajectory, [law], stored) for law, low in least.items()}
     together = _destroyed(trajectory, list(least), stored) if any(destroyed.values()) else 0.0
     return least, destroyed, together
@@ -234,8 +227,7 @@ def _rounding_of(trajectory: Trajectory, points: Points, laws: list[str], chosen
     ends = np.union1d(chosen, chosen + 1)
     segment = None if points.segment is None else points.segment[ends]
     rows = model.inputs(result, points.t[ends], points.y[ends], points.ydot[ends], segment)
-    names = [item.name for item in model.system.outputs]
-    columns = [names.index(f"sigma_{law}") for law in laws]
+    columns = [model.system.output_columns[f"sigma_{law}"] for law in laws]
     n, part, least = len(model.system.states), np.full(rows.shape[1], EPS), np.zeros(rows.shape[1])
     part[1 : 1 + 2 * n] = max(EPS, SLACK * trajectory.run.rtol)
     least[1 : 1 + n] = SLACK * result.problem.atol
@@ -271,4 +263,4 @@ def lost(booked: Array, seen: Array, rounded: Array | float = 0.0) -> tuple[Any,
 
 
 def _largest(*columns: Array) -> float:
-    return max(float(np.max(np.abs(c), initial=0.0)) for c in columns)
+    return max(max(float(c.max(initial=0.0)), -float(c.min(initial=0.0))) for c in columns)

@@ -28,6 +28,7 @@ from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
+from surfacechem.tolerances import EPS
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,9 @@ SAMPLES, CLOSER = 60.0, 7.3
 Choices: a look costs an evaluation, and 7.3 is no whole number, so that the looks of the two fall on different times.
 What both miss lasts less than 1/438 of the run, which every estimate says.
 """
+
+AT_ONCE = 10_000
+"""Rows in which named quantities are evaluated together, so that they take some MB."""
 
 OWN = "radau"
 """The method of this package."""
@@ -115,18 +119,20 @@ class Trajectory:
     @cached_property
     def roundings(self) -> dict[str, float]:
         """By how much the last bit of a state changes each named quantity at most."""
-        result = self.result
+        result, system, times = self.result, self.model.system, self.result.times
+        # No flux reads one of the states inside bodies alone but the first, and those are not named.
+        own = [j for j, state in enumerate(system.states) if state.name not in system.inside]
+        together = max(1, AT_ONCE // max(len(times), 1))
         worst = np.zeros(self.outputs.shape[1])
-        for j, state in enumerate(self.model.system.states):
-            if state.name in self.model.system.inside:
-                continue  # no flux reads one of them alone but the first, and those are not named
-            nudged = result.outputs.copy()
-            nudged[:, j] *= 1 + np.finfo(float).eps
-            values = self.model.evaluate(result, result.times, nudged, self.rates)
+        for some in (own[first : first + together] for first in range(0, len(own), together)):
+            nudged = np.array([result.outputs] * len(some))
+            nudged[range(len(some)), :, some] *= 1 + EPS
+            rows = nudged.reshape(-1, len(system.states)), np.concatenate([self.rates] * len(some))
+            values = self.model.evaluate(result, np.concatenate([times] * len(some)), *rows)
             with np.errstate(invalid="ignore"):  # quantities may be infinite, whatever the last bit is
-                worst = np.fmax(worst, np.max(np.abs(values - self.outputs), axis=0, initial=0.0))
-        names = [item.name for item in self.model.system.outputs]
-        return dict(zip(names, worst, strict=True))
+                changes = np.abs(values.reshape(len(some), *self.outputs.shape) - self.outputs)
+                worst = np.fmax(worst, np.fmax.reduce(changes.max(axis=1, initial=0.0)))
+        return dict(zip(system.output_columns, worst, strict=True))
 
     @cached_property
     def everywhere(self) -> dict[str, Array]:
