@@ -361,13 +361,14 @@ class Friction(Law):
 
 @dataclass(frozen=True)
 class RateType:
-    """A rate type of mechanisms: an Arrhenius coefficient times what load does to one coefficient of a law."""
+    """A rate type of mechanisms: what a law makes of an Arrhenius coefficient."""
 
     name: str
     """Name in a mechanism."""
-    factor: str
-    """Method of the law that states the logarithm of what load does."""
-    constants: Mapping[str, float]
+    method: str
+    """Method of the law: the logarithm of a factor of the coefficient, or what one of REACTIONS in
+    :mod:`surfacechem.mechanism.rate_types` asks for."""
+    constants: Mapping[str, float] = field(default_factory=dict)
     """Parameters of the law that the Arrhenius coefficient stands for: one, or zero where the other way counts."""
     names: tuple[str, ...] = ()
     """Parameters of the law that a reaction has by the same names, and with the same defaults."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from surfacechem.contracts.terms import RateLaw, parameter
+from surfacechem.contracts.terms import RateLaw, RateType, parameter
 from surfacechem.expressions import Expression, power, product, scaled_exp, scaled_expm1
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
 
@@ -18,11 +18,23 @@ class LinearAffinity(RateLaw):
     6.0
     """
 
+    rate_types = (RateType("linear-affinity", "net", {"c_r": 1.0}),)
+
     c_r: float = parameter("1/(J s)", "rate constant per bond", at_least=0)
 
     def rate(self, mu: Expression, n_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         return -n_c * self.c_r * mu
+
+    def net(self, forward: Expression, mu: Expression, T_c: Expression) -> Expression:
+        r"""Rate proportional to the affinity in a mechanism, ``type: linear-affinity``.
+
+        .. math:: R = -k(T) \prod_k (n_k^\circ)^{r_k}\,\frac{\mu}{k_B T}
+
+        b = 1 makes :math:`c_r` of the law independent of temperature. Always admissible.
+        Source: Sauer, Duong & Mandadapu (2021), eq. e:R.
+        """
+        return self.bind({"c_r": 1 / (BOLTZMANN * T_c)}).rate(mu=mu, n_c=forward)
 
 
 class ExponentialAffinity(RateLaw):
@@ -38,12 +50,23 @@ class ExponentialAffinity(RateLaw):
     1.070002974...e+18
     """
 
+    rate_types = (RateType("exponential-affinity", "net", {"C_r": 1.0}),)
+
     C_r: float = parameter("1/(J s m^2)", "rate constant per area", at_least=0)
 
     def rate(self, mu: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         thermal = BOLTZMANN * T_c
         return -scaled_expm1(self.C_r * thermal, mu / thermal)
+
+    def net(self, forward: Expression, mu: Expression, T_c: Expression) -> Expression:
+        r"""Rate exponential in the affinity in a mechanism, ``type: exponential-affinity``.
+
+        .. math:: R = k(T) \prod_k (n_k^\circ)^{r_k} \left( 1 - e^{\mu / k_B T} \right)
+
+        Always admissible. Source: Sauer, Duong & Mandadapu (2021), the equation after e:R.
+        """
+        return self.bind({"C_r": forward / (BOLTZMANN * T_c)}).rate(mu=mu, T_c=T_c)
 
 
 class Relaxation(RateLaw):
@@ -153,6 +176,7 @@ class KamalSourour(RateLaw):
     """
 
     keeps_range = True
+    rate_types = (RateType("Kamal-Sourour", "catalysed", {"A_1": 0.0}, ("E_2", "m", "n"), renamed={"A_2": "A_2"}),)
 
     A_1: float = parameter("1/s", "pre-exponential factor without bonds", at_least=0)
     A_2: float = parameter("1/s", "pre-exponential factor of autocatalysis", at_least=0)
@@ -164,12 +188,17 @@ class KamalSourour(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, T_c: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         k_1 = scaled_exp(self.A_1, -self.E_1 / (GAS_CONSTANT * T_c))
-        return n_c * (k_1 + autocatalysis(self.A_2, self.E_2, self.m, phi, T_c)) * power(1 - phi, self.n)
+        return n_c * (k_1 + self.catalysed(phi, T_c)) * power(1 - phi, self.n)
 
+    def catalysed(self, phi: Expression, T_c: Expression, shift: Expression = 0) -> Expression:
+        r"""Autocatalytic cure in a mechanism, ``type: Kamal-Sourour``: what is formed speeds up its own formation.
 
-def autocatalysis(
-    A: Expression, E: Expression, m: Expression, phi: Expression, T_c: Expression, shift: Expression = 0
-) -> Expression:
-    """Rate constant A e^(-E / R_g T) phi^m [1/s] that is due to what has formed, times exp(shift)."""
-    # As a power it is nothing where nothing has formed: what waits for its own product does not begin by itself.
-    return scaled_exp(A, shift - E / (GAS_CONSTANT * T_c)) * power(phi, m)
+        .. math:: R = n^\circ \left( A\,T^b e^{-E_a / R_g T} + A_2 e^{-E_2 / R_g T} \theta_p^{\,m} \right)
+                  \theta_r^{\,n}
+
+        One species r turns into one species p. Admissible where it is reversible or mu <= 0.
+        Source: Kamal & Sourour (1973), Polym. Eng. Sci. 13, 59, doi 10.1002/pen.760130110.
+        """
+        # The part due to what has formed, times exp(shift). As a power it is nothing where nothing has formed: what
+        # waits for its own product does not begin by itself.
+        return scaled_exp(self.A_2, shift - self.E_2 / (GAS_CONSTANT * T_c)) * power(phi, self.m)
