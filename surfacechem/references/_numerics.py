@@ -142,9 +142,6 @@ SERIES_TERMS = 22
 """Of the second difference for arguments within [-1, 0]; those left out begin with 23 / 24! = 4e-23."""
 
 ASYMPTOTIC_TERMS = 38
-CONVERGENT_TERMS = 160
-"""Of Ei up to FAR_EI; those left out begin with 40^160 / (160 160!) = 3e-31, against e^40 / 40 = 6e15."""
-
 FAR, FAR_EI = 50.0, 40.0
 """Arguments of E_n and Ei from which on asymptotic series reach rounding before they diverge: 38! / 40^38 = 7e-17."""
 
@@ -214,13 +211,10 @@ def scaled_Ei(x: Array) -> Array:
     >>> scaled_Ei(np.array([1.0, 50.0]))
     array([0.69717488, 0.02041705])
     """
+    from scipy.special import expi
+
     near, far = np.minimum(x, FAR_EI), np.maximum(x, FAR_EI)
-    term, total = np.ones_like(near), np.zeros_like(near)
-    for n in range(1, CONVERGENT_TERMS):
-        term = term * near / n
-        total = total + term / n
-    convergent = np.exp(-near) * (np.euler_gamma + np.log(near) + total)
-    return np.where(x < FAR_EI, convergent, -_asymptotic(1, -far))  # Ei(x) = -E_1(-x)
+    return np.where(x < FAR_EI, np.exp(-near) * expi(near), -_asymptotic(1, -far))  # Ei(x) = -E_1(-x)
 
 
 def _asymptotic(n: int, x: Array) -> Array:
@@ -238,7 +232,6 @@ def lambert_of_exp(a: Array) -> Array:
     >>> lambert_of_exp(np.array([1.0, 1e4]))
     array([1.00000000e+00, 9.99079058e+03])
     """
-    low, high = np.minimum(a, 1.0), np.maximum(a, 1.0)
-    small = np.exp(increasing_root(lambda s: (s + np.exp(s), 1.0 + np.exp(s)), low, low - np.exp(low), low))
-    large = increasing_root(lambda w: (w + np.log(w), 1.0 + 1.0 / w), high, 0.5 * (1.0 + high), high)
-    return np.where(a < 1.0, small, large)
+    from scipy.special import wrightomega
+
+    return np.asarray(wrightomega(a))

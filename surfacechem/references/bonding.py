@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from fractions import Fraction
 from typing import ClassVar
 
@@ -164,24 +165,13 @@ class EndothermicBonding(PerfectContact):
     def __post_init__(self) -> None:
         """Refuse what has no positive heat capacity to begin with."""
         super().__post_init__()
-        if self.free_capacity <= 0.0:
+        if Fraction(self.K_2) >= Fraction(self.T_0) * self.exact_capacity:
             raise InputError(f"{self.name}: K_2 must be below T_0 (C_1 + C_2 + C_c), the capacity it takes away.")
 
-    @property
-    def free_capacity(self) -> float:
-        r""":math:`1-\kappa` from exact arithmetic."""
-        return float(1 - Fraction(self.K_2) / (Fraction(self.T_0) * self.exact_capacity))
-
     def quantities(self, t: Array) -> Quantities:
-        kappa = self.K_2 / (self.T_0 * self.C)
-        ratio = self.free_capacity / (self.free_capacity - kappa * np.expm1(-2.0 * t / self.tau))
-        absorbed = self.K_2 / self.tau * np.exp(-2.0 * t / self.tau) * ratio**2 / self.free_capacity
-        return {
-            "phi": -np.expm1(-t / self.tau),
-            "T": self.T_0 * np.sqrt(ratio),
-            "q_1": -self.C_1 / self.C * absorbed,
-            "q_2": -self.C_2 / self.C * absorbed,
-        }
+        given = {item.name: getattr(self, item.name) for item in fields(self)}
+        every = Bonding(**given, T_i=self.T_0).quantities(t)
+        return {name: every[name] for name in ("phi", "T", "q_1", "q_2")}
 
 
 class BimolecularBonding(Reference):

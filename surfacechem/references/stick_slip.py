@@ -63,7 +63,17 @@ class Slip:
         return slip, v, self.k * (self.stretch * np.cos(angle) + away * np.sin(angle))
 
 
-class StickSlip(Reference):
+class Slider(Reference):
+    """A mass on a spring whose end moves at constant speed."""
+
+    m: float = parameter("kg/m^2", "mass", above=0)
+    k: float = parameter("Pa/m", "tangential stiffness", above=0)
+    V: float = parameter("m/s", "speed of the spring's end", above=0)
+
+    told = read(tangential="m k", ramp="V=w_t")
+
+
+class StickSlip(Slider):
     r"""Stick-slip of a mass on a spring whose end moves at constant speed, from rest with a relaxed spring.
 
     .. math:: t_{slip}=\frac2\omega\Big(\pi-\arctan\frac{\Delta\omega}V\Big),\quad t_{stick}=\frac{2\Delta}V,\quad
@@ -80,13 +90,8 @@ class StickSlip(Reference):
     '0.400994458826 9.944588e-04 0.633456323 16.039778353'
     """
 
-    m: float = parameter("kg/m^2", "mass", above=0)
-    k: float = parameter("Pa/m", "tangential stiffness", above=0)
-    V: float = parameter("m/s", "speed of the spring's end", above=0)
     t_s: float = parameter("Pa", "traction that sticking bears", above=0)
     t_k: float = parameter("Pa", "traction of sliding", at_least=0)
-
-    told = read(tangential="m k", ramp="V=w_t")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
@@ -157,21 +162,18 @@ class Cycle:
         return self.stick_time + self.slip.duration
 
 
-class BondedSlider(Reference):
+class BondedSlider(Slider):
     """A mass on a driven spring whose contact sticks the better the more bonds it has; sliding breaks all of them.
 
     It starts at rest with a relaxed spring. A subclass states its cycles, and its bonds during a stick.
     """
 
-    m: float = parameter("kg/m^2", "mass", above=0)
-    k: float = parameter("Pa/m", "tangential stiffness", above=0)
-    V: float = parameter("m/s", "speed of the spring's end", above=0)
     p: float = parameter("Pa", "contact pressure", above=0)
     mu_b: float = parameter("1", "static friction coefficient of complete bonding", above=0)
     mu_ub: float = parameter("1", "static friction coefficient without bonds", above=0)
     mu_k: float = parameter("1", "sliding friction coefficient", at_least=0)
 
-    told = read(tangential="m k", ramp="V=w_t", initial="p", friction="mu_b mu_ub mu_k=mu")
+    told = read(initial="p", friction="mu_b mu_ub mu_k=mu")
 
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
