@@ -14,7 +14,6 @@ from surfacechem import plots
 from surfacechem.contracts.grids import points
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
-from surfacechem.references import get
 from surfacechem.results import spatial
 from surfacechem.results.error_estimates import against_tighter, with_cells
 from surfacechem.results.spatial import judged
@@ -169,31 +168,12 @@ def test_a_joint_jump_heats_the_volume_of_the_bodies():
     np.testing.assert_allclose(rises, lumped, rtol=1e-9)
 
 
-def test_cells_are_chosen_by_an_accuracy():
-    chosen = two("{accuracy: 1e-4}").run()
-    assert chosen.accuracy.error < 1e-4
-    assert not chosen.warnings
-    widths = np.diff(chosen.dataset.x_1)
-    assert np.all(widths[1:] > widths[:-1])
-    reached = np.sqrt(0.2 * 2e-3 / 4e3 * 1.0)  # by the first output
-    assert widths[0] < reached / 8
-
-
 def test_a_search_that_ends_early_states_the_error_of_its_last_cells(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(spatial, "TRIALS", 1)
     simulation = two("{accuracy: 1e-5}")
     chosen, (trajectory,), errors = simulation._resolved(simulation.case.run, {})
     assert spatial.grid(chosen.case.scene) != spatial.grid(simulation.case.scene)
     assert errors == [chosen._halved(trajectory, given=False)]
-
-
-def test_the_error_of_the_cells_is_estimated():
-    simulation = two(40)
-    exact = simulation.run().accuracy
-    estimate = against_tighter(trajectory := simulation.run().trajectory, simulation._cell_errors(trajectory))
-    assert estimate.source.endswith("and one with half of the cells")
-    for name in ("T_1", "profile_1", "profile_2"):
-        assert 0.5 < estimate.variables[name] / exact.variables[name] < 2
 
 
 def test_a_sweep_takes_the_cells_that_its_runs_need_and_states_what_they_leave():
@@ -281,22 +261,6 @@ run: {until: 1 s}
     assert text.count(old) == 1
     with pytest.raises(InputError, match=re.escape(message)):
         Simulation(load_text(text.replace(old, new))).run()
-
-
-@pytest.mark.parametrize("R", [0.0, 1e-3, 0.1])
-def test_slabs_that_have_not_felt_their_far_side_are_half_spaces(R):
-    """Carslaw & Jaeger (1959), sections 2.7 and 2.15, until t = L^2 / (121 alpha)."""
-    T, C, L, k = (np.array(pair) for pair in ((400.0, 300.0), (4e3, 9e3), (2e-3, 5e-3), (0.2, 0.7)))
-    e, alpha = np.sqrt(k * C / L), k * L / C
-    names = ("T", "C", "thickness", "conductivity")
-    given = {f"{name}_{n + 1}": pair[n] for name, pair in zip(names, (T, C, L, k), strict=True) for n in (0, 1)}
-    slabs, contact = get("conducting-slabs")(**given, R=R), e @ T / e.sum()
-    t, x = np.geomspace(1e-4, 1, 8) * np.min(L**2 / alpha) / 121, np.linspace(0, 2e-3, 9)
-    for n in (0, 1):
-        xi = x / (2 * np.sqrt(alpha[n] * t[:, None]))
-        later = np.exp(-(xi**2)) * erfcx(xi + np.sum(1 / e) / R * np.sqrt(t[:, None])) if R else 0.0
-        exact = T[n] + (contact - T[n]) * (erfc(xi) - later)
-        np.testing.assert_allclose(slabs.profile(n + 1, x, t), exact, atol=1e-10)
 
 
 def test_an_exact_solution_of_another_scene_is_not_used():

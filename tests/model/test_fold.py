@@ -15,6 +15,7 @@ from solved import closed
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone, XuNeedleman
 from surfacechem.laws.factors import Power
+from surfacechem.laws.friction import Coulomb, MohrCoulomb
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -298,3 +299,11 @@ def test_motion_that_nothing_bears_is_given_up_soon():
 
     assert come_to_rest(driving, np.full(2, 1e-9), np.zeros(2), np.zeros(2)) is None
     assert 0 < seen < 10_000
+
+
+@pytest.mark.parametrize("friction", [Coulomb(mu=0.3), MohrCoulomb(mu=0.3, c=1e7)])
+def test_a_zone_in_shear_beside_friction(friction):
+    loading = {"w_n": Hold(level=-1e-9), "w_t": Ramp(rate=1e-8)}
+    mounts = {"normal": Mounting(k=1e15), "tangential": Mounting(k=0.05 * STIFF)}
+    trajectory = solve(loading, frictions=[friction], **mounts)
+    assert trajectory.status == "finished", trajectory.reason

@@ -9,9 +9,7 @@ import surfacechem
 from surfacechem.contracts.terms import RateLaw
 from surfacechem.errors import InputError
 from surfacechem.laws import laws
-from surfacechem.mechanism import load_mechanism
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.studies.mechanism_rates import Curves
 
 KT = BOLTZMANN * 298.15
 LENGTH = 3.8e-9  # 0.4 nm + 3.4 nm
@@ -90,17 +88,6 @@ def test_a_reaction_whose_reverse_knows_no_force_keeps_its_equilibrium(tmp_path)
     reversible = "- {equation: a <=> b, duplicate: true, rate-constant: {A: 2 1/s, b: 0, Ea: 0}}\n"
     data = pairs(tmp_path, *both("a", "b", 0.4, -0.6), reversible=reversible, duplicate=True).run().dataset
     np.testing.assert_allclose(data["departure_R1_R2"], 1e-9 * 10e-12 / KT, atol=1e-10)
-
-
-def test_the_sheet_of_a_mechanism_says_the_same():
-    curves = Curves(load_mechanism("vinculin.yaml"))
-    (pair,) = curves.pairs
-    values = curves.departure(pair, np.array(298.15), np.linspace(0, 40e-12, 9))
-    np.testing.assert_allclose(values, math.log(6.1 / 43) + 16.24 / 8.314462618, atol=1e-9)
-    K = curves.log_equilibrium("R3", np.array(298.15), np.array([0.0, 1e-11]))
-    assert K[1] - K[0] == pytest.approx(1e-11 * LENGTH / KT, rel=1e-9)
-    free = curves.log_equilibrium("R2", np.array(298.15), np.array([0.0, 1e-11]))
-    assert free[1] == free[0]
 
 
 # -- laws of one kind of bond -----------------------------------------------------------------------------------------

@@ -185,16 +185,6 @@ def test_sensitivity_to_a_rate():
     assert net.sensitivity_parameter_name(0) == "interface: open => linear_affinity"
 
 
-def test_a_multiplier_is_a_factor_on_a_rate():
-    slow, net = network("exothermic")
-    slow.phase.set_multiplier(0.5)
-    net.advance(1.0)
-    fast, net = network("exothermic")
-    net.advance(0.5)
-    assert slow["phi"] == pytest.approx(fast["phi"], rel=LOOSE)
-    assert slow["T"] == pytest.approx(fast["T"], rel=LOOSE)
-
-
 @pytest.fixture
 def warm(tmp_path):
     """The plates of DNA bonds, one of them cold and kept so."""
@@ -262,19 +252,6 @@ def test_heat_through_a_wall(tmp_path):
     found = [interface["T_1"], interface["T_2"], other["T_1"], other["T_2"]]
     np.testing.assert_allclose(found, exact, rtol=1e-8)
     assert interface["E_total"] + other["E_total"] == pytest.approx(before, abs=1e-6)
-
-
-def test_beside_flow_controllers_and_reservoirs(warm):
-    gas = stirred(300.0, volume=0.01)
-    hot = ct.Solution("air.yaml")
-    hot.TPX = 400.0, ct.one_atm, "N2: 1"
-    inlet, outlet = ct.Reservoir(hot, clone=True), ct.Reservoir(hot, clone=True)
-    feed = ct.MassFlowController(inlet, gas, mdot=0.05)
-    ct.PressureController(gas, outlet, primary=feed, K=1e-5)
-    interface, net = network(warm, area=0.01, bodies={"upper": gas}, others=[gas])
-    net.advance(200.0)
-    assert 300 < interface["T_1"] == pytest.approx(gas.T, rel=1e-3)
-    assert gas.T > 380
 
 
 @pytest.mark.parametrize(

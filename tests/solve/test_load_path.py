@@ -2,19 +2,18 @@
 
 import numpy as np
 import pytest
-from scenes import bodies
+from scenes import bodies, together
+from solved import closed, solve
 
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.laws.contact import Penalty, TangentialStiffness
 from surfacechem.laws.friction import RateAndStateAging
 from surfacechem.laws.loading import Hold, Table
-from surfacechem.model.assemble import assemble
 from surfacechem.reactor import InterfaceReactor, ReactorNet
 from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
-from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
+from surfacechem.scene import Mounting
 
 OWN, LIBRARY = "radau", "lsoda"
 
@@ -291,48 +290,31 @@ def test_loads_jump_in_a_reactor_network(loading):
     assert interface.dataset.attrs["energy_error"] < 1e-6
 
 
-# -- far-field tractions that jump: what has no inertia or damper moves at once, and what is not stored is heat -------
+# -- what creeps, and what is late ------------------------------------------------------------------------------------
 
-K, E, MU = 1e9, 1e10, 0.5
-LEVELS = [0.0, 1e3, 1.5e3, -2e3]
-STEPS = Table(
-    times=[0.0, 10.0, 10.0, 20.0, 20.0, 30.0, 30.0, 40.0], values=[level for level in LEVELS for _ in range(2)]
-)
-BODIES = bodies("T", "T", C_1=1.0, C_2=1.0)
-
-
-def stepped(interface, loading, mounts, initial=None, rtol=1e-11):
-    scene = Scene(BODIES, interface, (), loading, None, 300.0, {"T": 300.0, **(initial or {})}, **mounts)
-    return Model(assemble(scene)).solve(Run(np.linspace(0.0, 40.0, 9).tolist(), rtol))
-
-
-def held(trajectory, name):
-    """A quantity in the middle of each level of the load."""
-    return trajectory.everywhere[name][1 : len(trajectory.result.times) : 2]
+LIGHT = bodies("T", "T", C_1=1.0, C_2=1.0)
 
 
 def test_what_creeps_is_carried_along():
-    loading = {"p": Hold(level=1e6), "w_t": Hold(level=0.0), "F_t": STEPS}
+    """Tractions that jump move an elastic gap at once, and the age and velocity of its friction follow."""
+    k, E, levels = 1e9, 1e10, np.array([0.0, 1e3, 1.5e3, -2e3])
+    steps = Table(times=[0.0, 10.0, 10.0, 20.0, 20.0, 30.0, 30.0, 40.0], values=levels.repeat(2).tolist())
     friction = RateAndStateAging(mu_0=0.6, a=0.008, b=0.014, L=5e-6, v_0=1e-6)
-    interface = Interface("T", [TangentialStiffness(E_t=E)], [friction])
-    trajectory = stepped(interface, loading, {"tangential": Mounting(k=K)}, {"theta": 1.0})
-    np.testing.assert_allclose(held(trajectory, "u_t"), np.array(LEVELS) / (K + E), rtol=1e-12)
-    strength = (0.6 + 0.014 * np.log(1e-6 / 5e-6 * held(trajectory, "theta"))) / 0.008
-    drive = held(trajectory, "t_t") / (0.008 * 1e6)
-    np.testing.assert_allclose(held(trajectory, "v"), 2e-6 * np.sinh(drive) * np.exp(-strength), rtol=1e-11)
-    assert audit(trajectory).findings == ()
-    assert audit(trajectory).energy_error < 1e-9
+    loading = {"p": Hold(level=1e6), "w_t": Hold(level=0.0), "F_t": steps}
+    given = {"initial": {"theta": 1.0}, "pair": LIGHT, "tangential": Mounting(k=k)}
+    found = closed(together([TangentialStiffness(E_t=E)], [friction], loading, **given), 40.0, outputs=9)
+    u, theta, t_t, v = (found.everywhere[name][1:9:2] for name in ("u_t", "theta", "t_t", "v"))
+    np.testing.assert_allclose(u, levels / (k + E), rtol=1e-12)
+    strength = (0.6 + 0.014 * np.log(1e-6 / 5e-6 * theta)) / 0.008
+    np.testing.assert_allclose(v, 2e-6 * np.sinh(t_t / 8e3) * np.exp(-strength), rtol=1e-11)
 
 
 @pytest.mark.parametrize("begin", [0.0, 14.584101652239939, 36.0])
 def test_a_late_pulse_is_as_sharp_as_an_early_one(begin):
     """One digit of the time is up to a millionth of the pulse; in a time of its own nothing is lost in it."""
-    times = begin + np.array([0.0, 1e-9, 2e-9])
-    pulse = Table(times=times.tolist(), values=[0.0, -1e9, 0.0])
-    trajectory = stepped(
-        Interface("T", [Penalty(E_n=1e15)]), {"w_n": Hold(level=0.0), "F_n": pulse}, {"normal": Mounting(k=1e9)}
-    )
-    books = audit(trajectory)
+    pulse = Table(times=(begin + np.array([0.0, 1e-9, 2e-9])).tolist(), values=[0.0, -1e9, 0.0])
+    loading = {"w_n": Hold(level=0.0), "F_n": pulse}
+    books = audit(solve(together([Penalty(E_n=1e15)], loading=loading, pair=LIGHT, normal=Mounting(k=1e9)), 40.0))
     assert books.energy_scale == pytest.approx(0.5 * 1e18 / 1e15, rel=1e-5)
     assert books.energy_error < 1e-11
 
