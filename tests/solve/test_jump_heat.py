@@ -32,74 +32,54 @@ def paths(**ends):
     return "heat: [" + ", ".join(f"conductance: {{between: [{e}, interface], h: {h}}}" for e, h in ends.items()) + "]"
 
 
-APART = {"T_1": "T_1", "T_2": "T_2"}
+def apart(interface, heat="", **more):
+    """Two bodies with temperatures of their own; ``interface`` is what is said of the interface first."""
+    return {"T_1": "T_1", "T_2": "T_2", "interface": f"  {interface}", "heat": heat, **more}
+
+
+AROUND = "surroundings: {temperature: 280 K}\n"
+OUTWARD = AROUND + paths(slider=2, base=1, surroundings=5)
+CELLS = ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}"
+STORING = "temperature: T_c\n  potential: [constant-interface-capacity: {C_c: 20}]"
 THERMAL = {
-    "slider": APART | {"interface": "  partition: {slider: 1, base: 0}"},
-    "base": APART | {"interface": "  partition: {slider: 0, base: 1}"},
-    "surroundings": APART
-    | {
-        "interface": "  partition: {slider: 0.2, base: 0.5, surroundings: 0.3}",
-        "heat": "surroundings: {temperature: 280 K}",
-    },
-    "paths": APART | {"interface": "  temperature: T_c", "heat": paths(slider=9, base=1)},
-    "paths outward": APART
-    | {
-        "interface": "  temperature: T_c",
-        "heat": "surroundings: {temperature: 280 K}\n" + paths(slider=2, base=1, surroundings=5),
-    },
-    "mean": APART
-    | {
-        "interface": "  temperature: T_c",
-        "heat": "heat: [conductance: {between: [slider, base], h: 3, closure: mean}]",
-    },
-    "stores": APART
-    | {
-        "interface": "  temperature: T_c\n  potential: [constant-interface-capacity: {C_c: 20}]",
-        "heat": paths(slider=9, base=1),
-        "initial": "T_c: 300",
-    },
-    "perfect": {"T_1": "T", "T_2": "T", "interface": "  temperature: T"},
-    "one-sided": {"T_1": "T_1", "T_2": "T_2", "interface": "  temperature: T_1"},
-    "held": {"T_1": "T_1", "T_2": "310 K", "interface": "  partition: {slider: 0.3, base: 0.7}"},
-    "cells": APART
-    | {
-        "interface": "  partition: {slider: 0.8, base: 0.2}",
-        "cells": ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}",
-    },
-    "area": APART
-    | {
-        "interface": "  temperature: T_c",
-        "heat": "surroundings: {temperature: 280 K}\n" + paths(slider=2, base=1, surroundings=5),
-        "loading": "J_c: 2",
-    },
+    "slider": apart("partition: {slider: 1, base: 0}"),
+    "base": apart("partition: {slider: 0, base: 1}"),
+    "surroundings": apart("partition: {slider: 0.2, base: 0.5, surroundings: 0.3}", AROUND),
+    "paths": apart("temperature: T_c", paths(slider=9, base=1)),
+    "paths outward": apart("temperature: T_c", OUTWARD),
+    "mean": apart("temperature: T_c", "heat: [conductance: {between: [slider, base], h: 3, closure: mean}]"),
+    "stores": apart(STORING, paths(slider=9, base=1), initial="T_c: 300"),
+    "perfect": apart("temperature: T", T_1="T", T_2="T"),
+    "one-sided": apart("temperature: T_1"),
+    "held": apart("partition: {slider: 0.3, base: 0.7}", T_2="310 K"),
+    "cells": apart("partition: {slider: 0.8, base: 0.2}", cells=CELLS),
+    "area": apart("temperature: T_c", OUTWARD, loading="J_c: 2"),
 }
-
-
 SPOTS = "pressure-conductance: {h_c: 1e5, H: 1 GPa, h_0: 5, between: [slider, interface]}"
-TOUCHING = f"heat: [{SPOTS}, conductance: {{between: [base, interface], h: %s}}%s]"
+SQUEEZED = "pressure-conductance: {h_c: 1e4, H: 1e8, q: 0.5, between: [base, interface]}"
+
+
+def touching(h="20", more=""):
+    return f"heat: [{SPOTS}, conductance: {{between: [base, interface], h: {h}}}{more}]"
+
+
 CHANGING = {
-    "spots": {"heat": TOUCHING % (20, "")},
-    "outward": {
-        "heat": "surroundings: {temperature: 280 K}\n"
-        + TOUCHING % (20, ", conductance: {between: [surroundings, interface], h: 30}")
-    },
-    "both": {
-        "heat": f"heat: [{SPOTS}, pressure-conductance: {{h_c: 1e4, H: 1e8, q: 0.5, between: [base, interface]}}]"
-    },
-    "warmer": {"heat": TOUCHING % ("{value: 20, times: [power: {of: T_2, exponent: 80}]}", "")},
-    "spots over cells": {
-        "heat": TOUCHING % (20, ""),
-        "cells": ", conduction: {thickness: 1 mm, conductivity: 1 W/m/K, cells: 4}",
-    },
-    "spots of an area": {"heat": TOUCHING % (20, ""), "loading": "J_c: 2"},
+    "spots": apart("temperature: T_c", touching()),
+    "outward": apart(
+        "temperature: T_c", AROUND + touching(more=", conductance: {between: [surroundings, interface], h: 30}")
+    ),
+    "both": apart("temperature: T_c", f"heat: [{SPOTS}, {SQUEEZED}]"),
+    "warmer": apart("temperature: T_c", touching("{value: 20, times: [power: {of: T_2, exponent: 80}]}")),
+    "spots over cells": apart("temperature: T_c", touching(), cells=CELLS),
+    "spots of an area": apart("temperature: T_c", touching(), loading="J_c: 2"),
 }
-CHANGING = {name: APART | {"interface": "  temperature: T_c"} | given for name, given in CHANGING.items()}
 """Conductances that change as loads jump."""
+BARE = {"bare": apart("partition: 0.5")}
 
 
 def text(thermal, loading, mechanics, potential="", static="", **more):
     given = {"cells": "", "heat": "", "C_1": 1000, "static": static, "initial": ""}
-    given |= (THERMAL | CHANGING)[thermal] | more
+    given |= (THERMAL | CHANGING | BARE)[thermal] | more
     interface = given["interface"]
     if potential:
         interface = (
@@ -365,26 +345,16 @@ def test_what_follows_a_traction_that_jumps_is_damped_by_its_own_support(thermal
 @pytest.mark.parametrize("jumps", [True, False])
 def test_check_says_that_the_parts_of_a_support_matter_only_where_it_makes_heat(jumps):
     """A support without a damper makes heat only as the gap follows a load that jumps."""
-    case = CASE.format(
-        **APART,
-        cells="",
-        C_1=1000,
-        interface="  potential: [penalty: {E_n: 1e13 Pa/m}]",
-        static=", mu_s: 0.6",
-        heat="",
-        mechanics="normal: {k: 1e9 Pa/m, beta_1: 1}, tangential: {k: 1e9 Pa/m}",
-        loading="F_n: {table: {times: [0, 2, %s, 4], values: [-2 MPa, -2 MPa, -1 MPa, -1 MPa]}}, w_n: 0, "
-        "w_t: {ramp: {rate: 0.25 mm/s}}" % ("2" if jumps else "3"),
-        initial="T_1: 300, T_2: 300",
-    )
-    simulation = Simulation(load_text(case))
-    idle = [text for text in warnings(simulation.model.system) if "beta_1 = 1 has no effect" in text]
-    moved = [
-        part.run().dataset.T_2[-1]
-        for part in (simulation, Simulation(load_text(case.replace("beta_1: 1", "beta_1: 0"))))
-    ]
-    assert bool(idle) != jumps
-    assert (abs(float(moved[0] - moved[1])) > 1e-6) == jumps
+    loads = table("F_n", [-2, -2, -1, -1], "MPa", 0 if jumps else 1) + ", w_n: 0, w_t: {ramp: {rate: 0.25 mm/s}}"
+    moved = []
+    for part in (1, 0):
+        mechanics = f"normal: {{k: 1e9 Pa/m, beta_1: {part}}}, tangential: {{k: 1e9 Pa/m}}"
+        case = text("bare", loads, mechanics, "penalty: {E_n: 1e13 Pa/m}", ", mu_s: 0.6")
+        simulation = Simulation(load_text(case))
+        moved.append(float(simulation.run().dataset.T_2[-1]))
+        idle = [said for said in warnings(simulation.model.system) if f"beta_1 = {part} has no effect" in said]
+        assert bool(idle) != jumps
+    assert (abs(moved[0] - moved[1]) > 1e-6) == jumps
 
 
 def test_where_a_way_has_no_numbers_nothing_is_shared():
@@ -397,18 +367,9 @@ def test_what_a_pressure_stops_does_not_cool_the_interface_first(method):
     """The limit rises faster than the spring pulls: sliding stops, as if the pressure had jumped."""
     runs = []
     for rise in (0, 1e-3):
-        case = load_text(
-            CASE.format(
-                **THERMAL["paths"],
-                cells="",
-                C_1=1000,
-                static="",
-                mechanics="tangential: {k: 1e9 Pa/m}",
-                loading=f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}, "
-                "w_t: {ramp: {rate: 0.25 mm/s}}",
-                initial="T_1: 300, T_2: 300",
-            )
-        )
+        loads = f"p: {{table: {{times: [0, 3, {3 + rise}, 4], values: [0.5e6, 0.5e6, 2e6, 2e6]}}}}"
+        given = text("paths", f"{loads}, w_t: {{ramp: {{rate: 0.25 mm/s}}}}", "tangential: {k: 1e9 Pa/m}")
+        case = load_text(given)
         runs.append(Simulation(replace(case, run=replace(case.run, solver=method))).run(error="balances"))
     assert [run.status for run in runs] == ["finished", "finished"]
     assert runs[1].dataset.event_name.values.tolist() == ["slip forward", "stop"]
