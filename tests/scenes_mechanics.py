@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from scenes import SITES, bodies, path, varying
+from scenes import SITES, bodies, path, together, varying
 
 from surfacechem.laws.bonding import BondEnergy
 from surfacechem.laws.bulk import Constant
@@ -52,10 +52,6 @@ class Moving:
         return self.scene.__name__
 
 
-def pulled(g_n: float = 2e-8) -> dict[str, float]:
-    return {"g_n": g_n}
-
-
 def cohesive(**changes) -> ExponentialCohesiveZone:
     """Strength that falls with temperature and grows with bonding; the range of the zone varies too."""
     strength = varying(1e6, Power(exponent=-1.0), Linear(of="phi", slope=0.5))
@@ -63,17 +59,12 @@ def cohesive(**changes) -> ExponentialCohesiveZone:
     return ExponentialCohesiveZone(**values | changes)
 
 
-def _bonded(temperature, extra=(), **rest) -> Interface:
-    return Interface(
-        temperature, [cohesive(), BondEnergy(K_0=300.0), *extra], (), [LinearAffinity(c_r=1e16)], SITES, **rest
-    )
-
-
 def _gap(mounting: Mounting, loading) -> Scene:
     """A separate interface temperature, cohesion that depends on temperature and bonds."""
     heat = [path("interface", "lower", 900.0), path("upper", "interface", 300.0)]
     initial = APART | {"T_c": 305.0, "phi": 0.4, "g_n": 2e-8}
-    interface = _bonded("T_c", [InterfaceCapacity(C_c=3.0)])
+    potentials = [cohesive(), BondEnergy(K_0=300.0), InterfaceCapacity(C_c=3.0)]
+    interface = Interface("T_c", potentials, (), [LinearAffinity(c_r=1e16)], SITES)
     return Scene(bodies(), interface, heat, loading, T_0=300.0, initial=initial, normal=mounting)
 
 
@@ -96,12 +87,8 @@ def quasi_static_gap() -> Scene:
 
 def dead_load() -> Scene:
     """A far-field traction alone on springs that bonds are."""
-    interface = Interface(
-        "T", [BondStiffness(E_b=1e13, E_n=1e14), BondEnergy(K_0=300.0)], (), [LinearAffinity(c_r=1e16)], SITES
-    )
-    initial = TOGETHER | {"phi": 0.5}
-    loading = {"F_n": Ramp(start=1e5, rate=1e3)}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial)
+    potentials = [BondStiffness(E_b=1e13, E_n=1e14), BondEnergy(K_0=300.0)]
+    return together(potentials, (), {"F_n": Ramp(start=1e5, rate=1e3)}, {"phi": 0.5}, [LinearAffinity(c_r=1e16)])
 
 
 def no_medium_gap() -> Scene:
@@ -132,17 +119,13 @@ def stretched_gap() -> Scene:
 
 def rigid() -> Scene:
     """Nothing opens: the far field is borne until the interface debonds."""
-    interface = _bonded_rigid([TensileStrength(t_max=varying(1e6, Proportional(of="phi")))])
-    initial = TOGETHER | {"phi": 0.6}
-    loading = {"w_n": Ramp(start=1e-9, rate=1e-9)}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=Mounting(k=1e14))
+    return _bonded((), varying(1e6, Proportional(of="phi")))
 
 
 def rigid_under_load() -> Scene:
     """Nothing holds: the far field presses, the dead load pulls more."""
-    interface = Interface("T", [], [Coulomb(mu=0.3)])
     loading = {"w_n": Hold(level=-2e-9), "F_n": Hold(level=3e5), "v": Hold(level=0.01)}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=TOGETHER, normal=Mounting(k=1e14))
+    return together((), [Coulomb(mu=0.3)], loading, normal=Mounting(k=1e14))
 
 
 def rigid_with_a_mass() -> Scene:
@@ -156,31 +139,21 @@ def rigid_with_a_damper() -> Scene:
 
 
 def _hitting(mounting) -> Scene:
-    interface = Interface("T", [], [Coulomb(mu=0.3)])
     loading = {"w_n": Ramp(start=-2e-9, rate=1e-9), "F_n": Hold(level=-3e5), "w_t": Ramp(rate=1e-3)}
-    initial = TOGETHER | {"g_n": 3e-9, "u_t": 0.0, "v": 1e-4}
-    tangential = Mounting(k=1e8, m=10.0)
-    return Scene(
-        bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=mounting, tangential=tangential
-    )
+    mounts = {"normal": mounting, "tangential": Mounting(k=1e8, m=10.0)}
+    return together((), [Coulomb(mu=0.3)], loading, {"g_n": 3e-9, "u_t": 0.0, "v": 1e-4}, **mounts)
 
 
-def _bonded_rigid(limits) -> Interface:
-    return Interface("T", [BondEnergy(K_0=300.0)], (), [LinearAffinity(c_r=1e16)], SITES, limits=limits)
+def _bonded(potentials, t_max) -> Scene:
+    """A contact whose bonds have a strength."""
+    bonds = {"reactions": [LinearAffinity(c_r=1e16)], "limits": [TensileStrength(t_max=t_max)]}
+    loading, initial = {"w_n": Ramp(start=1e-9, rate=1e-9)}, {"phi": 0.6}
+    return together([*potentials, BondEnergy(K_0=300.0)], (), loading, initial, normal=Mounting(k=1e14), **bonds)
 
 
 def bonded_contact() -> Scene:
     """Elastic contact with a strength, quasi-static."""
-    interface = Interface(
-        "T",
-        [BondedContact(E_n=1e14), BondEnergy(K_0=300.0)],
-        reactions=[LinearAffinity(c_r=1e16)],
-        sites=SITES,
-        limits=[TensileStrength(t_max=1e6)],
-    )
-    initial = TOGETHER | {"phi": 0.6}
-    loading = {"w_n": Ramp(start=1e-9, rate=1e-9)}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=Mounting(k=1e14))
+    return _bonded([BondedContact(E_n=1e14)], 1e6)
 
 
 SLIDING = ({"slip": 0.0}, {"slip": 1.0}, {"slip": -1.0})
@@ -326,37 +299,25 @@ def elastic_prescribed() -> Scene:
 
 def both_directions() -> Scene:
     """Normal and tangential gap move; the normal traction is the pressure of friction."""
-    interface = Interface(
-        "T", [NormalStiffness(E_n=varying(1e14, LinearInTemperature(slope=-1e-3)))], [Coulomb(mu=0.4, mu_s=0.6)]
-    )
-    return Scene(
-        bodies("T", "T"),
-        interface,
-        (),
-        {"w_n": Ramp(start=-1e-7, rate=-1e-9), "w_t": Ramp(rate=1e-3)},
-        T_0=300.0,
-        initial=TOGETHER | {"g_n": -1e-8, "u_t": 0.0, "v": 1e-3},
-        normal=Mounting(k=1e13, c_g=1e6),
-        tangential=Mounting(k=1e8, m=10.0),
-    )
+    potentials = [NormalStiffness(E_n=varying(1e14, LinearInTemperature(slope=-1e-3)))]
+    loading = {"w_n": Ramp(start=-1e-7, rate=-1e-9), "w_t": Ramp(rate=1e-3)}
+    mounts = {"normal": Mounting(k=1e13, c_g=1e6), "tangential": Mounting(k=1e8, m=10.0)}
+    initial = {"g_n": -1e-8, "u_t": 0.0, "v": 1e-3}
+    return together(potentials, [Coulomb(mu=0.4, mu_s=0.6)], loading, initial, **mounts)
 
 
 def mixed_mode() -> Scene:
     """A coupled cohesive zone that opens and shears, both directions damped."""
-    interface = Interface("T", [XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.8, r=0.1)])
+    zone = XuNeedleman(Phi_n=0.1, g_0=1e-8, g_t0=2e-8, q=0.8, r=0.1)
     loading = {"w_n": Ramp(start=1e-8, rate=1e-8), "u_t": Ramp(start=1e-8, rate=1e-8)}
-    initial = TOGETHER | {"g_n": 1e-8, "g_t": 1e-8}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=Mounting(k=1e15, c_g=1e5))
+    return together([zone], (), loading, {"g_n": 1e-8, "g_t": 1e-8}, normal=Mounting(k=1e15, c_g=1e5))
 
 
 def adhesion() -> Scene:
     """Adhesion that is lost for good."""
-    interface = Interface(
-        "T", [AdhesionIntensity(C_N=1e15, C_T=1e15, w=0.1, E_n=1e16)], (), [AdhesionLoss(b=1e-2)], SITES
-    )
-    loading = {"w_n": Ramp(start=2e-8, rate=1e-8), "g_t": Hold(level=1e-9)}
-    initial = TOGETHER | {"g_n": 2e-8, "phi": 0.9}
-    return Scene(bodies("T", "T"), interface, (), loading, T_0=300.0, initial=initial, normal=Mounting(k=1e15, c_b=1e5))
+    law, loss = AdhesionIntensity(C_N=1e15, C_T=1e15, w=0.1, E_n=1e16), [AdhesionLoss(b=1e-2)]
+    loading, initial = {"w_n": Ramp(start=2e-8, rate=1e-8), "g_t": Hold(level=1e-9)}, {"g_n": 2e-8, "phi": 0.9}
+    return together([law], (), loading, initial, loss, normal=Mounting(k=1e15, c_b=1e5))
 
 
 def programme() -> Scene:
@@ -378,43 +339,26 @@ def reservoirs() -> Scene:
         Table(times=[0.0, 1.0], values=[300.0, 305.0]), [cohesive(t_max=varying(1e6, Power(exponent=-1.0)))]
     )
     loading = {"w_n": Ramp(start=2e-8, rate=1e-9)}
-    return Scene(pair, interface, (), loading, T_0=300.0, initial=pulled(), normal=Mounting(k=1e15, c_b=1e5, c_g=1e5))
+    return Scene(
+        pair, interface, (), loading, T_0=300.0, initial={"g_n": 2e-8}, normal=Mounting(k=1e15, c_b=1e5, c_g=1e5)
+    )
 
 
-STAGES = tuple({"stage": float(i)} for i in range(4))
+WHERE = ({"closed": 1.0}, {"closed": 0.0})
+GAPS = (inertial_gap, overdamped_gap, quasi_static_gap, dead_load, no_medium_gap, algebraic_temperature_gap)
+SMOOTH = (*GAPS, stretched_gap, film_slider, plane_film, mixed_mode, adhesion, reservoirs)
+SLIDERS = (inertial_slider, damped_slider, quasi_static_slider, stribeck_slider, bonding_slider, both_directions)
+ELASTIC_SLIDERS = (elastic_inertial_slider, elastic_damped_slider, elastic_quasi_static_slider)
+PLANE_SLIDERS = (plane_slider, plane_damped_slider, plane_uneven_slider, plane_bonding_slider)
 
 ALL = [
-    Moving(inertial_gap),
-    Moving(overdamped_gap),
-    Moving(quasi_static_gap),
-    Moving(dead_load),
-    Moving(no_medium_gap),
-    Moving(algebraic_temperature_gap),
-    Moving(stretched_gap),
-    Moving(rigid, ({"closed": 1.0}, {"closed": 0.0})),
-    Moving(rigid_under_load, ({"closed": 1.0}, {"closed": 0.0})),
+    *(Moving(scene) for scene in SMOOTH),
+    *(Moving(scene, WHERE) for scene in (rigid, rigid_under_load)),
     Moving(rigid_with_a_mass, ({"closed": 1.0, "slip": 1.0}, {"closed": 0.0, "slip": -1.0})),
     Moving(rigid_with_a_damper, ({"closed": 1.0, "slip": 1.0}, {"closed": 0.0, "slip": 0.0})),
     Moving(bonded_contact, ({"bonded": 1.0}, {"bonded": 0.0})),
-    Moving(inertial_slider, SLIDING),
-    Moving(damped_slider, SLIDING),
-    Moving(quasi_static_slider, SLIDING),
-    Moving(film_slider),
-    Moving(stribeck_slider, SLIDING),
-    Moving(bonding_slider, SLIDING),
-    Moving(plane_slider, SLIDING[:2]),
-    Moving(plane_damped_slider, SLIDING[:2]),
-    Moving(plane_uneven_slider, SLIDING[:2]),
-    Moving(plane_bonding_slider, SLIDING[:2]),
-    Moving(plane_film),
-    Moving(elastic_inertial_slider, SLIDING),
-    Moving(elastic_damped_slider, SLIDING),
-    Moving(elastic_quasi_static_slider, SLIDING),
-    Moving(elastic_rate_dependent_slider, SLIDING),
-    Moving(elastic_prescribed, SLIDING),
-    Moving(both_directions, SLIDING),
-    Moving(mixed_mode),
-    Moving(adhesion),
-    Moving(programme, STAGES),
-    Moving(reservoirs),
+    *(Moving(scene, SLIDING) for scene in (*SLIDERS, *ELASTIC_SLIDERS)),
+    *(Moving(scene, SLIDING) for scene in (elastic_rate_dependent_slider, elastic_prescribed)),
+    *(Moving(scene, SLIDING[:2]) for scene in PLANE_SLIDERS),
+    Moving(programme, tuple({"stage": float(i)} for i in range(4))),
 ]
