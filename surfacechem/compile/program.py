@@ -122,6 +122,13 @@ class Program:
         return np.array(rows, dtype=np.int64)
 
     @cached_property
+    def sizes(self) -> NDArray[np.int64]:
+        """Numbers of states, accounts, margins, inputs; of states of the core, of chains, and of states in them."""
+        core = self.chains[0].first if self.chains else self.n
+        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
+        return np.array(sizes, dtype=np.int64)
+
+    @cached_property
     def chain_table(self) -> NDArray[np.int64]:
         """A row (first, end, anchor) for each chain; anchor -1 where it hangs on nothing."""
         return np.array([(c.first, c.end, c.anchor) for c in self.chains], dtype=np.int64).reshape(-1, 3)

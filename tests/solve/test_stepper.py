@@ -18,6 +18,7 @@ from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
 from surfacechem.solve.radau.solver import Radau, consistent, output_rates, solve_many
+from surfacechem.solve.radau.stepper import ROWS
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
     DEFECT,
@@ -33,7 +34,7 @@ from surfacechem.solve.radau.tables import (
     STAGES,
     TO_PARTS,
 )
-from surfacechem.solve.radau.work import ROWS, combine
+from surfacechem.solve.radau.work import combine
 
 radau = Radau()
 

@@ -36,7 +36,6 @@ class Evaluation:
         self._algebraic = np.flatnonzero(program.algebraic_mask)
         self.guess = y[self._algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
-        self._search = stepper.run_batch()
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
         self._batch = search_batch(program, ends, table, self._counts)
         self._ledger = _Code(program.ledger, self.inputs)
@@ -50,7 +49,7 @@ class Evaluation:
         self.ydot[:] = 0.0
         self._counts[:] = 0
         self.program.filled(self.inputs)
-        self._search(0, 1, self._batch)
+        stepper.run(self._batch, 0, 1)
         found = bool(self._counts[0, END] == 0)
         if found:
             self.guess = self.y[self._algebraic]

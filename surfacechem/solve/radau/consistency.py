@@ -12,15 +12,8 @@ import numpy as np
 from surfacechem.solve.radau.linear import factor, fold_chains, solve_real
 from surfacechem.solve.radau.roundoff import spread_noise
 from surfacechem.solve.radau.work import (
-    COLUMNS,
-    DELTA,
-    ERROR,
     JACOBIAN,
-    NOISE,
     RESIDUAL,
-    RHS,
-    TRIAL,
-    TRIAL_DOT,
     any_true,
     compiled,
     evaluate,
@@ -41,73 +34,78 @@ SMALLEST_PIVOT = DIGITS
 
 @compiled
 def _residual(w: Any) -> bool:
-    """Residual at the trial state into RHS."""
-    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    evaluate(w, RESIDUAL, w.vector[RHS].ctypes.data)
-    return bool(finite(w.vector[RHS]))
+    """Residual at the trial state into the right-hand side; whether it is finite."""
+    set_inputs(w, w.trial, w.trial_dot)
+    evaluate(w, RESIDUAL, w.rhs)
+    return bool(finite(w.rhs))
 
 
 @compiled
-def _chain_matrix(w: Any) -> None:
-    """Derivatives by the unknowns where chains are concerned; of a chain the rates are."""
-    core = w.real.shape[0]
-    for c in range(w.chains.shape[0]):
+def _fold(w: Any) -> bool:
+    """Eliminate the chains from the matrix of the unknowns; of a chain these are the rates."""
+    core = w.core
+    for c in range(w.links):
         anchor = w.chains[c, 2]
         for i in range(core):
             w.real_border[i, c] = w.border_derivatives[1, i, c]
         for i in range(w.chains[c, 0] - core, w.chains[c, 1] - core):
             for side in range(3):
                 w.real_bands[i, side] = w.band_derivatives[1, i, side]
-            w.vector[COLUMNS, core + i] = 1.0
+            w.columns[core + i] = 1.0
         if anchor >= 0 and w.algebraic[anchor]:
             w.real_bands[w.chains[c, 0] - core, 0] = w.band_derivatives[0, w.chains[c, 0] - core, 0]
+    return bool(fold_chains(w.real, w.real_border, w.real_bands, w.chains))
 
 
 @compiled
 def _factor(w: Any) -> bool:
-    n = w.real.shape[0]
-    evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
+    """Factor the matrix of the unknowns, its columns in units of their largest entry beside that of its row."""
+    n = w.core
+    evaluate(w, JACOBIAN, w.jacobian)
+    for i in range(n):
+        for j in range(n):
+            w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
     for j in range(n):
         largest = 0.0
         for i in range(n):
-            w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
-        for i in range(n):
             row = 0.0
             for m in range(n):
-                row = max(row, abs(w.jacobian[0 if w.algebraic[m] else 1, i, m]))
+                row = max(row, abs(w.real[i, m]))
             largest = max(largest, abs(w.real[i, j]) / row if row > 0.0 else 0.0)
-        w.vector[COLUMNS, j] = 1.0 / largest if largest > 0.0 else 1.0
-    if w.chains.shape[0] > 0:
-        _chain_matrix(w)
-        if not fold_chains(w.real, w.real_border, w.real_bands, w.chains):
-            return False
-    return bool(factor(w.real, w.order[0], w.vector[COLUMNS], w.vector[DELTA], SMALLEST_PIVOT))
+        w.columns[j] = 1.0 / largest if largest > 0.0 else 1.0
+    if w.links > 0 and not _fold(w):
+        return False
+    return bool(factor(w.real, w.order[0], w.columns, w.delta, SMALLEST_PIVOT))
 
 
 @compiled
 def _correction(w: Any, delta: Any) -> float:
-    """Newton correction for the residual in RHS; returns its size in the algebraic variables."""
+    """Newton correction for the present residual; returns its size in the algebraic variables."""
     norm = 0.0
-    for j in range(delta.shape[0]):
-        delta[j] = -w.vector[RHS, j]
+    for j in range(w.n):
+        delta[j] = -w.rhs[j]
     solve_real(w, delta)
-    for j in range(delta.shape[0]):
+    for j in range(w.n):
         if w.algebraic[j]:
-            norm = max(norm, abs(delta[j]) / (abs(w.vector[TRIAL, j]) + abs(delta[j]) + TINY))
+            norm = max(norm, abs(delta[j]) / (abs(w.trial[j]) + abs(delta[j]) + TINY))
     return norm
 
 
 @compiled
-def _shift(w: Any, delta: Any, fraction: float) -> None:
-    for j in range(delta.shape[0]):
-        w.vector[TRIAL if w.algebraic[j] else TRIAL_DOT, j] += fraction * delta[j]
+def _move(w: Any, delta: Any, fraction: float) -> None:
+    """Move the unknowns along a correction: the algebraic variables, and the rates of the others."""
+    for j in range(w.n):
+        if w.algebraic[j]:
+            w.trial[j] += fraction * delta[j]
+        else:
+            w.trial_dot[j] += fraction * delta[j]
 
 
 @compiled
 def _size(w: Any, delta: Any, unit: Any) -> float:
     """Size of a correction of the algebraic variables in these units; not a number where it is none."""
     norm = 0.0
-    for j in range(delta.shape[0]):
+    for j in range(w.n):
         if w.algebraic[j] and not abs(delta[j]) / unit[j] <= norm:
             norm = abs(delta[j]) / unit[j]
     return norm
@@ -121,30 +119,30 @@ def _damped(w: Any, delta: Any) -> bool:
     Residuals are no measure: those of rates are as large as what they divide by is small, and linear anyway.
     Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural monotonicity test.
     """
-    following, unit = w.g[1], w.vector[ERROR]
-    for j in range(delta.shape[0]):
-        unit[j] = abs(w.vector[TRIAL, j]) + abs(delta[j]) + TINY
+    following, unit = w.g[1], w.error
+    for j in range(w.n):
+        unit[j] = abs(w.trial[j]) + abs(delta[j]) + TINY
     before = _size(w, delta, unit)
     fraction = 1.0
-    _shift(w, delta, 1.0)
+    _move(w, delta, 1.0)
     for _halving in range(40):
         if _residual(w):
             _correction(w, following)
             if _size(w, following, unit) <= before:
                 return True
         fraction *= 0.5
-        _shift(w, delta, -fraction)
+        _move(w, delta, -fraction)
     return False
 
 
 @compiled
-def _rounds(w: Any, delta: Any) -> bool:
+def _is_rounding(w: Any, delta: Any) -> bool:
     """Whether a correction is no larger than what rounding of the equations makes of it."""
-    spread_noise(w, TRIAL, TRIAL_DOT)
+    spread_noise(w, w.trial, w.trial_dot)
     largest = 0.0
-    for j in range(delta.shape[0]):
+    for j in range(w.n):
         if w.algebraic[j]:
-            largest = max(largest, abs(delta[j]) - 2.0 * w.vector[NOISE, j])
+            largest = max(largest, abs(delta[j]) - 2.0 * w.noise[j])
     return largest <= 0.0
 
 
@@ -164,9 +162,9 @@ def find_consistent(w: Any) -> int:
             return SINGULAR_STATE
         # The system is linear in the derivatives: without algebraic variables one correction is exact.
         if not nonlinear or norm <= DIGITS or norm_last <= CONVERGING:
-            _shift(w, delta, 1.0)
+            _move(w, delta, 1.0)
             return CONSISTENT if _residual(w) else NOT_FINITE_STATE
-        if iteration >= ROUNDED and _rounds(w, delta):
+        if iteration >= ROUNDED and _is_rounding(w, delta):
             return CONSISTENT
         if not _damped(w, delta):
             # At rounding level the corrections cannot fall any more.

@@ -13,29 +13,18 @@ from surfacechem.solve.radau.tables import (
     GAMMA,
     NEWTON_NODES,
     NODES,
-    PROBE_SHAPE,
     SCAN_RATES,
     SCAN_VALUES,
     SCANNED,
     START_RATE,
 )
 from surfacechem.solve.radau.work import (
-    BASE,
-    CORRECTION,
-    ERROR,
     LEDGER,
-    MEMBER,
-    Q_CORRECTION,
-    Q_TRIAL,
-    TAU,
-    TRIAL,
-    TRIAL_DOT,
-    Q,
-    Y,
     combine,
     compiled,
     copy,
     evaluate,
+    put,
 )
 
 
@@ -54,31 +43,18 @@ def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
 @compiled
 def keep_polynomial(w: Any) -> None:
     """Newton's form of the polynomials of state and ledger over the step, for outputs and events inside."""
-    k = w.count[MEMBER]
-    _newton_form(k, w.z, w.vector[CORRECTION], w.polynomial)
-    _newton_form(k, w.q_stage, w.ledger[Q_CORRECTION], w.q_polynomial)
-
-
-@compiled
-def add_probe(w: Any, k: int, defect: Any) -> None:
-    """The next term of the ledger's polynomial, from a defect of its rate at the probe."""
-    for m in range(w.q_polynomial.shape[0]):
-        for i in range(stage_count(k) + 2):
-            w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * defect[m]
-
-
-@compiled
-def _evaluate(k: int, x: float, polynomial: Any, start: Any, result: Any) -> None:
-    for m in range(polynomial.shape[0]):
-        result[m] = start[m] + nested(k, stage_count(k) + 1, x, polynomial[m])
+    _newton_form(w.member, w.z, w.correction, w.polynomial)
+    _newton_form(w.member, w.q_stage, w.q_correction, w.q_polynomial)
 
 
 @compiled
 def interpolate(w: Any, x: float) -> None:
     """State and ledger at the fraction x of the step."""
-    k = w.count[MEMBER]
-    _evaluate(k, x, w.polynomial, w.vector[Y], w.vector[TRIAL])
-    _evaluate(k, x, w.q_polynomial, w.ledger[Q], w.ledger[Q_TRIAL])
+    top = stage_count(w.member) + 1
+    for m in range(w.n):
+        w.trial[m] = w.y[m] + nested(w.member, top, x, w.polynomial[m])
+    for m in range(w.n_ledger):
+        w.q_trial[m] = w.q[m] + nested(w.member, top, x, w.q_polynomial[m])
 
 
 @compiled
@@ -93,20 +69,33 @@ def change_and_slope(k: int, x: float, row: Any) -> Any:
 
 
 @compiled
-def interpolate_rate(w: Any, h: float, x: float) -> None:
-    """State at the fraction x of the step, and the derivative of its polynomial."""
-    for m in range(w.polynomial.shape[0]):
-        change, slope = change_and_slope(w.count[MEMBER], x, w.polynomial[m])
-        w.vector[TRIAL, m] = w.vector[Y, m] + change
-        w.vector[TRIAL_DOT, m] = slope / h
+def put_inside(w: Any, h: float, x: float) -> None:
+    """State at the fraction x of the step and the derivative of its polynomial, as trial and as inputs."""
+    for m in range(w.n):
+        change, slope = change_and_slope(w.member, x, w.polynomial[m])
+        w.trial[m] = w.y[m] + change
+        w.trial_dot[m] = slope / h
+    put(w, x * h, w.trial, w.trial_dot)
+
+
+@compiled
+def probe_ledger(w: Any, h: float) -> None:
+    """Rates of the ledger at the trial state, at the time of the inputs. The state is corrected by its error there
+    first: a fast rate would magnify it.
+    """
+    n, rate = w.n, GAMMA[w.member] / h
+    for j in range(n):
+        w.inputs[1 + j] = w.trial[j] + w.error[j]
+        w.inputs[1 + n + j] = w.trial_dot[j] + rate * w.error[j]
+    evaluate(w, LEDGER, w.q_probe)
 
 
 @compiled
 def scan_step(w: Any) -> None:
     """Change of the state since the start, and its rate times the step, at all points where margins are examined."""
-    k, n = w.count[MEMBER], w.algebraic.shape[0]
+    k, n = w.member, w.n
     s = stage_count(k)
-    copy(w.vector[CORRECTION], w.z[s])  # a row that is free
+    copy(w.correction, w.z[s])  # a row that is free
     points, terms, z = 4 * k + 9, s + 1, w.z.ctypes.data
     combine(SCAN_VALUES[k].ctypes.data, 8, points, terms, z, n, w.scanned.ctypes.data)
     combine(SCAN_RATES[k].ctypes.data, 8, points, terms, z, n, w.scanned_rates.ctypes.data)
@@ -115,30 +104,34 @@ def scan_step(w: Any) -> None:
 @compiled
 def put_scanned(w: Any, h: float, i: int) -> None:
     """Inputs at a point where margins are examined."""
-    n, rate = w.algebraic.shape[0], 1.0 / h
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + SCANNED[w.count[MEMBER], i] * h)
-    inputs, y, change, slope = w.inputs, w.vector[Y], w.scanned[i], w.scanned_rates[i]
+    n, rate = w.n, 1.0 / h
+    inputs, y, change, slope = w.inputs, w.y, w.scanned[i], w.scanned_rates[i]
+    inputs[0] = w.base + (w.tau + SCANNED[w.member, i] * h)
     for m in range(n):
         inputs[1 + m] = y[m] + change[m]
         inputs[1 + n + m] = slope[m] * rate
 
 
 @compiled
-def keep_correction(w: Any) -> None:
-    """Leading error of the polynomial per unit shape, from the error estimate."""
-    for m in range(w.algebraic.shape[0]):
-        w.vector[CORRECTION, m] = GAMMA[w.count[MEMBER]] * w.vector[ERROR, m]
+def finish_step(w: Any, h: float) -> None:
+    """What interpolation inside the step needs beyond the stages: the leading error of the polynomial, from the error
+    estimate, and the quadratures of the ledger.
+    """
+    for m in range(w.n):
+        w.correction[m] = GAMMA[w.member] * w.error[m]
+    if w.n_ledger > 0:
+        integrate_ledger(w, h)
 
 
 @compiled
 def integrate_ledger(w: Any, h: float) -> None:
     """Quadratures over the step at its stages; row 7 of the rates holds those at the start of the step."""
-    k = w.count[MEMBER]
+    k = w.member
     s = stage_count(k)
     for i in range(s):
         set_stage(w, i, h)
-        evaluate(w, LEDGER, w.rates[i].ctypes.data)
-    for m in range(w.ledger.shape[1]):
+        evaluate(w, LEDGER, w.rates[i])
+    for m in range(w.n_ledger):
         defect = w.rates[7, m]
         for i in range(s):
             defect -= START_RATE[k, i] * w.rates[i, m]
@@ -146,15 +139,15 @@ def integrate_ledger(w: Any, h: float) -> None:
             for j in range(s):
                 total += COLLOCATION[k, i, j] * w.rates[j, m]
             w.q_stage[i, m] = h * total
-        w.ledger[Q_CORRECTION, m] = h * defect
+        w.q_correction[m] = h * defect
 
 
 @compiled
 def hold_rates(w: Any, h: float) -> None:
     """Quadratures over the step with the rates at its start, where those at its end are singular."""
-    k = w.count[MEMBER]
-    for m in range(w.ledger.shape[1]):
+    k = w.member
+    for m in range(w.n_ledger):
         for i in range(stage_count(k)):
             w.rates[i, m] = w.rates[7, m]
             w.q_stage[i, m] = NODES[k, i] * h * w.rates[7, m]
-        w.ledger[Q_CORRECTION, m] = 0.0
+        w.q_correction[m] = 0.0

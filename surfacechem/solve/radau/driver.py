@@ -6,17 +6,16 @@ import numpy as np
 
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import find_consistent
-from surfacechem.solve.radau.dense import hold_rates
+from surfacechem.solve.radau.dense import finish_step, hold_rates
 from surfacechem.solve.radau.guards import AT_START, find_event, keep_sides, mark_at_end, restore_sides, start_margins
 from surfacechem.solve.radau.newton import stage_count
 from surfacechem.solve.radau.outputs import write_outputs
-from surfacechem.solve.radau.quadrature import ledger_factor, ledger_norm
+from surfacechem.solve.radau.quadrature import ledger_norm
 from surfacechem.solve.radau.step import (
     BRIEF,
     GOOD,
     accept,
     advance,
-    finish_step,
     first_size,
     growing_size,
     keep_matrices,
@@ -25,35 +24,9 @@ from surfacechem.solve.radau.step import (
     store_polynomial,
     unseen,
 )
-from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS, STOP, Batch
-from surfacechem.solve.radau.work import (
-    ATOL,
-    BASE,
-    H_FACTORED,
-    LOOSE,
-    M_LARGEST,
-    M_NOW,
-    MEMBER,
-    Q_LARGEST,
-    REFUSED,
-    REJECTED,
-    RTOL,
-    STEPS,
-    TAU,
-    TRIAL,
-    TRIAL_DOT,
-    YDOT,
-    Q,
-    Y,
-    any_true,
-    clear,
-    compiled,
-    copy,
-    finite,
-    lay_out,
-    reference,
-)
-from surfacechem.tolerances import ROUNDING, SHALLOW, SQRT_EPS
+from surfacechem.solve.radau.stepper import END, EVENTS, FIRST_COUNTER, OUTPUTS, RECORDS
+from surfacechem.solve.radau.work import any_true, clear, compiled, copy, lay_out, row_of
+from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SHALLOW, SQRT_EPS
 
 FINISHED = int(Status.FINISHED)
 EVENT = int(Status.EVENT)
@@ -75,29 +48,23 @@ TAKEN, AGAIN, MISSED, ENDED = range(4)
 
 
 @compiled
-def row_of(table: Any, i: int) -> int:
-    """Row of run i in a table that has one for each run, or one for all."""
-    return min(i, int(table.shape[0]) - 1)
-
-
-@compiled
 def _write_state(w: Any, row: Any, t: float) -> None:
     """[t | y | ydot | ledger] of the current state."""
-    n = w.algebraic.shape[0]
+    n = w.n
     row[0] = t
     for j in range(n):
-        row[1 + j] = w.vector[Y, j]
-        row[1 + n + j] = w.vector[YDOT, j]
-    for m in range(w.ledger.shape[1]):
-        row[1 + 2 * n + m] = w.ledger[Q, m]
+        row[1 + j] = w.y[j]
+        row[1 + n + j] = w.ydot[j]
+    for m in range(w.n_ledger):
+        row[1 + 2 * n + m] = w.q[m]
 
 
 @compiled
 def _write_events(w: Any, events: Any, counts: Any) -> bool:
     """A row for each guard that fired; True if one of them is terminal."""
-    now = w.clock[BASE] + w.clock[TAU]
+    now = w.base + w.tau
     terminal = False
-    for m in range(w.kinds.shape[0]):
+    for m in range(w.n_margins):
         if w.fired[m] == 0:
             continue
         k = min(counts[EVENTS], events.shape[0]) - 1
@@ -111,72 +78,56 @@ def _write_events(w: Any, events: Any, counts: Any) -> bool:
             row = events[counts[EVENTS]]
             row[0] = m
             _write_state(w, row[1:], now)
+        # Those for which there is no room are counted all the same: the run is then repeated with room for all.
         counts[EVENTS] += 1
         terminal = terminal or w.kinds[m, 0] == 1
     return terminal
 
 
 @compiled
-def _record(w: Any, steps: Any, counts: Any) -> None:
-    if counts[RECORDS] < steps.shape[0]:
-        _write_state(w, steps[counts[RECORDS]], w.clock[BASE] + w.clock[TAU])
+def _record(w: Any, records: Any, counts: Any) -> None:
+    if counts[RECORDS] < records.shape[0]:
+        _write_state(w, records[counts[RECORDS]], w.base + w.tau)
     counts[RECORDS] += 1
 
 
 @compiled
-def _next_try(h: float, remaining: float) -> float:
-    """Fit the step to the end of the segment without a tiny last one."""
-    if h >= remaining * (1.0 - SQRT_EPS):
-        return remaining
-    return 0.5 * remaining if 2.0 * h > remaining else h
-
-
-@compiled
-def _start(w: Any, batch: Any, i: int) -> int:
+def _start(w: Any, i: int) -> int:
     """Begin anew at the current state, with the tables begun where it is the first one."""
     outcome = restart(w)
     if outcome != GOOD:
         return outcome
-    counts, times, outputs = batch.counts[i], batch.times[row_of(batch.times, i)], batch.outputs[i]
-    if w.kinds.shape[0] > 0:
-        start_margins(w)
-        clear(w.fired)
-    if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.clock[BASE]:
-        copy(w.vector[Y], outputs[0])
-        copy(w.ledger[Q], outputs[0, w.algebraic.shape[0] :])
+    counts, times, outputs = w.counts[i], w.times[row_of(w.times, i)], w.outputs[i]
+    start_margins(w)
+    clear(w.fired)
+    if counts[OUTPUTS] == 0 and times.shape[0] > 0 and times[0] <= w.base:
+        copy(w.y, outputs[0])
+        copy(w.q, outputs[0, w.n :])
         counts[OUTPUTS] = 1
     if counts[RECORDS] == 0:
-        _record(w, batch.steps[i], counts)
+        _record(w, w.records[i], counts)
     return GOOD
-
-
-@compiled
-def _ledger_error(w: Any, h: float, remaining: float) -> float:
-    """Error of the ledger over the step in units of what is allowed; infinite where one of its rates is."""
-    if w.ledger.shape[1] == 0:
-        return 0.0
-    singular = not finite(w.q_stage[stage_count(w.count[MEMBER]) - 1])
-    return np.inf if singular else ledger_norm(w, h, remaining)
 
 
 @compiled
 def _is_brief(w: Any, h: float) -> bool:
     """Whether a step is too brief for the ledger to shorten it: what ends the run there is told by the states."""
-    return bool(h < SHALLOW * (w.clock[BASE] + w.clock[TAU]))
+    return bool(h < SHALLOW * (w.base + w.tau))
 
 
 @compiled
 def _ledger_limit(w: Any, h: float, remaining: float) -> float:
     """Longest next step that serves the ledger; shorter than this one where this one does not."""
-    norm = 0.0 if _is_brief(w, h) else _ledger_error(w, h, remaining)
+    norm = 0.0 if _is_brief(w, h) else ledger_norm(w, h, remaining)
     if norm == 0.0:
         return np.inf
-    limit = h * ledger_factor(w, norm)
+    # The local error of a quadrature of order 2s - 1 goes with h^(2s).
+    limit = h * max(0.1, 0.9 * max(norm, NEGLIGIBLE) ** (-0.5 / stage_count(w.member)))
     if norm <= 1.0:
         return max(limit, h)
-    if w.count[REFUSED] > PATIENCE + w.count[STEPS] // 2:
+    if w.refused > PATIENCE + w.steps // 2:
         return np.inf
-    w.count[REFUSED] += 1
+    w.refused += 1
     return limit
 
 
@@ -190,7 +141,7 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
     if limit < h:
         return AGAIN, limit
     size = h
-    if w.kinds.shape[0] > 0:
+    if w.n_margins > 0:
         keep_sides(w)
         size = find_event(w, h)
     if size == AT_START:
@@ -204,146 +155,137 @@ def _judge(w: Any, h: float, limit: float, left: float, spacing: float) -> tuple
         if limit < size:
             restore_sides(w)
             return AGAIN, limit
-        if _is_brief(w, size) and _ledger_error(w, size, left) > 1.0:
+        if _is_brief(w, size) and ledger_norm(w, size, left) > 1.0:
             hold_rates(w, size)
     if size > BRIEF * spacing:
-        seen = unseen(w, size, spacing, left, w.clock[TAU] == 0.0, size == left or any_true(w.fired))
+        # Beside the ends of a segment and beside events there may be something narrow.
+        seen = unseen(w, size, spacing, left, w.tau == 0.0, size == left or any_true(w.fired))
         if seen < 1.0:
-            if w.kinds.shape[0] > 0:
-                restore_sides(w)
+            restore_sides(w)
             return MISSED, seen * size
     return TAKEN, size
 
 
 @compiled
-def _accept(w: Any, batch: Any, i: int, size: float, end: float, goes_on: bool) -> None:
+def _accept(w: Any, i: int, size: float, end: float, goes_on: bool) -> None:
     """Move on by a step of this size, with its outputs; to the very end of the segment where it is all but reached."""
-    counts = batch.counts[i]
-    reached = w.clock[BASE] + (w.clock[TAU] + size)
-    whole = size == (end - w.clock[BASE]) - w.clock[TAU] or reached >= end
-    times = batch.times[row_of(batch.times, i)]
-    counts[OUTPUTS] = write_outputs(w, times, batch.outputs[i], counts[OUTPUTS], size, end if whole else reached)
+    counts = w.counts[i]
+    reached = w.base + (w.tau + size)
+    whole = size == (end - w.base) - w.tau or reached >= end
+    times = w.times[row_of(w.times, i)]
+    counts[OUTPUTS] = write_outputs(w, times, w.outputs[i], counts[OUTPUTS], size, end if whole else reached)
     store_polynomial(w, size, 1.0)
     accept(w, size)
-    _record(w, batch.steps[i], counts)
+    _record(w, w.records[i], counts)
     if whole:
-        w.clock[TAU] = end - w.clock[BASE]
-        if w.kinds.shape[0] > 0 and goes_on:
+        w.tau = end - w.base
+        if w.n_margins > 0 and goes_on:
             mark_at_end(w)
 
 
 @compiled
-def _run_segment(w: Any, batch: Any, i: int, end: float, goes_on: bool) -> int:
+def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
     """Integrate to the end of a segment; GOOD, or the status that ends the run."""
     h, size_last, norm_last, aim = 0.0, 0.0, 1.0, np.inf
-    spacing, max_steps = batch.spacing[row_of(batch.spacing, i)], batch.max_steps[row_of(batch.max_steps, i)]
+    spacing = w.spacing[row_of(w.spacing, i)]
     if spacing < np.inf:
-        spacing = min(spacing, (end - w.clock[BASE]) / FEWEST)
-    while end - w.clock[BASE] - w.clock[TAU] > 0.0:
+        spacing = min(spacing, (end - w.base) / FEWEST)
+    while end - w.base - w.tau > 0.0:
         if h == 0.0:
-            outcome = _start(w, batch, i)
+            outcome = _start(w, i)
             if outcome != GOOD:
                 return outcome
-            h, size_last, norm_last, aim = first_size(w, end - w.clock[BASE]), 0.0, 1.0, np.inf
-        left = (end - w.clock[BASE]) - w.clock[TAU]
-        remaining = min(left, aim - w.clock[TAU])
-        outcome, h, norm, proposed = advance(
-            w, _next_try(h, remaining), max_steps, batch.counts[i], size_last, norm_last
-        )
+            h, size_last, norm_last, aim = first_size(w, end - w.base), 0.0, 1.0, np.inf
+        left = (end - w.base) - w.tau
+        remaining = min(left, aim - w.tau)
+        # Without a tiny last step.
+        if h >= remaining * (1.0 - SQRT_EPS):
+            h = remaining
+        elif 2.0 * h > remaining:
+            h = 0.5 * remaining
+        outcome, h, norm, proposed = advance(w, h, i, size_last, norm_last)
         if outcome != GOOD:
             return outcome
         finish_step(w, h)
         limit = _ledger_limit(w, h, left)
         verdict, size = _judge(w, h, limit, left, spacing)
         if verdict == ENDED:
-            _write_events(w, batch.events[i], batch.counts[i])
+            _write_events(w, w.events[i], w.counts[i])
             return EVENT
         if verdict != TAKEN:
             if verdict == MISSED:
                 # A step ends there, so that its last stage feels what the others have missed.
-                aim = w.clock[TAU] + size
-            w.count[REJECTED] += 1
-            w.clock[H_FACTORED] = 0.0
+                aim = w.tau + size
+            w.rejected += 1
+            w.h_factored = 0.0
             h = size
             continue
         if size == remaining:
             aim = np.inf
-        _accept(w, batch, i, size, end, goes_on)
+        _accept(w, i, size, end, goes_on)
         size_last, norm_last = h, max(norm, LEAST_NORM)
         h = min(keep_matrices(w, h, min(proposed, limit)), growing_size(w))
         if any_true(w.fired):
-            if _write_events(w, batch.events[i], batch.counts[i]):
+            if _write_events(w, w.events[i], w.counts[i]):
                 return EVENT
             h = 0.0
     return GOOD
 
 
 @compiled
-def _run(w: Any, batch: Any, i: int) -> None:
+def _run(w: Any, i: int) -> None:
     """One run, from its initial state through its segments."""
-    n, segments, counts, end = (
-        w.algebraic.shape[0],
-        batch.segments[row_of(batch.segments, i)],
-        batch.counts[i],
-        batch.ends[i],
-    )
+    segments, counts, end = w.segments[row_of(w.segments, i)], w.counts[i], w.ends[i]
     clear(w.fired)
-    clear(w.count)
-    clear(w.ledger[Q])
-    accounts, peaks = w.ledger.shape[1], batch.peaks[row_of(batch.peaks, i)]
-    copy(peaks[:accounts], w.ledger[Q_LARGEST])
-    copy(peaks[accounts:], w.margin[M_LARGEST])
-    copy(batch.y0[i], w.vector[Y])
-    clear(w.vector[YDOT])
+    w.steps = w.rejected = w.residuals = w.jacobians = w.factorizations = w.iterations = 0
+    w.member = w.last_member = w.tries = w.calm = w.fresh = w.refused = 0
+    clear(w.q)
+    peaks = w.peaks[row_of(w.peaks, i)]
+    copy(peaks[: w.n_ledger], w.q_largest)
+    copy(peaks[w.n_ledger :], w.margin_largest)
+    copy(w.y0[i], w.y)
+    clear(w.ydot)
     status = GOOD
     for segment in range(segments.shape[0] - 1):
-        w.clock[BASE] = segments[segment]
-        w.clock[TAU] = 0.0
-        copy(batch.parameters[i, segment], w.inputs[1 + 2 * n :])
-        more = batch.goes_on != 0 or segment + 2 < segments.shape[0]
-        status = _run_segment(w, batch, i, segments[segment + 1], more)
+        w.base = segments[segment]
+        w.tau = 0.0
+        copy(w.parameters[i, segment], w.inputs[1 + 2 * w.n :])
+        more = w.goes_on != 0 or segment + 2 < segments.shape[0]
+        status = _run_segment(w, i, segments[segment + 1], more)
         if status != GOOD:
             break
     counts[END] = FINISHED if status == GOOD else status
-    _write_state(w, end, segments[-1] if status == GOOD else w.clock[BASE] + w.clock[TAU])
-    if w.kinds.shape[0] > 0:
+    _write_state(w, end, segments[-1] if status == GOOD else w.base + w.tau)
+    if w.n_margins > 0:
         start_margins(w)
-        copy(w.margin[M_NOW], end[end.shape[0] - w.kinds.shape[0] :])
-    for k in range(STOP - FIRST_COUNTER):
-        counts[FIRST_COUNTER + k] = w.count[k]
+        copy(w.margin, end[end.shape[0] - w.n_margins :])
+    counters = w.steps, w.rejected, w.residuals, w.jacobians, w.factorizations, w.iterations
+    for k, counter in enumerate(counters):
+        counts[FIRST_COUNTER + k] = counter
 
 
 @compiled
-def _make_consistent(w: Any, batch: Any, i: int) -> None:
+def _make_consistent(w: Any, i: int) -> None:
     """The state of a row [t | y | ydot] made consistent in place."""
-    n, row = w.algebraic.shape[0], batch.ends[i]
+    n, row = w.n, w.ends[i]
     w.inputs[0] = row[0]
-    copy(batch.parameters[row_of(batch.parameters, i), 0], w.inputs[1 + 2 * n :])
-    copy(row[1 : 1 + n], w.vector[TRIAL])
-    copy(row[1 + n : 1 + 2 * n], w.vector[TRIAL_DOT])
-    batch.counts[i, END] = find_consistent(w)
-    copy(w.vector[TRIAL], row[1:])
-    copy(w.vector[TRIAL_DOT], row[1 + n :])
+    copy(w.parameters[row_of(w.parameters, i), 0], w.inputs[1 + 2 * n :])
+    copy(row[1 : 1 + n], w.trial)
+    copy(row[1 + n : 1 + 2 * n], w.trial_dot)
+    w.counts[i, END] = find_consistent(w)
+    copy(w.trial, row[1:])
+    copy(w.trial_dot, row[1 + n :])
 
 
-def run_batch(first: int, last: int, fields: Any) -> None:
-    """Runs first to last - 1 of a :data:`Batch`, whose fields come as a plain tuple, since Numba looks at the types of
-    a named one twice as long. Every run writes to its own rows, so the result does not depend on the threads. Without
-    segments the rows of ``ends`` are made consistent.
+def run_batch(first: int, last: int, memory: Any, batch: Any) -> None:
+    """Runs first to last - 1 of a batch, whose fields come as a plain tuple, since Numba looks at the types of a named
+    one twice as long. Every run writes to its own rows, so the result does not depend on the threads, each of which has
+    a memory of its own. Without segments the rows of ``ends`` are made consistent.
     """
-    batch = reference(Batch(*fields))
-    place = np.zeros(1, np.int64)
-    lay_out(batch, place)
-    memory = np.zeros(place[0] // 8, np.int64)
-    place[0] = memory.ctypes.data
-    w = reference(lay_out(batch, place))
-    w.clock[RTOL] = batch.rtol
-    w.clock[LOOSE] = loosening(batch.rtol)
-    copy(batch.atol, w.vector[ATOL])
+    w = lay_out(batch, memory)
+    w.loose = loosening(w.rtol)
     for i in range(first, last):
-        if batch.segments.shape[1] == 0:
-            _make_consistent(w, batch, i)
+        if w.segments.shape[1] == 0:
+            _make_consistent(w, i)
         else:
-            _run(w, batch, i)
-    # A last use: Numba releases an array after the last statement that names it.
-    memory[0] = 0
+            _run(w, i)

@@ -9,40 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.dense import interpolate_rate, keep_polynomial, put_scanned, scan_step
+from surfacechem.solve.radau.dense import finish_step, keep_polynomial, put_inside, put_scanned, scan_step
 from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
-from surfacechem.solve.radau.step import estimate_error, finish_step, store_polynomial, too_small
+from surfacechem.solve.radau.step import estimate_error, store_polynomial, too_small
 from surfacechem.solve.radau.tables import EDGE, SCANNED
-from surfacechem.solve.radau.work import (
-    BASE,
-    H_FACTORED,
-    M_BEFORE,
-    M_EARLIER,
-    M_FIRST,
-    M_FIRST_SIDE,
-    M_HIGH,
-    M_LARGEST,
-    M_LAST_SIDE,
-    M_LOW,
-    M_NOW,
-    M_PROBE,
-    M_SIDE,
-    M_SLOPE,
-    MARGINS,
-    MEMBER,
-    RTOL,
-    TAU,
-    TRIAL,
-    TRIAL_DOT,
-    YDOT,
-    Y,
-    any_true,
-    clear,
-    compiled,
-    copy,
-    evaluate,
-    set_inputs,
-)
+from surfacechem.solve.radau.work import MARGINS, any_true, clear, compiled, copy, evaluate, put
 from surfacechem.tolerances import CBRT_EPS, EPS, NOISE, ROUNDING, SHALLOW, SOLVED, SQRT_EPS, TINY
 
 LEAVING, AT_ZERO, BEYOND, RISING, FALLING, OUT_OF_PLAY = 0.0, 2.0, -2.0, 3.0, -3.0, 4.0
@@ -60,7 +31,7 @@ AT_START, SHORTER = -1.0, -2.0
 @compiled
 def noise(w: Any, m: int) -> float:
     """Size of a margin that is zero for all that can be told: its rounding, in proportion to the largest seen."""
-    return float(NOISE * w.margin[M_LARGEST, m])
+    return float(NOISE * w.margin_largest[m])
 
 
 @compiled
@@ -72,59 +43,60 @@ def is_limit(w: Any, m: int) -> bool:
 @compiled
 def start_margins(w: Any) -> None:
     """Sides of zero at a start or restart."""
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    set_inputs(w, w.vector[Y], w.vector[YDOT])
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-    copy(w.margin[M_NOW], w.margin[M_BEFORE])
-    for m in range(w.margin.shape[1]):
-        value = w.margin[M_NOW, m]
+    if w.n_margins == 0:
+        return
+    put(w, 0.0, w.y, w.ydot)
+    evaluate(w, MARGINS, w.margin)
+    copy(w.margin, w.margin_before)
+    for m in range(w.n_margins):
+        value = w.margin[m]
         if w.kinds[m, 4] == 0:
-            w.margin[M_SIDE, m] = OUT_OF_PLAY
+            w.side[m] = OUT_OF_PLAY
             continue
-        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
+        w.margin_largest[m] = max(w.margin_largest[m], abs(value))
         if w.fired[m] != 0:
-            w.margin[M_SIDE, m] = LEAVING
+            w.side[m] = LEAVING
         elif abs(value) <= noise(w, m):
-            w.margin[M_SIDE, m] = AT_ZERO if is_limit(w, m) else LEAVING
+            w.side[m] = AT_ZERO if is_limit(w, m) else LEAVING
         elif value > 0.0:
-            w.margin[M_SIDE, m] = 1.0
+            w.side[m] = 1.0
         else:
-            w.margin[M_SIDE, m] = BEYOND if is_limit(w, m) else -1.0
+            w.side[m] = BEYOND if is_limit(w, m) else -1.0
 
 
 @compiled
 def keep_sides(w: Any) -> None:
     """Remember the margins at the start of a step."""
-    copy(w.margin[M_SIDE], w.margin[M_FIRST_SIDE])
-    copy(w.margin[M_BEFORE], w.margin[M_FIRST])
+    copy(w.side, w.side_first)
+    copy(w.margin_before, w.margin_first)
 
 
 @compiled
 def restore_sides(w: Any) -> None:
     """Go back to the margins at the start of a step that is made again; none has fired."""
-    copy(w.margin[M_FIRST_SIDE], w.margin[M_SIDE])
-    copy(w.margin[M_FIRST], w.margin[M_BEFORE])
+    copy(w.side_first, w.side)
+    copy(w.margin_first, w.margin_before)
     clear(w.fired)
 
 
 @compiled
 def update_sides(w: Any) -> None:
     """Move on to the margins of now: their sides, the largest seen, and what was before."""
-    copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
-    copy(w.margin[M_SIDE], w.margin[M_LAST_SIDE])
-    for m in range(w.margin.shape[1]):
-        value, side = w.margin[M_NOW, m], w.margin[M_SIDE, m]
-        w.margin[M_LARGEST, m] = max(w.margin[M_LARGEST, m], abs(value))
+    copy(w.margin_before, w.margin_earlier)
+    copy(w.side, w.side_last)
+    for m in range(w.n_margins):
+        value, side = w.margin[m], w.side[m]
+        w.margin_largest[m] = max(w.margin_largest[m], abs(value))
         least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
         if abs(side) < AT_ZERO and abs(value) > least:
-            w.margin[M_SIDE, m] = 1.0 if value > 0.0 else -1.0
-        w.margin[M_BEFORE, m] = value
+            w.side[m] = 1.0 if value > 0.0 else -1.0
+        w.margin_before[m] = value
 
 
 @compiled
 def crosses(w: Any, m: int) -> bool:
     """Whether a margin lies across zero from its side, in a direction that counts; a strict one by more than noise."""
-    side, value, direction = w.margin[M_SIDE, m], w.margin[M_NOW, m], w.kinds[m, 1]
+    side, value, direction = w.side[m], w.margin[m], w.kinds[m, 1]
     if w.kinds[m, 3] == 1:
         return bool(side == 1.0 and value < -noise(w, m))
     falling = side == 1.0 and value <= 0.0 and direction <= 0
@@ -135,47 +107,33 @@ def crosses(w: Any, m: int) -> bool:
 @compiled
 def mark_at_end(w: Any) -> None:
     """Mark the kinks that reach zero with the end of a segment: the next one cannot tell on which side they were."""
-    set_inputs(w, w.vector[Y], w.vector[YDOT])
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
-    for m in range(w.kinds.shape[0]):
-        side = w.margin[M_SIDE, m]
+    put(w, 0.0, w.y, w.ydot)
+    evaluate(w, MARGINS, w.margin)
+    for m in range(w.n_margins):
+        side = w.side[m]
         counts = w.kinds[m, 0] == 0 and abs(side) == 1.0 and side * w.kinds[m, 1] <= 0.0
-        if counts and abs(w.margin[M_NOW, m]) <= noise(w, m):
+        if counts and abs(w.margin[m]) <= noise(w, m):
             w.fired[m] = 1
 
 
 @compiled
 def _leave(w: Any, m: int, rises: bool, held: float) -> None:
     """A limit that starts at zero or beyond goes this way; one that rises from zero has this side."""
-    beyond = w.margin[M_SIDE, m] == BEYOND
-    w.margin[M_SIDE, m] = FALLING if not rises else -1.0 if beyond else held
+    beyond = w.side[m] == BEYOND
+    w.side[m] = FALLING if not rises else -1.0 if beyond else held
 
 
 @compiled
 def _follow_rates(w: Any, h: float) -> None:
     """Sides of limits that start at zero or beyond and leave it as they would at the rate at which the step starts."""
-    for j in range(w.algebraic.shape[0]):
-        w.vector[TRIAL, j] = w.vector[Y, j] + EDGE * h * w.vector[YDOT, j]
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + EDGE * h)
-    set_inputs(w, w.vector[TRIAL], w.vector[YDOT])
-    evaluate(w, MARGINS, w.margin[M_PROBE].ctypes.data)
-    for m in range(w.margin.shape[1]):
-        by_rate, change = w.margin[M_PROBE, m] - w.margin[M_BEFORE, m], w.margin[M_NOW, m] - w.margin[M_BEFORE, m]
-        if abs(w.margin[M_SIDE, m]) == AT_ZERO and abs(by_rate) > noise(w, m) and 0.5 < change / by_rate < 2.0:
+    for j in range(w.n):
+        w.trial[j] = w.y[j] + EDGE * h * w.ydot[j]
+    put(w, EDGE * h, w.trial, w.ydot)
+    evaluate(w, MARGINS, w.margin_probe)
+    for m in range(w.n_margins):
+        by_rate, change = w.margin_probe[m] - w.margin_before[m], w.margin[m] - w.margin_before[m]
+        if abs(w.side[m]) == AT_ZERO and abs(by_rate) > noise(w, m) and 0.5 < change / by_rate < 2.0:
             _leave(w, m, by_rate > 0.0, 1.0)
-
-
-@compiled
-def _any_at_zero(w: Any) -> bool:
-    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
-    found = False
-    for m in range(w.margin.shape[1]):
-        if w.margin[M_SIDE, m] == RISING:
-            w.margin[M_SIDE, m] = AT_ZERO if abs(w.margin[M_BEFORE, m]) <= noise(w, m) else 1.0
-        found = found or abs(w.margin[M_SIDE, m]) == AT_ZERO
-        w.margin[M_LOW, m] = w.margin[M_HIGH, m] = 0.0
-    return found
 
 
 @compiled
@@ -186,41 +144,40 @@ def _sides_are_known(w: Any, h: float) -> bool:
     wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
     goes farther.
     """
-    if not _any_at_zero(w):
+    found = False
+    for m in range(w.n_margins):
+        if w.side[m] == RISING:
+            w.side[m] = AT_ZERO if abs(w.margin_before[m]) <= noise(w, m) else 1.0
+        found = found or abs(w.side[m]) == AT_ZERO
+        w.low[m] = w.high[m] = 0.0
+    if not found:
         return True
     # How far each falls and rises in the step, into the rows that will hold brackets.
-    for i in range(4 * w.count[MEMBER] + 9):
+    for i in range(4 * w.member + 9):
         put_scanned(w, h, i)
-        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+        evaluate(w, MARGINS, w.margin)
         if i == 0:
             _follow_rates(w, h)
-        for m in range(w.margin.shape[1]):
-            change = w.margin[M_NOW, m] - (w.margin[M_BEFORE, m] if w.margin[M_SIDE, m] == BEYOND else 0.0)
-            w.margin[M_LOW, m] = max(w.margin[M_LOW, m], -change)
-            w.margin[M_HIGH, m] = max(w.margin[M_HIGH, m], change)
+        for m in range(w.n_margins):
+            change = w.margin[m] - (w.margin_before[m] if w.side[m] == BEYOND else 0.0)
+            w.low[m] = max(w.low[m], -change)
+            w.high[m] = max(w.high[m], change)
     known, shortest = True, too_small(w, 0.25 * h)
-    for m in range(w.margin.shape[1]):
-        fall, rise = w.margin[M_LOW, m], w.margin[M_HIGH, m]
-        small = max(noise(w, m), w.clock[RTOL] * max(fall, rise))
-        if abs(w.margin[M_SIDE, m]) == AT_ZERO and max(fall, rise) > noise(w, m):
+    for m in range(w.n_margins):
+        fall, rise = w.low[m], w.high[m]
+        small = max(noise(w, m), w.rtol * max(fall, rise))
+        if abs(w.side[m]) == AT_ZERO and max(fall, rise) > noise(w, m):
             known = known and (shortest or min(fall, rise) <= small)
             _leave(w, m, rise > fall, RISING)
     return known
 
 
 @compiled
-def _margin_inside(w: Any, h: float, x: float, row: int) -> None:
-    """Margins at the fraction x of the step, from the polynomial."""
-    interpolate_rate(w, h, x)
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
-    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    evaluate(w, MARGINS, w.margin[row].ctypes.data)
-
-
-@compiled
 def _probe(w: Any, h: float, m: int, x: float) -> float:
-    _margin_inside(w, h, x, M_PROBE)
-    return float(w.margin[M_PROBE, m])
+    """A margin at the fraction x of the step, from the polynomial."""
+    put_inside(w, h, x)
+    evaluate(w, MARGINS, w.margin_probe)
+    return float(w.margin_probe[m])
 
 
 @compiled
@@ -247,11 +204,11 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
     By parabolas, and by a tenth of the larger part where these make no progress, as close as the value of a minimum
     tells its place (after Brent 1973, Algorithms for Minimization without Derivatives, chapter 5).
     """
-    side = w.margin[M_SIDE, m]
+    side = w.side[m]
     touches = is_limit(w, m) and w.kinds[m, 3] == 0
     # A strict one has to pass zero by more than the error of the states, which may be less than the tolerance: at loose
     # tolerances a fixed part counts all the same, since what is brief is shallow, too.
-    shallow = max(min(w.clock[RTOL], SHALLOW) * w.margin[M_LARGEST, m], noise(w, m))
+    shallow = max(min(w.rtol, SHALLOW) * w.margin_largest[m], noise(w, m))
     least = shallow if w.kinds[m, 3] == 1 else 0.0
     at_a, at_b, at_c = side * _probe(w, h, m, a), side * _probe(w, h, m, b), side * _probe(w, h, m, c)
     for _iteration in range(80):
@@ -275,15 +232,15 @@ def _reaches(w: Any, h: float, m: int, a: float, b: float, c: float) -> float:
 @compiled
 def _dips(w: Any, h: float, m: int, a: float, b: float, c: float) -> bool:
     """Whether a margin reaches zero between three points though it is not across it at any; keeps the bracket."""
-    side = w.margin[M_SIDE, m]
+    side = w.side[m]
     if abs(side) != 1.0 or side * w.kinds[m, 1] > 0.0:
         return False
-    values = side * w.margin[M_EARLIER, m], side * w.margin[M_BEFORE, m], side * w.margin[M_NOW, m]
+    values = side * w.margin_earlier[m], side * w.margin_before[m], side * w.margin[m]
     if not _may_reach(a, b, c, values[0], values[1], values[2]):
         return False
     keep_polynomial(w)
     x = _reaches(w, h, m, a, b, c)
-    w.margin[M_LOW, m], w.margin[M_HIGH, m] = a, x
+    w.low[m], w.high[m] = a, x
     return x > 0.0
 
 
@@ -293,14 +250,14 @@ def _mark(w: Any, h: float, earlier: float, before: float, x: float) -> float:
     passed there, else 0.
     """
     found = 0.0
-    for m in range(w.kinds.shape[0]):
-        w.margin[M_LOW, m], w.margin[M_HIGH, m] = before, x
+    for m in range(w.n_margins):
+        w.low[m], w.high[m] = before, x
         # A limit that goes the wrong way from zero, or from beyond it, has left it by now.
-        falls = w.margin[M_SIDE, m] == FALLING and w.margin[M_NOW, m] < -noise(w, m)
+        falls = w.side[m] == FALLING and w.margin[m] < -noise(w, m)
         if falls and before <= EDGE:
             found = AT_START
         elif falls:
-            w.margin[M_HIGH, m] = before
+            w.high[m] = before
         marked = falls or crosses(w, m) or (before > 0.0 and _dips(w, h, m, earlier, before, x))
         w.fired[m] = marked
         if marked and found == 0.0:
@@ -317,18 +274,19 @@ def _scan(w: Any, h: float) -> tuple[float, float]:
     if not _sides_are_known(w, h):
         return 0.0, SHORTER
     earlier, before = 0.0, 0.0
-    for i in range(4 * w.count[MEMBER] + 9):
-        x = SCANNED[w.count[MEMBER], i]
+    for i in range(4 * w.member + 9):
+        x = SCANNED[w.member, i]
         put_scanned(w, h, i)
-        evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+        evaluate(w, MARGINS, w.margin)
         found = _mark(w, h, earlier, before, x)
         if found > 0.0:
             # Others may have their lowest point in this interval, which shows from a point just behind it.
             keep_polynomial(w)
-            copy(w.margin[M_BEFORE], w.margin[M_EARLIER])
-            copy(w.margin[M_NOW], w.margin[M_BEFORE])
-            _margin_inside(w, h, x + EDGE, M_NOW)
-            for m in range(w.kinds.shape[0]):
+            copy(w.margin_before, w.margin_earlier)
+            copy(w.margin, w.margin_before)
+            put_inside(w, h, x + EDGE)
+            evaluate(w, MARGINS, w.margin)
+            for m in range(w.n_margins):
                 if w.fired[m] == 0:
                     w.fired[m] = _dips(w, h, m, before, x, x + EDGE)
         if found != 0.0:
@@ -344,7 +302,7 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
 
     Source: Dowell & Jarratt (1971), A modified regula falsi method, BIT 11.
     """
-    side = w.margin[M_SIDE, m]
+    side = w.side[m]
     value_high, value_low = _probe(w, h, m, high), _probe(w, h, m, low)
     if value_high * side > 0.0:
         # It touches zero there.
@@ -372,14 +330,14 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
 def _first(w: Any, h: float) -> tuple[int, float]:
     """The marked margin that reaches zero first, and where; the slopes of all that cross, per step."""
     first, earliest = -1, 2.0
-    for m in range(w.kinds.shape[0]):
-        w.margin[M_SLOPE, m] = 0.0
+    for m in range(w.n_margins):
+        w.margin_slope[m] = 0.0
         if w.fired[m] != 0:
-            x = _bracketed(w, h, m, w.margin[M_LOW, m], w.margin[M_HIGH, m])
-            if _probe(w, h, m, x) * w.margin[M_SIDE, m] <= 0.0:
+            x = _bracketed(w, h, m, w.low[m], w.high[m])
+            if _probe(w, h, m, x) * w.side[m] <= 0.0:
                 width = CBRT_EPS * max(x, ROUNDING)
                 rise = _probe(w, h, m, x + width) - _probe(w, h, m, x - width)
-                w.margin[M_SLOPE, m] = rise / (2.0 * width)
+                w.margin_slope[m] = rise / (2.0 * width)
             if x < earliest:
                 first, earliest = m, x
     return first, earliest
@@ -390,7 +348,7 @@ def _step_onto(w: Any, size: float) -> float:
     """Repeat the step with another size, with the full order of the method, and the margins at its end; returns the
     norm of its error.
     """
-    w.clock[H_FACTORED] = 0.0
+    w.h_factored = 0.0
     if not factor_newton(w, size):
         return np.inf
     predict(w, size)
@@ -399,9 +357,15 @@ def _step_onto(w: Any, size: float) -> float:
     store_polynomial(w, size, 0.0)
     norm = estimate_error(w, size)
     finish_step(w, size)
-    set_stage(w, stage_count(w.count[MEMBER]) - 1, size)
-    evaluate(w, MARGINS, w.margin[M_NOW].ctypes.data)
+    set_stage(w, stage_count(w.member) - 1, size)
+    evaluate(w, MARGINS, w.margin)
     return norm
+
+
+@compiled
+def _resolution(w: Any, size: float) -> float:
+    """What time resolves at the end of a step: half the spacing of doubles there."""
+    return float(0.5 * EPS * (abs(w.base + w.tau) + size))
 
 
 @compiled
@@ -410,26 +374,25 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
     step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
     that all but touches it none to be trusted.
     """
-    side, slope = w.margin[M_SIDE, m], w.margin[M_SLOPE, m]
+    side, slope = w.side[m], w.margin_slope[m]
     size = best = x * h
-    closest = np.inf
+    closest, nudge = np.inf, 0.0
     store_polynomial(w, h, 0.0)
-    resolution = 0.5 * EPS * (abs(w.clock[BASE] + w.clock[TAU]) + size)
-    nudge = 0.0
+    resolution = _resolution(w, size)
     for attempt in range(12):
         if not _step_onto(w, size) < worst:
             return 0.0
-        value = w.margin[M_NOW, m]
+        value = w.margin[m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
         # What is left after a few attempts is the rounding of the margin itself.
-        still = abs(change) <= resolution * (1 + attempt)
-        if crossed and (still or value == 0.0 or nudge > 0.0 or attempt >= 6):
+        rounded = value == 0.0 or nudge > 0.0 or attempt >= 6 or abs(change) <= resolution * (1 + attempt)
+        if crossed and rounded:
             return size
         if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
             # Where it came closest it is zero, or the polynomial was too coarse to tell.
-            touches = closest <= ALIKE * noise(w, m) and _step_onto(w, best) < worst
-            return best if touches else 0.0
+            size, touches = best, closest <= ALIKE * noise(w, m)
+            return size if touches and _step_onto(w, size) < worst else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
         # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
@@ -444,15 +407,14 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
     """A step that ends just short of a kink, where it counts as zero or time knows nothing nearer: beyond it the last
     stage would feel what begins there.
     """
-    side = w.margin[M_SIDE, m]
-    slope = max(abs(w.margin[M_SLOPE, m]) / h, abs(w.margin[M_BEFORE, m]) / size)
-    resolution = 0.5 * EPS * (abs(w.clock[BASE] + w.clock[TAU]) + size)
+    side = w.side[m]
+    slope = max(abs(w.margin_slope[m]) / h, abs(w.margin_before[m]) / size)
     for attempt in range(40):
-        shorter = size - resolution * 2.0**attempt
+        shorter = size - _resolution(w, size) * 2.0**attempt
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):
             break
         nearest = 2.0 * slope * (size - shorter)
-        if 0.0 < w.margin[M_NOW, m] * side <= max(nearest, noise(w, m)):
+        if 0.0 < w.margin[m] * side <= max(nearest, noise(w, m)):
             return shorter
     _step_onto(w, size)
     return size
@@ -461,15 +423,15 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
 @compiled
 def _resolved(w: Any, size: float) -> float:
     """Difference of two times that are one for all that can be told."""
-    return float(SOLVED * abs(w.clock[BASE] + w.clock[TAU]) + ROUNDING * size)
+    return float(SOLVED * abs(w.base + w.tau) + ROUNDING * size)
 
 
 @compiled
 def _mark_coincident(w: Any, h: float, size: float) -> None:
     """Keep as fired the margins that are across zero too, or within rounding of it in time."""
     near = _resolved(w, size)
-    for m in range(w.kinds.shape[0]):
-        value, slope = w.margin[M_NOW, m], w.margin[M_SLOPE, m]
+    for m in range(w.n_margins):
+        value, slope = w.margin[m], w.margin_slope[m]
         close = abs(value) * h <= near * abs(slope) if slope != 0.0 else abs(value) <= noise(w, m)
         w.fired[m] = crosses(w, m) or (w.fired[m] != 0 and close)
 
@@ -478,7 +440,7 @@ def _mark_coincident(w: Any, h: float, size: float) -> None:
 def _kink_at(w: Any, first: int) -> int:
     """The kink at which a step ends: the margin that it went for, or another that fires there; -1 if there is none."""
     found = -1
-    for m in range(w.kinds.shape[0]):
+    for m in range(w.n_margins):
         if w.kinds[m, 0] == 0 and w.kinds[m, 2] == 0 and (m == first or (found < 0 and w.fired[m] != 0)):
             found = m
     return found
@@ -498,7 +460,7 @@ def find_event(w: Any, h: float) -> float:
     first, earliest = _first(w, h)
     if earliest < before:
         # A lowest point shows one point later: the sides that hold there are those of the point before it.
-        copy(w.margin[M_LAST_SIDE], w.margin[M_SIDE])
+        copy(w.side_last, w.side)
     size = _refine(w, h, first, max(earliest, TINY), 1.0 if w.kinds[first, 2] == 1 else np.inf)
     if size == 0.0:
         restore_sides(w)
@@ -510,8 +472,8 @@ def find_event(w: Any, h: float) -> float:
         _mark_coincident(w, h, size)
         w.fired[short] = 1
     # Where a strict margin is not zero at the end, the polynomial has seen what is not there.
-    left = w.margin[M_NOW, first] * w.margin[M_SIDE, first]
-    reached = left <= ALIKE * noise(w, first) + abs(w.margin[M_SLOPE, first]) * _resolved(w, size) / h
+    left = w.margin[first] * w.side[first]
+    reached = left <= ALIKE * noise(w, first) + abs(w.margin_slope[first]) * _resolved(w, size) / h
     w.fired[first] = w.kinds[first, 3] == 0 or reached
     if w.fired[first] == 0 and not any_true(w.fired):
         update_sides(w)

@@ -29,7 +29,10 @@ def size_of(value: Any) -> float:
 
 
 @compiled
-def _row_scales(a: Any, columns: Any, rows: Any) -> bool:
+def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> bool:
+    """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
+    threshold.
+    """
     n = a.shape[0]
     for i in range(n):
         largest = 0.0
@@ -38,48 +41,26 @@ def _row_scales(a: Any, columns: Any, rows: Any) -> bool:
         if not 0.0 < largest < np.inf:
             return False
         rows[i] = 1.0 / largest
-    return True
-
-
-@compiled
-def _swap(a: Any, rows: Any, k: int, p: int) -> None:
-    for j in range(a.shape[0]):
-        a[k, j], a[p, j] = a[p, j], a[k, j]
-    rows[k], rows[p] = rows[p], rows[k]
-
-
-@compiled
-def _pivot(a: Any, rows: Any, k: int) -> int:
-    p, best = k, -1.0
-    for i in range(k, a.shape[0]):
-        size = size_of(a[i, k]) * rows[i]
-        if size > best:
-            p, best = i, size
-    return p
-
-
-@compiled
-def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> bool:
-    """Replace a by its factors, the inverse pivots on the diagonal; False if a scaled pivot is not above the
-    threshold.
-    """
-    n = a.shape[0]
-    if not _row_scales(a, columns, rows):
-        return False
     for k in range(n):
-        p = _pivot(a, rows, k)
+        p, best = k, -1.0
+        for i in range(k, n):
+            size = size_of(a[i, k]) * rows[i]
+            if size > best:
+                p, best = i, size
         if not size_of(a[p, k]) * rows[p] * columns[k] > threshold:
             return False
         order[k] = p
         if p != k:
-            _swap(a, rows, k, p)
+            for j in range(n):
+                a[k, j], a[p, j] = a[p, j], a[k, j]
+            rows[k], rows[p] = rows[p], rows[k]
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):
-            factor = a[i, k] * inverse
-            a[i, k] = factor
+            multiple = a[i, k] * inverse
+            a[i, k] = multiple
             for j in range(k + 1, n):
-                a[i, j] -= factor * a[k, j]
+                a[i, j] -= multiple * a[k, j]
     return True
 
 
@@ -103,26 +84,21 @@ def solve(a: Any, order: Any, x: Any) -> None:
 
 
 @compiled
-def _eliminate(bands: Any, first: int, end: int) -> bool:
-    """Remove the outward entries; leaves inverse pivots and the factors of the right-hand side."""
-    for i in range(end - 1, first - 1, -1):
-        if i < end - 1:
-            bands[i, 2] *= bands[i + 1, 1]
-            bands[i, 1] -= bands[i, 2] * bands[i + 1, 0]
-        if not 0.0 < size_of(bands[i, 1]) < np.inf:
-            return False
-        bands[i, 1] = 1.0 / bands[i, 1]
-    return True
-
-
-@compiled
 def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
-    """Eliminate the chains from the core, which is not yet factored; False where a pivot vanishes."""
+    """Eliminate the chains from the core, which is not yet factored; False where a pivot vanishes.
+
+    It leaves inverse pivots in the bands, and beside them the factors of the right-hand side.
+    """
     n = core.shape[0]
     for c in range(chains.shape[0]):
-        first, anchor = chains[c, 0] - n, chains[c, 2]
-        if not _eliminate(bands, first, chains[c, 1] - n):
-            return False
+        first, end, anchor = chains[c, 0] - n, chains[c, 1] - n, chains[c, 2]
+        for i in range(end - 1, first - 1, -1):
+            if i < end - 1:
+                bands[i, 2] *= bands[i + 1, 1]
+                bands[i, 1] -= bands[i, 2] * bands[i + 1, 0]
+            if not 0.0 < size_of(bands[i, 1]) < np.inf:
+                return False
+            bands[i, 1] = 1.0 / bands[i, 1]
         for i in range(n):
             border[i, c] *= bands[first, 1]
             if anchor >= 0:
@@ -131,20 +107,35 @@ def fold_chains(core: Any, border: Any, bands: Any, chains: Any) -> bool:
 
 
 @compiled
-def _before(border: Any, bands: Any, chains: Any, x: Any) -> None:
-    """The right-hand side of the core with the chains eliminated."""
-    n = border.shape[0]
+def shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
+    """G_y + shift G_ydot."""
+    stiffness, mass = derivatives[0], derivatives[1]
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = shift * mass[i, j] + stiffness[i, j]
+
+
+@compiled
+def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool:
+    """Eliminate the chains of G_y + shift G_ydot from its core."""
+    shifted(w.border_derivatives, shift, border)
+    shifted(w.band_derivatives, shift, bands)
+    return bool(fold_chains(core, border, bands, w.chains))
+
+
+@compiled
+def _solve_chained(chains: Any, core: Any, border: Any, bands: Any, order: Any, x: Any) -> None:
+    """Overwrite the right-hand side by the solution with a matrix whose chains are folded into its core."""
+    n = core.shape[0]
+    # The right-hand side of the core with the chains eliminated, from their far ends.
     for c in range(chains.shape[0]):
         first = chains[c, 0]
         for i in range(chains[c, 1] - 2, first - 1, -1):
             x[i] -= bands[i - n, 2] * x[i + 1]
         for i in range(n):
             x[i] -= border[i, c] * x[first]
-
-
-@compiled
-def _behind(n: int, bands: Any, chains: Any, x: Any) -> None:
-    """The solution along the chains from that of the core."""
+    solve(core, order, x)
+    # The solution along the chains, from that of the core outwards.
     for c in range(chains.shape[0]):
         first, anchor = chains[c, 0], chains[c, 2]
         if anchor >= 0:
@@ -157,37 +148,17 @@ def _behind(n: int, bands: Any, chains: Any, x: Any) -> None:
 @compiled
 def solve_real(w: Any, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the real matrix."""
-    chained = w.chains.shape[0] > 0
-    if chained:
-        _before(w.real_border, w.real_bands, w.chains, x)
-    solve(w.real, w.order[0], x)
-    if chained:
-        _behind(w.real.shape[0], w.real_bands, w.chains, x)
+    if w.links > 0:
+        _solve_chained(w.chains, w.real, w.real_border, w.real_bands, w.order[0], x)
+    else:
+        solve(w.real, w.order[0], x)
 
 
 @compiled
 def solve_complex(w: Any, pair: int, x: Any) -> None:
     """Overwrite the right-hand side by the solution with the complex matrix of a pair of eigenvalues."""
-    chained = w.chains.shape[0] > 0
-    if chained:
-        _before(w.complex_border[pair], w.complex_bands[pair], w.chains, x)
-    solve(w.complex[pair], w.order[1 + pair], x)
-    if chained:
-        _behind(w.real.shape[0], w.complex_bands[pair], w.chains, x)
-
-
-@compiled
-def _shifted(derivatives: Any, shift: Any, matrix: Any) -> None:
-    """G_y + shift G_ydot."""
-    stiffness, mass = derivatives[0], derivatives[1]
-    for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
-            matrix[i, j] = shift * mass[i, j] + stiffness[i, j]
-
-
-@compiled
-def fold_shifted(w: Any, shift: Any, core: Any, border: Any, bands: Any) -> bool:
-    """Eliminate the chains of G_y + shift G_ydot from its core."""
-    _shifted(w.border_derivatives, shift, border)
-    _shifted(w.band_derivatives, shift, bands)
-    return bool(fold_chains(core, border, bands, w.chains))
+    if w.links > 0:
+        border, bands = w.complex_border[pair], w.complex_bands[pair]
+        _solve_chained(w.chains, w.complex[pair], border, bands, w.order[1 + pair], x)
+    else:
+        solve(w.complex[pair], w.order[1 + pair], x)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.solve.radau.linear import factor, fold_shifted, solve_complex, solve_real
+from surfacechem.solve.radau.linear import factor, fold_shifted, shifted, solve_complex, solve_real
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
     COARSE,
@@ -23,39 +23,14 @@ from surfacechem.solve.radau.tables import (
     TO_PARTS,
 )
 from surfacechem.solve.radau.work import (
-    BASE,
-    COLUMNS,
-    CONTRACTION,
-    DELTA,
-    FACTORIZATIONS,
-    GUESSED,
-    H_LAST,
-    ITERATIONS,
     JACOBIAN,
-    JACOBIANS,
-    LAST_MEMBER,
-    MEMBER,
-    OFFSET,
-    PIVOT,
     RESIDUAL,
-    RESIDUALS,
-    RHS,
-    ROUNDOFF,
-    RTOL,
-    SCALE,
-    TAU,
-    THETA,
-    TRIES,
-    WEIGHT,
-    YDOT,
-    Q,
-    Y,
     clear,
     combine,
     compiled,
     evaluate,
     finite,
-    set_inputs,
+    put,
 )
 from surfacechem.tolerances import EPS, NEGLIGIBLE, TINY
 
@@ -110,17 +85,10 @@ def nested(k: int, top: int, x: float, row: Any) -> float:
 
 
 @compiled
-def _differentiate(w: Any) -> None:
-    """Evaluate G_y and G_ydot at the inputs."""
-    evaluate(w, JACOBIAN, w.jacobian.ctypes.data)
-    w.count[JACOBIANS] += 1
-
-
-@compiled
 def _differentiate_at_start(w: Any) -> None:
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    set_inputs(w, w.vector[Y], w.vector[YDOT])
-    _differentiate(w)
+    put(w, 0.0, w.y, w.ydot)
+    evaluate(w, JACOBIAN, w.jacobian)
+    w.jacobians += 1
 
 
 @compiled
@@ -128,29 +96,11 @@ def _row_sizes(w: Any, sizes: Any) -> None:
     """Size of the equations of the core by their derivatives and the typical sizes of the states; NaN where they or
     those by the rates are not finite.
     """
-    for i in range(w.jacobian.shape[1]):
+    for i in range(w.core):
         total = 0.0
-        for j in range(w.jacobian.shape[1]):
-            total += abs(w.jacobian[0, i, j]) * w.vector[SCALE, j] + 0.0 * w.jacobian[1, i, j]
+        for j in range(w.core):
+            total += abs(w.jacobian[0, i, j]) * w.scale[j] + 0.0 * w.jacobian[1, i, j]
         sizes[i] = total
-
-
-@compiled
-def _differentiate_midway(w: Any, h: float) -> None:
-    """Evaluate G_y and G_ydot at the middle of the step as it is foreseen; at its start where the equations would be
-    far stiffer: a step through states that are foreseen wrongly must not pass for one that has converged.
-    """
-    known, sizes = w.vector[COLUMNS], w.vector[RHS]
-    _row_sizes(w, known)
-    set_stage(w, w.count[MEMBER] + 1, h)
-    _differentiate(w)
-    _row_sizes(w, sizes)
-    stiffer = False
-    for i in range(w.jacobian.shape[1]):
-        # Not >: what is not finite is stiffer, too.
-        stiffer = stiffer or not sizes[i] <= STIFFER * known[i]
-    if stiffer:
-        _differentiate_at_start(w)
 
 
 @compiled
@@ -159,10 +109,22 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
     start.
     """
     _differentiate_at_start(w)
-    if foresee and w.clock[OFFSET] == 1.0 and 0.0 < h <= FORESEEN * w.clock[H_LAST]:
-        _differentiate_midway(w, h)
+    if foresee and w.offset == 1.0 and 0.0 < h <= FORESEEN * w.h_last:
+        known, sizes = w.columns, w.rhs
+        _row_sizes(w, known)
+        set_stage(w, w.member + 1, h)
+        evaluate(w, JACOBIAN, w.jacobian)
+        w.jacobians += 1
+        _row_sizes(w, sizes)
+        stiffer = False
+        for i in range(w.core):
+            # Not >: what is not finite is stiffer, too.
+            stiffer = stiffer or not sizes[i] <= STIFFER * known[i]
+        if stiffer:
+            # A step through states that are foreseen wrongly must not pass for one that has converged.
+            _differentiate_at_start(w)
     for part in range(2):
-        for i in range(w.jacobian.shape[1]):
+        for i in range(w.core):
             if not finite(w.jacobian[part, i]):
                 return False
     # Chains that are not finite show in their pivots.
@@ -172,26 +134,20 @@ def differentiate_system(w: Any, h: float, foresee: bool) -> bool:
 @compiled
 def factor_newton(w: Any, h: float) -> bool:
     """Factor the real and the complex Newton matrices for this step size."""
-    k = w.count[MEMBER]
-    mass, stiffness = w.jacobian[1], w.jacobian[0]
-    n, chained = mass.shape[0], w.chains.shape[0] > 0
-    w.count[FACTORIZATIONS] += 1
-    real, pairs = w.real, w.complex
-    for i in range(n):
-        for j in range(n):
-            real[i, j] = GAMMA[k] / h * mass[i, j] + stiffness[i, j]
-    if chained and not fold_shifted(w, GAMMA[k] / h, real, w.real_border, w.real_bands):
+    k, real, chained = w.member, w.real, w.links > 0
+    w.factorizations += 1
+    shift = GAMMA[k] / h
+    shifted(w.jacobian, shift, real)
+    if chained and not fold_shifted(w, shift, real, w.real_border, w.real_bands):
         return False
-    if not factor(real, w.order[0], w.vector[PIVOT], w.vector[DELTA], 0.0):
+    if not factor(real, w.order[0], w.pivot, w.delta, 0.0):
         return False
     for pair in range(k + 1):
-        shift = PAIR_VALUES[k, pair] / h
-        for i in range(n):
-            for j in range(n):
-                pairs[pair, i, j] = shift * mass[i, j] + stiffness[i, j]
-        if chained and not fold_shifted(w, shift, pairs[pair], w.complex_border[pair], w.complex_bands[pair]):
+        complex_shift, matrix = PAIR_VALUES[k, pair] / h, w.complex[pair]
+        shifted(w.jacobian, complex_shift, matrix)
+        if chained and not fold_shifted(w, complex_shift, matrix, w.complex_border[pair], w.complex_bands[pair]):
             return False
-        if not factor(pairs[pair], w.order[1 + pair], w.vector[PIVOT], w.vector[DELTA], 0.0):
+        if not factor(matrix, w.order[1 + pair], w.pivot, w.delta, 0.0):
             return False
     return True
 
@@ -199,27 +155,28 @@ def factor_newton(w: Any, h: float) -> bool:
 @compiled
 def predict(w: Any, h: float) -> None:
     """First guess of the stages from the stored polynomial; no change where there is none, or none that reaches."""
-    k, last = w.count[MEMBER], w.count[LAST_MEMBER]
+    k, last = w.member, w.last_member
     s, top, z = stage_count(k), stage_count(last), w.z
-    if not h <= REACH * w.clock[H_LAST]:
+    if not h <= REACH * w.h_last:
         for i in range(s):
             clear(z[i])
         return
-    for m in range(w.algebraic.shape[0]):
+    for m in range(w.n):
         row = w.z_polynomial[m]
-        start = 0.0 if w.clock[OFFSET] == 0.0 else w.z_last[top - 1, m]
+        # Predictions start at the end of the stored step, or at its start where the step is repeated with another size.
+        start = 0.0 if w.offset == 0.0 else w.z_last[top - 1, m]
         for i in range(s):
-            x = w.clock[OFFSET] + NODES[k, i] * h / w.clock[H_LAST]
+            x = w.offset + NODES[k, i] * h / w.h_last
             z[i, m] = nested(last, top - 1, x, row) - start
 
 
 @compiled
 def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
     """Inputs of stage i from its slope."""
-    n = w.algebraic.shape[0]
-    # Local names spare the loops a look at the workspace after each store.
-    inputs, z, y, slopes = w.inputs, w.z[i], w.vector[Y], w.slopes[i]
-    inputs[0] = w.clock[BASE] + (w.clock[TAU] + NODES[w.count[MEMBER], i] * h)
+    n = w.n
+    # Local names spare the loops a look at the record after each store.
+    inputs, z, y, slopes = w.inputs, w.z[i], w.y, w.slopes[i]
+    inputs[0] = w.base + (w.tau + NODES[w.member, i] * h)
     for m in range(n):
         inputs[1 + m] = y[m] + z[m]
         inputs[1 + n + m] = slopes[m] * rate
@@ -228,43 +185,30 @@ def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
 @compiled
 def set_stage(w: Any, i: int, h: float) -> None:
     """Inputs of stage i."""
-    k, n = w.count[MEMBER], w.algebraic.shape[0]
-    address = w.slopes[i].ctypes.data
-    combine(INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, n, address)
+    k = w.member
+    combine(INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
     _put_stage(w, i, h, 1.0 / h)
 
 
 @compiled
-def end_of_step(w: Any, h: float, y: int, ydot: int, q: int) -> None:
-    """State, derivative and ledger at the end of the step, into these rows."""
-    n = w.algebraic.shape[0]
-    last = stage_count(w.count[MEMBER]) - 1
+def end_of_step(w: Any, h: float, y: Any, ydot: Any, q: Any) -> None:
+    """State, derivative and ledger at the end of the step, into these vectors."""
+    n, last = w.n, stage_count(w.member) - 1
     set_stage(w, last, h)
     for m in range(n):
-        w.vector[y, m] = w.inputs[1 + m]
-        w.vector[ydot, m] = w.inputs[1 + n + m]
-    for m in range(w.ledger.shape[1]):
-        w.ledger[q, m] = w.ledger[Q, m] + w.q_stage[last, m]
-
-
-@compiled
-def _stage_residuals(w: Any, h: float) -> None:
-    k, rate = w.count[MEMBER], 1.0 / h
-    s = stage_count(k)
-    w.count[RESIDUALS] += s
-    combine(INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.algebraic.shape[0], w.slopes.ctypes.data)
-    for i in range(s):
-        _put_stage(w, i, h, rate)
-        evaluate(w, RESIDUAL, w.g[i].ctypes.data)
+        y[m] = w.inputs[1 + m]
+        ydot[m] = w.inputs[1 + n + m]
+    for m in range(w.n_ledger):
+        q[m] = w.q[m] + w.q_stage[last, m]
 
 
 @compiled
 def _correct(w: Any) -> float:
     """One Newton correction of all stages, kept in g; returns its weighted maximum norm."""
-    k, n = w.count[MEMBER], w.algebraic.shape[0]
+    k, n = w.member, w.n
     s = stage_count(k)
-    # Local names spare the loops a look at the workspace after each store.
-    parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.vector[WEIGHT]
+    # Local names spare the loops a look at the record after each store.
+    parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.weight
     combine(TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
     solve_real(w, parts[0])
     for pair in range(k + 1):
@@ -291,35 +235,42 @@ def _correct(w: Any) -> float:
 
 @compiled
 def solve_stages(w: Any, h: float) -> int:
-    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the contraction rate in the
-    clock.
+    """Iterate to the tolerance, or to rounding level where that is coarser; leaves the rate of contraction.
+
+    Source: Hairer & Wanner II, IV.8: the rate of the last steps tells how much is left to correct, and whether the
+    iterations allowed will be enough.
     """
-    limit = 7 + 2 * w.count[MEMBER]
-    contraction = max(w.clock[CONTRACTION], EPS) ** 0.8
-    rounding = w.clock[ROUNDOFF]
+    limit = 7 + 2 * w.member
+    # The power takes back some of the trust in a rate that was found on another step.
+    contraction = max(w.contraction, EPS) ** 0.8
+    k, s, rate_of_time = w.member, stage_count(w.member), 1.0 / h
     norm_last, rate_last = 0.0, 0.0
-    w.clock[THETA] = 0.0
+    w.theta = 0.0
     for iteration in range(limit):
-        _stage_residuals(w, h)
+        combine(INVERSE[k].ctypes.data, 7, s, s, w.z.ctypes.data, w.n, w.slopes.ctypes.data)
+        for i in range(s):
+            _put_stage(w, i, h, rate_of_time)
+            evaluate(w, RESIDUAL, w.g[i])
+        w.residuals += s
         norm = _correct(w)
-        w.count[ITERATIONS] += 1
-        w.count[TRIES] = iteration + 1
+        w.iterations += 1
+        w.tries = iteration + 1
         if not norm < np.inf:
             return NOT_FINITE
         if iteration == 0:
-            w.clock[GUESSED] = norm
+            w.guessed = norm
         else:
             ratio = norm / norm_last
             rate = ratio if iteration == 1 else np.sqrt(ratio * rate_last)
             rate_last = ratio
             if rate >= 0.99 or rate / (1.0 - rate) * norm * rate ** (limit - 1 - iteration) > TIGHT:
                 break
-            w.clock[THETA] = rate
+            w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
-        believed = iteration > 0 or w.clock[RTOL] < COARSE
-        if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * rounding:
-            w.clock[CONTRACTION] = contraction
+        believed = iteration > 0 or w.rtol < COARSE
+        if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * w.roundoff:
+            w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)
-    w.clock[GUESSED] = 0.0
-    return CONVERGED if correction_is_noise(w, stage_count(w.count[MEMBER])) else DIVERGED
+    w.guessed = 0.0
+    return CONVERGED if correction_is_noise(w, s) else DIVERGED

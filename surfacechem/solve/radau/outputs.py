@@ -7,32 +7,12 @@ computed by a step of its own, from the start of the main step, which has the fu
 
 from typing import Any
 
-from surfacechem.solve.radau.dense import add_probe, integrate_ledger, interpolate, interpolate_rate, keep_polynomial
+from surfacechem.solve.radau.dense import integrate_ledger, interpolate, keep_polynomial, probe_ledger
 from surfacechem.solve.radau.newton import CONVERGED, end_of_step, factor_newton, predict, solve_stages, stage_count
 from surfacechem.solve.radau.roundoff import find_noise
-from surfacechem.solve.radau.step import MAGNIFIED, filter_residual, store_polynomial
-from surfacechem.solve.radau.tables import GAMMA, PROBE, PROBE_RATE
-from surfacechem.solve.radau.work import (
-    BASE,
-    CONTRACTION,
-    ERROR,
-    GUESSED,
-    LEDGER,
-    MEMBER,
-    NOISE,
-    Q_PROBE,
-    Q_TRIAL,
-    TAU,
-    THETA,
-    TRIAL,
-    TRIAL_DOT,
-    TRIES,
-    WEIGHT,
-    compiled,
-    copy,
-    evaluate,
-    set_inputs,
-)
+from surfacechem.solve.radau.step import MAGNIFIED, defect_inside, store_polynomial
+from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE
+from surfacechem.solve.radau.work import compiled, copy
 
 ALLOWED = 2.0
 """Error of the polynomial between its stages, in units of the tolerance."""
@@ -42,8 +22,8 @@ ALLOWED = 2.0
 def _largest(w: Any, floor: float) -> float:
     """Largest error in units of the tolerance, of the part above so many times the noise."""
     norm = 0.0
-    for j in range(w.algebraic.shape[0]):
-        size = (abs(w.vector[ERROR, j]) - floor * w.vector[NOISE, j]) / w.vector[WEIGHT, j]
+    for j in range(w.n):
+        size = (abs(w.error[j]) - floor * w.noise[j]) / w.weight[j]
         # Not max(): a NaN must reach the caller.
         if not size <= norm:
             norm = size
@@ -51,101 +31,61 @@ def _largest(w: Any, floor: float) -> float:
 
 
 @compiled
-def _polynomial_serves(w: Any, h: float) -> bool:
-    """Whether the equations hold at the probe, midway between the stages, where the polynomial is worst."""
-    x = PROBE[w.count[MEMBER]]
-    interpolate_rate(w, h, x)
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
-    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    filter_residual(w)
-    if _largest(w, 0.0) <= ALLOWED:
-        return True
-    find_noise(w)
-    return bool(_largest(w, MAGNIFIED) <= ALLOWED)
-
-
-@compiled
-def _probe_ledger(w: Any, h: float) -> None:
-    """Sample the rates of the ledger at the probe. The correction of the state there comes first: a fast rate would
-    magnify its error.
-    """
-    k = w.count[MEMBER]
-    for j in range(w.algebraic.shape[0]):
-        w.vector[TRIAL, j] += w.vector[ERROR, j]
-        w.vector[TRIAL_DOT, j] += GAMMA[k] / h * w.vector[ERROR, j]
-    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    evaluate(w, LEDGER, w.ledger[Q_PROBE].ctypes.data)
-    for m in range(w.ledger.shape[1]):
-        defect = w.ledger[Q_PROBE, m] - PROBE_RATE[k, 7] * w.rates[7, m]
-        for i in range(stage_count(k)):
-            defect -= PROBE_RATE[k, i] * w.rates[i, m]
-        w.ledger[Q_PROBE, m] = h * defect
-    add_probe(w, k, w.ledger[Q_PROBE])
-
-
-@compiled
-def _recall_step(w: Any, h: float) -> None:
-    """Stages and quadratures of the main step, from its stored polynomial."""
-    for i in range(stage_count(w.count[MEMBER])):
-        copy(w.z_last[i], w.z[i])
-    if w.ledger.shape[1] > 0:
-        integrate_ledger(w, h)
-
-
-@compiled
-def _step_aside(w: Any, size: float) -> bool:
-    """State and ledger at the end of a step of this size, as trial values; False where Newton's method fails."""
-    if not factor_newton(w, size):
-        return False
-    predict(w, size)
-    w.clock[CONTRACTION] = 1.0
-    if solve_stages(w, size) != CONVERGED:
-        return False
-    if w.ledger.shape[1] > 0:
-        integrate_ledger(w, size)
-    end_of_step(w, size, TRIAL, TRIAL_DOT, Q_TRIAL)
-    return True
-
-
-@compiled
-def _write(w: Any, row: Any) -> None:
-    """[y | ledger] of the trial values."""
-    n = w.algebraic.shape[0]
-    copy(w.vector[TRIAL], row)
-    copy(w.ledger[Q_TRIAL], row[n:])
-
-
-@compiled
-def _write_by_steps(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
-    """Each output by a step of its own; leaves the main step as it was."""
-    theta, contraction, guessed = w.clock[THETA], w.clock[CONTRACTION], w.clock[GUESSED]
-    tries = w.count[TRIES]
-    store_polynomial(w, h, 0.0)
-    for i in range(first, last):
-        size = (times[i] - w.clock[BASE]) - w.clock[TAU]
-        if not (0.0 < size < h and _step_aside(w, size)):
-            interpolate(w, min(max(size / h, 0.0), 1.0))
-        _write(w, outputs[i])
-    _recall_step(w, h)
-    factor_newton(w, h)
-    w.clock[THETA], w.clock[CONTRACTION], w.clock[GUESSED] = theta, contraction, guessed
-    w.count[TRIES] = tries
+def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
+    """An output by a step of its own, which has the full order; by the polynomial where Newton's method fails."""
+    stepped = False
+    if 0.0 < size < h and factor_newton(w, size):
+        predict(w, size)
+        w.contraction = 1.0
+        stepped = solve_stages(w, size) == CONVERGED
+    if stepped:
+        if w.n_ledger > 0:
+            integrate_ledger(w, size)
+        end_of_step(w, size, w.trial, w.trial_dot, w.q_trial)
+    else:
+        interpolate(w, min(max(size / h, 0.0), 1.0))
+    copy(w.trial, output)
+    copy(w.q_trial, output[w.n :])
 
 
 @compiled
 def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: float) -> None:
     """Outputs between the ends of the step."""
+    k = w.member
     keep_polynomial(w)
-    serves = _polynomial_serves(w, h)
-    if w.ledger.shape[1] > 0:
-        _probe_ledger(w, h)
+    # Midway between the stages the polynomial is worst: do the equations hold there?
+    defect_inside(w, h, PROBE[k])
+    serves = _largest(w, 0.0) <= ALLOWED
     if not serves:
-        _write_by_steps(w, times, outputs, first, last, h)
+        find_noise(w)
+        serves = _largest(w, MAGNIFIED) <= ALLOWED
+    if w.n_ledger > 0:
+        # The next term of the ledger's polynomial, from the defect of its rates there.
+        probe_ledger(w, h)
+        for m in range(w.n_ledger):
+            defect = w.q_probe[m] - PROBE_RATE[k, 7] * w.rates[7, m]
+            for i in range(stage_count(k)):
+                defect -= PROBE_RATE[k, i] * w.rates[i, m]
+            for i in range(stage_count(k) + 2):
+                w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
+    if serves:
+        for i in range(first, last):
+            x = ((times[i] - w.base) - w.tau) / h
+            interpolate(w, min(max(x, 0.0), 1.0))
+            copy(w.trial, outputs[i])
+            copy(w.q_trial, outputs[i, w.n :])
         return
+    theta, contraction, guessed, tries = w.theta, w.contraction, w.guessed, w.tries
+    store_polynomial(w, h, 0.0)
     for i in range(first, last):
-        x = ((times[i] - w.clock[BASE]) - w.clock[TAU]) / h
-        interpolate(w, min(max(x, 0.0), 1.0))
-        _write(w, outputs[i])
+        _write_by_step(w, (times[i] - w.base) - w.tau, h, outputs[i])
+    # The main step as it was: its stages, quadratures and factors, and what Newton's method knew.
+    for i in range(stage_count(k)):
+        copy(w.z_last[i], w.z[i])
+    if w.n_ledger > 0:
+        integrate_ledger(w, h)
+    factor_newton(w, h)
+    w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 
 
 @compiled
@@ -157,7 +97,6 @@ def write_outputs(w: Any, times: Any, outputs: Any, first: int, h: float, end: f
     if last > first:
         _write_inside(w, times, outputs, first, last, h)
     if last < times.shape[0] and times[last] == end:
-        end_of_step(w, h, TRIAL, TRIAL_DOT, Q_TRIAL)
-        _write(w, outputs[last])
+        end_of_step(w, h, outputs[last], w.trial_dot, outputs[last, w.n :])
         last += 1
     return last

@@ -57,6 +57,7 @@ def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: 
     program, times = problem.program, runs[-1]
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
+        program.sizes,
         program.addresses,
         program.algebraic_mask,
         program.chain_table,
@@ -88,12 +89,12 @@ def _run_one(problem: Problem, step_rows: int, event_rows: int) -> Any:
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
     batch = _batch(problem, (*columns, segments, times), step_rows, event_rows)
     if problem.max_seconds is None:
-        stepper.run_batch()(0, 1, tuple(batch))
+        stepper.run(batch, 0, 1)
         return batch
     timer = threading.Timer(problem.max_seconds, batch.counts[:, STOP].fill, args=(1,))
     timer.start()
     try:
-        stepper.run_batch()(0, 1, tuple(batch))
+        stepper.run(batch, 0, 1)
     finally:
         timer.cancel()
     return batch
@@ -153,7 +154,7 @@ def _solved(problems: Sequence[Problem]) -> list[Result]:
     segments, times = (_shared([getattr(problem, name) for problem in problems]) for name in ("segments", "times"))
     columns = y0, parameters, spacing, max_steps, peaks, segments, times
     batch = _batch(problems[0], columns, *_usual_rows(problems[0]))
-    stepper.run_batch()(0, len(problems), tuple(batch))
+    stepper.run(batch, 0, len(problems))
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
 
@@ -163,7 +164,7 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
     """
     while True:
         needed, records = int(batch.counts[i, EVENTS]), int(batch.counts[i, RECORDS]) if problem.record_steps else 0
-        if needed <= batch.events.shape[1] and records <= batch.steps.shape[1]:
+        if needed <= batch.events.shape[1] and records <= batch.records.shape[1]:
             return _result(problem, batch, i)
         batch, i = _run_one(problem, records, needed), 0
 
@@ -179,7 +180,7 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
     outputs, end = counts[OUTPUTS], batch.ends[i]
     m = 1 + 2 * n + program.n_ledger
     values = batch.outputs[i, :outputs]
-    events, steps = batch.events[i, : counts[EVENTS]], batch.steps[i, : counts[RECORDS]]
+    events, steps = batch.events[i, : counts[EVENTS]], batch.records[i, : counts[RECORDS]]
     if len(batch.counts) > 1:  # the room for the steps of many runs is not kept for those that they took
         events, steps = events.copy(), steps.copy()
     return Result(
@@ -248,9 +249,8 @@ def solve_many(
     shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
     limits = np.array((np.inf,)), np.array((max_steps,)), _peaks(shared)[None]
     batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), 0, 0)
-    kernel, fields = stepper.run_batch(), tuple(batch)
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda i: kernel(i, min(i + CHUNK, len(states)), fields), range(0, len(states), CHUNK)))
+        list(pool.map(lambda i: stepper.run(batch, i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
     return BatchResult(
         status=batch.counts[:, END],
         t=batch.ends[:, 0],
@@ -270,16 +270,16 @@ class Consistent:
     valid: NDArray[np.bool_]
 
 
-def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> tuple[Any, ...]:
+def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np.int64]) -> Any:
     """The batch whose rows [t | y | ydot] of ``ends`` are made consistent where they stand.
 
     ``table`` [row, 1, parameter] may have one row for all; ``counts`` [row, COLUMNS] gets the outcomes under END.
     """
-    none, rows, nothing = np.empty(0, np.int64), np.zeros((1, 0)), _no_rows(len(ends))
-    return (
-        program.addresses, program.algebraic_mask, program.chain_table, none,
+    rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
+    return Batch(
+        program.sizes, program.addresses, program.algebraic_mask, program.chain_table, program.ledger_groups,
         1.0, np.ones(program.n), _kinds(()), 0,
-        ends, table, np.zeros(0), none, rows, rows, rows, ends, counts, nothing, nothing, nothing,
+        ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 
 
@@ -305,7 +305,7 @@ def consistent(program: Program, t: ArrayLike, y: ArrayLike, ydot: ArrayLike, pa
         filled = program.filled(np.concatenate([ends, rows], axis=1))
         table = np.ascontiguousarray(filled[:, None, 1 + 2 * n :])
     counts = np.zeros((len(ends), COLUMNS), np.int64)
-    stepper.run_batch()(0, len(ends), search_batch(program, ends, table, counts))
+    stepper.run(search_batch(program, ends, table, counts), 0, len(ends))
     valid = (counts[:, END] == 0).reshape(shape[:-1])
     return Consistent(ends[:, 1 : 1 + n].reshape(shape), ends[:, 1 + n :].reshape(shape), valid)
 

@@ -18,13 +18,7 @@ import numpy as np
 
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
-from surfacechem.solve.radau.dense import (
-    change_and_slope,
-    integrate_ledger,
-    interpolate_rate,
-    keep_correction,
-    keep_polynomial,
-)
+from surfacechem.solve.radau.dense import change_and_slope, keep_polynomial, probe_ledger, put_inside
 from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -40,50 +34,8 @@ from surfacechem.solve.radau.newton import (
 from surfacechem.solve.radau.quadrature import defect_norm, excused_norm
 from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.stepper import STOP
-from surfacechem.solve.radau.tables import FINEST, GAMMA, START_SLOPE
-from surfacechem.solve.radau.work import (
-    ATOL,
-    BASE,
-    CALM,
-    CONTRACTION,
-    DELTA,
-    ERROR,
-    FRESH,
-    GUESSED,
-    H_FACTORED,
-    H_JACOBIAN,
-    H_LAST,
-    LAST_MEMBER,
-    LEDGER,
-    LOOSE,
-    MEMBER,
-    NOISE,
-    OFFSET,
-    PIVOT,
-    Q_PROBE,
-    REFUSED,
-    REJECTED,
-    RESIDUAL,
-    RESIDUALS,
-    ROUNDOFF,
-    RTOL,
-    SCALE,
-    STEPS,
-    TAU,
-    THETA,
-    TRIAL,
-    TRIAL_DOT,
-    TRIES,
-    WEIGHT,
-    YDOT,
-    Q,
-    Y,
-    compiled,
-    copy,
-    evaluate,
-    finite,
-    set_inputs,
-)
+from surfacechem.solve.radau.tables import FINEST, START_SLOPE
+from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
 from surfacechem.tolerances import EPS, NEGLIGIBLE, ROUNDING, SOLVED, SQRT_EPS, TINY, ULPS
 
 SAFETY = 0.9
@@ -102,13 +54,13 @@ NOISY = 0.05
 def set_weights(w: Any) -> None:
     """Weights of the error norm, the typical sizes for pivoting, and the size of rounding errors in that norm."""
     rounding = 0.0
-    for j in range(w.algebraic.shape[0]):
-        size = abs(w.vector[Y, j])
-        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINY)
-        w.vector[WEIGHT, j] = weight
-        w.vector[SCALE, j] = max(size, weight)
+    for j in range(w.n):
+        size = abs(w.y[j])
+        weight = max(w.atol[j] + w.rtol * size, TINY)
+        w.weight[j] = weight
+        w.scale[j] = max(size, weight)
         rounding = max(rounding, EPS * size / weight)
-    w.clock[ROUNDOFF] = rounding
+    w.roundoff = rounding
 
 
 @compiled
@@ -125,10 +77,12 @@ def loosening(rtol: float) -> float:
 
 @compiled
 def filter_residual(w: Any) -> bool:
-    """Residual at the inputs through the real Newton matrix, an error of the state, into ERROR."""
-    error = w.vector[ERROR]
-    evaluate(w, RESIDUAL, error.ctypes.data)
-    w.count[RESIDUALS] += 1
+    """Residual at the inputs through the real Newton matrix, an error of the state, into the error; whether it is
+    finite.
+    """
+    error = w.error
+    evaluate(w, RESIDUAL, error)
+    w.residuals += 1
     solve_real(w, error)
     for j in range(error.shape[0]):
         error[j] = -error[j]
@@ -136,29 +90,37 @@ def filter_residual(w: Any) -> bool:
 
 
 @compiled
+def defect_inside(w: Any, h: float, x: float) -> bool:
+    """By how much the polynomial misses the equations at a fraction of the step, into the error; whether it is
+    finite.
+    """
+    put_inside(w, h, x)
+    return bool(filter_residual(w))
+
+
+@compiled
 def error_norm(w: Any, floor: float) -> float:
     """Norm of the part of the error above so many times the noise."""
     norm = 0.0
-    last = stage_count(w.count[MEMBER]) - 1
-    for j in range(w.algebraic.shape[0]):
-        size = max(abs(w.vector[Y, j]), abs(w.vector[Y, j] + w.z[last, j]))
-        weight = max(w.vector[ATOL, j] + w.clock[RTOL] * size, TINY)
-        norm = max(norm, (abs(w.vector[ERROR, j]) - floor * w.vector[NOISE, j]) / weight)
-    return norm / w.clock[LOOSE]
+    last = stage_count(w.member) - 1
+    for j in range(w.n):
+        size = max(abs(w.y[j]), abs(w.y[j] + w.z[last, j]))
+        weight = max(w.atol[j] + w.rtol * size, TINY)
+        norm = max(norm, (abs(w.error[j]) - floor * w.noise[j]) / weight)
+    return norm / w.loose
 
 
 @compiled
 def estimate_error(w: Any, h: float) -> float:
     """Norm of the local error."""
-    k = w.count[MEMBER]
-    n = w.algebraic.shape[0]
+    k = w.member
+    n = w.n
     for m in range(n):
         slope = 0.0
         for j in range(stage_count(k)):
             slope += START_SLOPE[k, j] * w.z[j, m]
-        w.vector[DELTA, m] = slope / h
-    w.inputs[0] = w.clock[BASE] + w.clock[TAU]
-    set_inputs(w, w.vector[Y], w.vector[DELTA])
+        w.delta[m] = slope / h
+    put(w, 0.0, w.y, w.delta)
     if not filter_residual(w):
         return np.inf
     norm = error_norm(w, 0.0)
@@ -171,8 +133,8 @@ def estimate_error(w: Any, h: float) -> float:
 @compiled
 def estimate_again(w: Any) -> float:
     """The estimate filtered a second time, where a stiff transient made the first one too large."""
-    for m in range(w.algebraic.shape[0]):
-        w.inputs[1 + m] = w.vector[Y, m] + w.vector[ERROR, m]
+    for m in range(w.n):
+        w.inputs[1 + m] = w.y[m] + w.error[m]
     if not filter_residual(w):
         return np.inf
     return float(max(error_norm(w, MAGNIFIED), NOISY))
@@ -180,10 +142,14 @@ def estimate_again(w: Any) -> float:
 
 @compiled
 def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) -> float:
-    """Gustafsson's predictive controller; h_last = 0 where there is no accepted step before."""
-    k = w.count[MEMBER]
+    """Gustafsson's predictive controller; h_last = 0 where there is no accepted step before.
+
+    Source: Gustafsson (1994), Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM
+    Trans. Math. Softw. 20; the safety of many iterations from Hairer & Wanner II, IV.8.
+    """
+    k = w.member
     limit = 7 + 2 * k
-    safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.count[TRIES]))
+    safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.tries))
     exponent = 1.0 / (stage_count(k) + 1.0)
     factor = safety * max(norm, ROUNDING) ** -exponent
     if h_last > 0.0 and norm < 1.0:
@@ -196,7 +162,7 @@ def convergent_size(w: Any, h: float) -> float:
     """Step size at which Newton's method will contract as it should, if its contraction is like the square of the
     step size; any where the first guess was good or rounding ended the iteration: then the contraction tells nothing.
     """
-    theta = w.clock[THETA] if w.clock[GUESSED] > 1.0 else 0.0
+    theta = w.theta if w.guessed > 1.0 else 0.0
     return h * max(LEAST_CONVERGENT, np.sqrt(CONTRACTING / theta)) if theta > 0.0 else np.inf
 
 
@@ -205,19 +171,19 @@ def choose_member(w: Any, slowest: float) -> bool:
     """Lower order where Newton contracts slower than this, back up after a few easy steps; True if the member
     changed.
     """
-    k = w.count[MEMBER]
-    if w.clock[THETA] > slowest:
-        w.count[CALM] = 0
-        w.count[MEMBER] = max(0, k - 1)
-    elif w.clock[THETA] < 0.05:
-        w.count[CALM] += 1
-        if w.count[CALM] >= 3:
-            w.count[MEMBER] = min(k + 1, preferred_member(w.clock[RTOL]))
+    k = w.member
+    if w.theta > slowest:
+        w.calm = 0
+        w.member = max(0, k - 1)
+    elif w.theta < 0.05:
+        w.calm += 1
+        if w.calm >= 3:
+            w.member = min(k + 1, preferred_member(w.rtol))
     else:
-        w.count[CALM] = 0
-    if w.count[MEMBER] != k:
-        w.count[CALM] = 0
-    return bool(w.count[MEMBER] != k)
+        w.calm = 0
+    if w.member != k:
+        w.calm = 0
+    return bool(w.member != k)
 
 
 @compiled
@@ -231,8 +197,8 @@ def growing_size(w: Any) -> float:
     mass, stiffness = w.jacobian[1], w.jacobian[0]
     fastest = 0.0
     for j in range(mass.shape[0]):
-        driven = w.vector[Y, j] != 0.0 or w.vector[YDOT, j] != 0.0
-        if driven and mass[j, j] != 0.0 and abs(w.vector[Y, j]) < w.vector[ATOL, j]:
+        driven = w.y[j] != 0.0 or w.ydot[j] != 0.0
+        if driven and mass[j, j] != 0.0 and abs(w.y[j]) < w.atol[j]:
             fastest = max(fastest, -stiffness[j, j] / mass[j, j])
     return 1.0 / fastest if fastest > 0.0 else np.inf
 
@@ -240,37 +206,37 @@ def growing_size(w: Any) -> float:
 @compiled
 def _rate_norm(w: Any, rate: Any) -> float:
     norm = 0.0
-    for j in range(w.algebraic.shape[0]):
+    for j in range(w.n):
         if not w.algebraic[j]:
-            norm = max(norm, abs(rate[j]) / w.vector[WEIGHT, j])
-    return norm / w.clock[LOOSE]
+            norm = max(norm, abs(rate[j]) / w.weight[j])
+    return norm / w.loose
 
 
 @compiled
 def first_size(w: Any, span: float) -> float:
     """Step over which the change of the rate, felt by a small trial step, stays within the tolerance."""
-    n = w.algebraic.shape[0]
-    speed = _rate_norm(w, w.vector[YDOT])
+    n = w.n
+    speed = _rate_norm(w, w.ydot)
     if not 0.0 < speed < np.inf:
         return NEGLIGIBLE * span
     size = 0.0
     for j in range(n):
-        size = max(size, abs(w.vector[Y, j]) / w.vector[WEIGHT, j])
-    trial = min(max(NEGLIGIBLE**2 * size / w.clock[LOOSE], 1e-2) / speed, NEGLIGIBLE * span)
+        size = max(size, abs(w.y[j]) / w.weight[j])
+    trial = min(max(NEGLIGIBLE**2 * size / w.loose, 1e-2) / speed, NEGLIGIBLE * span)
     for j in range(n):
-        w.vector[TRIAL, j] = w.vector[Y, j] + (0.0 if w.algebraic[j] else trial * w.vector[YDOT, j])
-        w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + trial)
+        w.trial[j] = w.y[j] + (0.0 if w.algebraic[j] else trial * w.ydot[j])
+        w.trial_dot[j] = w.ydot[j]
+    w.inputs[0] = w.base + (w.tau + trial)
     if find_consistent(w) != CONSISTENT:
         return trial
     for j in range(n):
-        w.vector[TRIAL_DOT, j] -= w.vector[YDOT, j]
-    change = _rate_norm(w, w.vector[TRIAL_DOT]) / speed
+        w.trial_dot[j] -= w.ydot[j]
+    change = _rate_norm(w, w.trial_dot) / speed
     if not change * span > SQRT_EPS * trial:
         return 0.05 * span
     # Ratios first: a rate of 1e200 over 1e-200 s would overflow.
     time_scale = trial / change
-    exponent = 1.0 / (stage_count(w.count[MEMBER]) + 1.0)
+    exponent = 1.0 / (stage_count(w.member) + 1.0)
     return min(time_scale * min(1.0, (speed * time_scale) ** -exponent), 0.05 * span)
 
 
@@ -279,6 +245,9 @@ INVALID, OLD, CURRENT = range(3)
 
 SLOW, SLOW_REJECTED = 0.8, 0.3
 """Contraction of Newton's method at which a lower order serves better, after an accepted and a rejected step."""
+
+SINGULAR_TRIALS = 12
+"""Sizes that are tried where matrices are singular: the last is 0.37^12 = 7e-6 of the first."""
 
 LASTS = 10.0
 """Growth of the step after which a Jacobian is taken anew: where the equations were far stiffer when it was taken, its
@@ -297,27 +266,24 @@ STOPPED = int(Status.STOPPED)
 @compiled
 def restart(w: Any) -> int:
     """Make the state consistent and forget the past; time starts from zero."""
-    n = w.algebraic.shape[0]
-    w.clock[BASE] += w.clock[TAU]
-    w.clock[TAU] = w.clock[H_LAST] = w.clock[H_FACTORED] = 0.0
-    w.clock[CONTRACTION] = 1.0
-    w.count[CALM] = 0
-    w.count[REFUSED] = min(w.count[REFUSED], w.count[STEPS] // 2)
-    w.count[FRESH] = INVALID
-    w.count[MEMBER] = preferred_member(w.clock[RTOL])
-    for j in range(n):
-        w.vector[TRIAL, j] = w.vector[Y, j]
-        w.vector[TRIAL_DOT, j] = w.vector[YDOT, j]
-    w.inputs[0] = w.clock[BASE]
+    w.base += w.tau
+    w.tau = w.h_last = w.h_factored = 0.0
+    w.contraction = 1.0
+    w.calm = 0
+    w.refused = min(w.refused, w.steps // 2)
+    w.fresh = INVALID
+    w.member = preferred_member(w.rtol)
+    copy(w.y, w.trial)
+    copy(w.ydot, w.trial_dot)
+    w.inputs[0] = w.base
     outcome = find_consistent(w)
     if outcome != CONSISTENT:
         return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
-    for j in range(n):
-        w.vector[Y, j] = w.vector[TRIAL, j]
-        w.vector[YDOT, j] = w.vector[TRIAL_DOT, j]
-    if w.ledger.shape[1] > 0:
-        set_inputs(w, w.vector[Y], w.vector[YDOT])
-        evaluate(w, LEDGER, w.rates[7].ctypes.data)
+    copy(w.trial, w.y)
+    copy(w.trial_dot, w.ydot)
+    if w.n_ledger > 0:
+        set_inputs(w, w.y, w.ydot)
+        evaluate(w, LEDGER, w.rates[7])
     set_weights(w)
     return GOOD
 
@@ -325,54 +291,58 @@ def restart(w: Any) -> int:
 @compiled
 def _prepare(w: Any, h: float, foresee: bool) -> int:
     """Newton matrices for this step size, kept where they still serve."""
-    if w.clock[H_FACTORED] == h:
+    if w.h_factored == h:
         return GOOD
-    outgrown = w.clock[THETA] >= NEGLIGIBLE or h > LASTS * w.clock[H_JACOBIAN]
-    if w.count[FRESH] == INVALID or (w.count[FRESH] == OLD and outgrown):
+    outgrown = w.theta >= NEGLIGIBLE or h > LASTS * w.h_jacobian
+    if w.fresh == INVALID or (w.fresh == OLD and outgrown):
         if not differentiate_system(w, h, foresee):
             return NONFINITE
-        w.count[FRESH] = CURRENT
-        w.clock[H_JACOBIAN] = h
-    w.clock[H_FACTORED] = 0.0
-    copy(w.vector[SCALE], w.vector[PIVOT])
+        w.fresh = CURRENT
+        w.h_jacobian = h
+    w.h_factored = 0.0
+    copy(w.scale, w.pivot)
     if not factor_newton(w, h):
         return SINGULAR
-    w.clock[H_FACTORED] = h
+    w.h_factored = h
     return GOOD
 
 
 @compiled
 def too_small(w: Any, h: float) -> bool:
     """Whether the step no longer moves time."""
-    return not (h > TINY and h > ULPS * w.clock[TAU])
+    return not (h > TINY and h > ULPS * w.tau)
 
 
 @compiled
-def advance(
-    w: Any, h: float, max_steps: int, counts: Any, size_last: float, norm_last: float
-) -> tuple[int, float, float, float]:
+def _may_try(w: Any, h: float, i: int) -> int:
+    """GOOD, or why run i tries no step of this size."""
+    if too_small(w, h):
+        return STEP_UNDERFLOW
+    if w.steps + w.rejected >= w.max_steps[row_of(w.max_steps, i)]:
+        return MAX_STEPS
+    return STOPPED if w.counts[i, STOP] != 0 else GOOD
+
+
+@compiled
+def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
     """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
-    repeated = w.clock[H_LAST] == 0.0
+    # The first step after a start, and every one that has been rejected, may be in a transient.
+    repeated = w.h_last == 0.0
     singular, failed = 0, False
     while True:
-        if too_small(w, h):
-            return STEP_UNDERFLOW, h, 0.0, h
-        if w.count[STEPS] + w.count[REJECTED] >= max_steps:
-            return MAX_STEPS, h, 0.0, h
-        if counts[STOP] != 0:
-            return STOPPED, h, 0.0, h
-        predict(w, h)
-        outcome = _prepare(w, h, not failed)
-        if outcome == NONFINITE:
-            return outcome, h, 0.0, h
-        if outcome == SINGULAR:
+        outcome = _may_try(w, h, i)
+        if outcome == GOOD:
+            predict(w, h)
+            outcome = _prepare(w, h, not failed)
+        if outcome == SINGULAR and singular < SINGULAR_TRIALS:
+            # A matrix may be singular by accident of the step size.
             singular += 1
-            if singular > 12:
-                return SINGULAR, h, 0.0, h
-            w.count[FRESH] = INVALID
+            w.fresh = INVALID
             failed = True
             h *= 0.37
             continue
+        if outcome != GOOD:
+            return outcome, h, 0.0, h
         outcome = solve_stages(w, h)
         if outcome == CONVERGED:
             norm = estimate_error(w, h)
@@ -385,49 +355,40 @@ def advance(
         else:
             smaller = h * (0.1 if outcome == NOT_FINITE else 0.4)
             failed = True
-        w.count[REJECTED] += 1
-        if outcome != CONVERGED and w.count[FRESH] == OLD:
-            w.count[FRESH] = INVALID
-            w.clock[H_FACTORED] = 0.0
-            continue
+        w.rejected += 1
+        w.h_factored = 0.0
         if outcome != CONVERGED:
-            w.count[FRESH] = INVALID
+            aged = w.fresh == OLD
+            w.fresh = INVALID
+            if aged:
+                continue  # with the Jacobian of here, before the step is made shorter
         choose_member(w, SLOW_REJECTED)
-        w.clock[H_FACTORED] = 0.0
         repeated = True
         h = smaller
 
 
 @compiled
-def finish_step(w: Any, h: float) -> None:
-    """What interpolation inside the step needs beyond the stages."""
-    keep_correction(w)
-    if w.ledger.shape[1] > 0:
-        integrate_ledger(w, h)
-
-
-@compiled
 def store_polynomial(w: Any, h: float, offset: float) -> None:
     """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
-    k = w.count[MEMBER]
+    k = w.member
     for i in range(stage_count(k)):
         copy(w.z[i], w.z_last[i])
-    for m in range(w.algebraic.shape[0]):
+    for m in range(w.n):
         divide(k, w.z, m, w.z_polynomial[m])
-    w.clock[H_LAST] = h
-    w.clock[OFFSET] = offset
-    w.count[LAST_MEMBER] = w.count[MEMBER]
+    w.h_last = h
+    w.offset = offset
+    w.last_member = w.member
 
 
 @compiled
 def accept(w: Any, h: float) -> None:
     """Move to the end of the step."""
-    last = stage_count(w.count[MEMBER]) - 1
-    end_of_step(w, h, Y, YDOT, Q)
+    last = stage_count(w.member) - 1
+    end_of_step(w, h, w.y, w.ydot, w.q)
     copy(w.rates[last], w.rates[7])
-    w.clock[TAU] += h
-    w.count[STEPS] += 1
-    w.count[FRESH] = min(w.count[FRESH], OLD)
+    w.tau += h
+    w.steps += 1
+    w.fresh = min(w.fresh, OLD)
     set_weights(w)
 
 
@@ -436,11 +397,11 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
     proposed = min(proposed, convergent_size(w, h))
     if choose_member(w, SLOW):
-        w.clock[H_FACTORED] = 0.0
-    elif w.clock[THETA] < NEGLIGIBLE and h <= proposed <= 1.2 * h:
+        w.h_factored = 0.0
+    elif w.theta < NEGLIGIBLE and h <= proposed <= 1.2 * h:
         return h
-    if w.clock[THETA] >= NEGLIGIBLE:
-        w.clock[H_FACTORED] = 0.0
+    if w.theta >= NEGLIGIBLE:
+        w.h_factored = 0.0
     return proposed
 
 
@@ -460,36 +421,23 @@ closer together than that; what is narrower still is passed over, as it is by a 
 
 
 @compiled
-def _state_differs(w: Any, h: float, x: float) -> bool:
-    """Whether the equations at a point are far from the polynomial; leaves the error of the state there in ERROR."""
-    interpolate_rate(w, h, x)
-    w.inputs[0] = w.clock[BASE] + (w.clock[TAU] + x * h)
-    set_inputs(w, w.vector[TRIAL], w.vector[TRIAL_DOT])
-    if not filter_residual(w):
-        return True
-    if error_norm(w, 0.0) <= FAR:
-        return False
-    find_noise(w)
-    return bool(not error_norm(w, MAGNIFIED) <= FAR)
-
-
-@compiled
-def _ledger_differs(w: Any, h: float, x: float, remaining: float) -> bool:
-    """Whether the rates of the ledger at a point are far from its polynomial, with the state corrected there."""
-    k = w.count[MEMBER]
-    for j in range(w.algebraic.shape[0]):
-        w.inputs[1 + j] += w.vector[ERROR, j]
-        w.inputs[1 + w.algebraic.shape[0] + j] += GAMMA[k] / h * w.vector[ERROR, j]
-    evaluate(w, LEDGER, w.ledger[Q_PROBE].ctypes.data)
-    for m in range(w.ledger.shape[1]):
-        _, slope = change_and_slope(k, x, w.q_polynomial[m])
-        w.ledger[Q_PROBE, m] = h * w.ledger[Q_PROBE, m] - slope
-    return bool(not defect_norm(w, Q_PROBE, h, remaining) <= FAR and not excused_norm(w, h) <= FAR)
-
-
-@compiled
 def _differs(w: Any, h: float, x: float, remaining: float) -> bool:
-    return _state_differs(w, h, x) or (w.ledger.shape[1] > 0 and _ledger_differs(w, h, x, remaining))
+    """Whether the equations at a fraction of the step are far from its polynomial, or the rates of the ledger, with the
+    state corrected there, from theirs.
+    """
+    if not defect_inside(w, h, x):
+        return True
+    if not error_norm(w, 0.0) <= FAR:
+        find_noise(w)
+        if not error_norm(w, MAGNIFIED) <= FAR:
+            return True
+    if w.n_ledger == 0:
+        return False
+    probe_ledger(w, h)
+    for m in range(w.n_ledger):
+        _, slope = change_and_slope(w.member, x, w.q_polynomial[m])
+        w.q_probe[m] = h * w.q_probe[m] - slope
+    return bool(not defect_norm(w, w.q_probe, h, remaining) <= FAR and not excused_norm(w, h) <= FAR)
 
 
 @compiled

@@ -3,8 +3,10 @@
 Importing this module imports neither Numba nor the kernel.
 """
 
+import math
 import threading
 from collections import namedtuple
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,9 @@ import numpy as np
 from surfacechem.compile import objectcode
 from surfacechem.compile.cache import compile_kernel, is_filled, kernel_folder
 
-FIELDS: dict[str, tuple[Any, int]] = {
+BATCH: dict[str, tuple[Any, int]] = {
     # the program
+    "sizes": (np.int64, 1),
     "code": (np.int64, 2),
     "algebraic": (np.bool_, 1),
     "chains": (np.int64, 2),
@@ -39,19 +42,160 @@ FIELDS: dict[str, tuple[Any, int]] = {
     "ends": (float, 2),
     "counts": (np.int64, 2),
     "outputs": (float, 3),
-    "steps": (float, 3),
+    "records": (float, 3),
     "events": (float, 3),
 }
 """Entries of a batch of runs: type and number of axes. The first axis of the last two groups is the run."""
 
 _named: Any = namedtuple
-Batch: Any = _named("Batch", FIELDS)
+Batch: Any = _named("Batch", BATCH)
 """What a batch of runs reads, and the rows that it writes."""
 
 END, OUTPUTS, EVENTS, RECORDS, FIRST_COUNTER, STOP, COLUMNS = 0, 1, 2, 3, 4, 10, 11
 """Columns of the table of counts: status, outputs written, events, recorded steps; then six counters, and a flag that
 is set from outside to end the run.
 """
+
+SIZES = ("n", "n_ledger", "n_margins", "n_inputs", "core", "links", "cells")
+"""Sizes of a program, in the order in which it tells them: the core is what is in no chain, the links are the chains,
+the cells what is in them.
+"""
+
+NUMBERS: dict[str, type] = {
+    # The time is base + tau, with tau counted from the last restart: steps can be far smaller than an ulp of the time.
+    "base": float,
+    "tau": float,
+    # The stored polynomial: its step, and where predictions start in it (0 or 1).
+    "h_last": float,
+    "offset": float,
+    # Steps of the current factors and of the Jacobian.
+    "h_factored": float,
+    "h_jacobian": float,
+    # Newton: rate of contraction, what is left after a correction in units of it, how wrong the first guess of the
+    # stages was and how large rounding is in units of the tolerance.
+    "theta": float,
+    "contraction": float,
+    "guessed": float,
+    "roundoff": float,
+    # How much larger than the tolerance the estimate of low order may be.
+    "loose": float,
+    # Counters of a run.
+    "steps": int,
+    "rejected": int,
+    "residuals": int,
+    "jacobians": int,
+    "factorizations": int,
+    "iterations": int,
+    # Member of the Radau family now, and that of the stored polynomial.
+    "member": int,
+    "last_member": int,
+    # Newton iterations of this step; easy steps in a row; age of the Jacobian; steps that the ledger has refused.
+    "tries": int,
+    "calm": int,
+    "fresh": int,
+    "refused": int,
+}
+"""Numbers of a trajectory."""
+
+WIDTH = 4
+"""States in a vector of the processor."""
+
+ROWS = 7 + WIDTH - 1
+"""Rows of a matrix of seven stages with room for the last vector, even of a single state."""
+
+SCAN_POINTS = 17
+"""Points of a step of the highest order at which guards are examined."""
+
+MEMORY: dict[str, tuple[type, tuple[str | int, ...]]] = {
+    # t, y, ydot, parameters: what every function of the program is given
+    "inputs": (float, ("n_inputs",)),
+    # state and rates now; a trial; weights of the error norm and typical sizes, now and when the matrices were factored
+    "y": (float, ("n",)),
+    "ydot": (float, ("n",)),
+    "trial": (float, ("n",)),
+    "trial_dot": (float, ("n",)),
+    "weight": (float, ("n",)),
+    "scale": (float, ("n",)),
+    "pivot": (float, ("n",)),
+    # error of the step, correction of its polynomial, right-hand sides and columns of linear systems
+    "error": (float, ("n",)),
+    "correction": (float, ("n",)),
+    "rhs": (float, ("n",)),
+    "delta": (float, ("n",)),
+    "columns": (float, ("n",)),
+    # rounding: of the variables; roughness of the equations over neighbouring times
+    "noise": (float, ("n",)),
+    "wobble": (float, ("n",)),
+    "wobble_now": (float, ("n",)),
+    "wobble_sums": (float, (3, "n")),
+    # stages: increments, those of the stored step, residuals and corrections, slopes, and both in the eigenbasis
+    "z": (float, (ROWS, "n")),
+    "z_last": (float, (ROWS, "n")),
+    "g": (float, (ROWS, "n")),
+    "slopes": (float, (ROWS, "n")),
+    "parts": (float, (ROWS, "n")),
+    "pairs": (complex, (3, "n")),
+    # derivatives by states and by rates, one behind the other as the compiled function writes them
+    "jacobian": (float, (2, "core", "core")),
+    "border_derivatives": (float, (2, "core", "links")),
+    "band_derivatives": (float, (2, "cells", 3)),
+    # Newton matrices and their factors
+    "real": (float, ("core", "core")),
+    "real_border": (float, ("core", "links")),
+    "real_bands": (float, ("cells", 3)),
+    "complex": (complex, (3, "core", "core")),
+    "complex_border": (complex, (3, "core", "links")),
+    "complex_bands": (complex, (3, "cells", 3)),
+    "order": (int, (4, "core")),
+    # polynomials in Newton's form: the stored one, and those of state and ledger over the step
+    "z_polynomial": (float, ("n", 9)),
+    "polynomial": (float, ("n", 9)),
+    "q_polynomial": (float, ("n_ledger", 9)),
+    # change of the state and its rate at the points where guards are examined
+    "scanned": (float, (SCAN_POINTS + 3, "n")),
+    "scanned_rates": (float, (SCAN_POINTS + 3, "n")),
+    # ledger: now, at a trial, correction of its polynomial, a probe; errors, what they are held against, the largest
+    # so far, rates at a state that differs by its tolerance; at the stages; rates there and, last, at the start
+    "q": (float, ("n_ledger",)),
+    "q_trial": (float, ("n_ledger",)),
+    "q_correction": (float, ("n_ledger",)),
+    "q_probe": (float, ("n_ledger",)),
+    "q_miss": (float, ("n_ledger",)),
+    "q_scale": (float, ("n_ledger",)),
+    "q_largest": (float, ("n_ledger",)),
+    "q_nudged": (float, ("n_ledger",)),
+    "q_stage": (float, (7, "n_ledger")),
+    "rates": (float, (8, "n_ledger")),
+    # guards: value now, at the two points before and at the start of the step, elsewhere; largest size so far; slope;
+    # side of zero each was last seen on, at the start of the step and at the point before; ends of the interval in
+    # which it reaches zero; which have fired
+    "margin": (float, ("n_margins",)),
+    "margin_before": (float, ("n_margins",)),
+    "margin_earlier": (float, ("n_margins",)),
+    "margin_first": (float, ("n_margins",)),
+    "margin_probe": (float, ("n_margins",)),
+    "margin_largest": (float, ("n_margins",)),
+    "margin_slope": (float, ("n_margins",)),
+    "side": (float, ("n_margins",)),
+    "side_first": (float, ("n_margins",)),
+    "side_last": (float, ("n_margins",)),
+    "low": (float, ("n_margins",)),
+    "high": (float, ("n_margins",)),
+    "fired": (int, ("n_margins",)),
+}
+"""Arrays that a trajectory writes to: type and shape."""
+
+
+@lru_cache(maxsize=64)
+def _bytes_of(sizes: tuple[int, ...]) -> int:
+    """Memory of a trajectory of a program of these sizes."""
+    size_of = dict(zip(SIZES, sizes, strict=True))
+    total = 0
+    for kind, shape in MEMORY.values():
+        lengths = (size_of[length] if isinstance(length, str) else length for length in shape)
+        total += np.dtype(kind).itemsize * math.prod(lengths)
+    return total
+
 
 _SOURCES = (
     "../contract",
@@ -89,16 +233,14 @@ def _compiled() -> Any:
     from surfacechem.solve.radau.driver import run_batch
     from surfacechem.solve.radau.work import PARTS
 
-    def kind(dtype: Any, ndim: int) -> Any:
-        entry = from_dtype(np.dtype(dtype))
-        return types.Array(entry, ndim, "C") if ndim else entry
-
     numba_types: Any = types
-    batch = numba_types.Tuple([kind(*field) for field in FIELDS.values()])
-    signature = types.void(types.int64, types.int64, batch)
+    entries = [(from_dtype(np.dtype(dtype)), axes) for dtype, axes in BATCH.values()]
+    batch = numba_types.Tuple([types.Array(entry, axes, "C") if axes else entry for entry, axes in entries])
+    signature = types.void(types.int64, types.int64, types.int64[::1], batch)
     kernel = compile_kernel(run_batch, signature, _folder(), PARTS)
     # A batch of no runs: Numba looks longer at the types of its first arguments than a brief run takes.
-    kernel(0, 0, tuple(np.zeros((0,) * ndim, dtype) if ndim else dtype(0) for dtype, ndim in FIELDS.values()))
+    nothing = (np.zeros((len(SIZES),) * axes, dtype) if axes else dtype(0) for dtype, axes in BATCH.values())
+    kernel(0, 0, np.zeros(0, np.int64), tuple(nothing))
     objectcode.keep(kernel, _folder())
     return kernel
 
@@ -113,6 +255,12 @@ def run_batch() -> Any:
         with _LOCK:
             _Loaded.kernel = _Loaded.kernel or _compiled()
     return _Loaded.kernel
+
+
+def run(batch: Any, first: int, last: int) -> None:
+    """Run some of a batch with a memory of their own: threads may do so with different runs at the same time."""
+    memory = np.zeros(_bytes_of(tuple(batch.sizes.tolist())) // 8, np.int64)
+    run_batch()(first, last, memory, tuple(batch))
 
 
 def load_briefly() -> None:

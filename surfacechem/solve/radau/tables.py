@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.solve.radau.stepper import SCAN_POINTS
+
 STAGES = (3, 5, 7)
 
 EDGE = 1e-6
 """The slopes of margins at both ends of a step are seen at this distance."""
-SCAN_POINTS = 17
-"""Points of a step of the highest order at which margins are examined."""
 FINEST = (2e-5, 3e-12)
 """Relative tolerances above which 3 and 5 stages reach an error soonest, measured on Robertson's and other problems."""
 COARSE = 3e-6

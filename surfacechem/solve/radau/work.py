@@ -1,4 +1,4 @@
-"""Calling machine code by its address from compiled Python, and the workspace of one trajectory.
+"""The memory of one trajectory as a record with named fields, and calls of machine code by its address.
 
 The address is data, not a function type: code compiled here never depends on the scene it calls and is cached for good.
 
@@ -7,36 +7,43 @@ compiler to make vectors of them; here they are written as vectors, whatever the
 a row runs over into the next row, which is written after it, or into rows that are kept free behind the last stage.
 """
 
-from functools import partial
-from typing import Any, NamedTuple
+from functools import reduce
+from typing import Any, NamedTuple, cast
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
-from numba.np.arrayobj import populate_array
+from numba.extending import (
+    infer_getattr,
+    intrinsic,
+    lower_getattr_generic,
+    lower_setattr_generic,
+    models,
+    register_model,
+)
 
-from surfacechem.solve.radau.tables import SCAN_POINTS
+from surfacechem.solve.radau.stepper import BATCH, MEMORY, NUMBERS, SIZES, WIDTH
 
 _njit: Any = numba.njit
 _intrinsic: Any = intrinsic
-_borrowed: Any = impl_ret_borrowed
 _Constant: Any = ir.Constant
+_loop: Any = cgutils.for_range
+_strided_loop: Any = cgutils.for_range_slice
+_alloca: Any = cgutils.alloca_once
 
 PARTS: set[str] = set()
 """Names of the functions that only the kernel itself calls."""
 
 
-def compiled(function: Any, counted: bool = False) -> Any:
-    """A part of the kernel. Nothing is allocated inside a step; without reference counts the code compiles and runs
-    about twice as fast.
+def compiled(function: Any) -> Any:
+    """A part of the kernel. Nothing is allocated: without reference counts the code compiles and runs about twice as
+    fast.
     """
     PARTS.add(function.__qualname__)
-    return _njit(error_model="numpy", _nrt=counted, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
 RESIDUAL, JACOBIAN, LEDGER, MARGINS = np.arange(4)
@@ -45,125 +52,157 @@ FUNCTIONS = 4
 functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
 constant."""
 
-(
-    ATOL, WEIGHT, SCALE, Y, YDOT, ERROR, RHS, TRIAL, TRIAL_DOT, DELTA, COLUMNS, CORRECTION, NOISE, PIVOT,
-    WOBBLE, WOBBLE_NOW, WOBBLE_SUMS,
-) = np.arange(17)  # fmt: skip
-"""Rows of the vectors of length n; PIVOT is SCALE as it was when the Newton matrices were factored, WOBBLE the
-roughness of the equations over neighbouring times. It is found from the last three rows, of which WOBBLE_SUMS is the
-first."""
-Q, Q_TRIAL, Q_CORRECTION, Q_PROBE, Q_MISS, Q_SCALE, Q_LARGEST, Q_NUDGED = np.arange(8)
-"""Rows of the vectors of length n_ledger."""
-(
-    M_NOW, M_SIDE, M_BEFORE, M_EARLIER, M_LARGEST, M_SLOPE, M_PROBE, M_LOW, M_HIGH, M_FIRST, M_FIRST_SIDE, M_LAST_SIDE,
-) = np.arange(12)  # fmt: skip
-"""Rows of the vectors of length n_margins: value; side of zero it was last seen on; values at the two points before;
-largest size so far; slope; value elsewhere; ends of the interval in which it reaches zero; value and side at the
-start of the step; side at the point before."""
-(
-    BASE, TAU, H_LAST, OFFSET, THETA, CONTRACTION, ROUNDOFF, RTOL, LOOSE, H_FACTORED, H_JACOBIAN, GUESSED,
-) = np.arange(12)  # fmt: skip
-"""Clock: time is BASE + TAU, with TAU counted from the last restart, so that steps can be far smaller than one ulp of
-t. H_FACTORED and H_JACOBIAN are the steps of the current factors and Jacobian; GUESSED is by how much the first
-guess of the stages was wrong, in units of the tolerance."""
-STEPS, REJECTED, RESIDUALS, JACOBIANS, FACTORIZATIONS, ITERATIONS = np.arange(6)
-MEMBER, LAST_MEMBER, TRIES, CALM, FRESH, REFUSED = np.arange(6, 12)
-"""Counters; members of the Radau family used now and by the stored polynomial; Newton
-iterations of this step and easy steps in a row; whether the Jacobian was taken at the current state; steps that the
-ledger has refused."""
+# -- The record ----------------------------------------------------------------------------------------------------
+
+_WORD = ir.IntType(64)
+_POINTER = ir.IntType(8).as_pointer()
+_NUMBA: dict[Any, Any] = {float: types.float64, int: types.int64, complex: types.complex128}
 
 
-class Work(NamedTuple):
-    """Everything one trajectory writes to; allocated once for a batch."""
+class _Field(NamedTuple):
+    kind: Any
+    shape: tuple[str | int, ...] | None
+    """Of an array: None where its lengths stand behind its address."""
+    place: int
+    """In words of eight bytes."""
 
-    code: Any
-    algebraic: Any
-    chains: Any
-    groups: Any
-    kinds: Any
-    inputs: Any
-    clock: Any
-    count: Any
-    vector: Any
-    z: Any
-    z_last: Any
-    g: Any
-    slopes: Any
-    parts: Any
-    pairs: Any
-    jacobian: Any
-    border_derivatives: Any
-    band_derivatives: Any
-    real: Any
-    real_border: Any
-    real_bands: Any
-    complex: Any
-    complex_border: Any
-    complex_bands: Any
-    order: Any
-    z_polynomial: Any
-    scanned: Any
-    scanned_rates: Any
-    ledger: Any
-    q_stage: Any
-    rates: Any
-    polynomial: Any
-    q_polynomial: Any
-    margin: Any
-    fired: Any
+
+def _layout() -> tuple[dict[str, _Field], int]:
+    """The fields of the record and its number of words."""
+    fields: dict[str, _Field] = {}
+    place = 0
+    for name, (dtype, axes) in BATCH.items():
+        entry = _NUMBA.get(dtype) or numba.from_dtype(np.dtype(dtype))
+        fields[name] = _Field(types.Array(entry, axes, "C") if axes else entry, None, place)
+        place += 1 + axes
+    for name, kind in {**dict.fromkeys(SIZES, int), **NUMBERS}.items():
+        fields[name] = _Field(_NUMBA[kind], None, place)
+        place += 1
+    for name, (kind, shape) in MEMORY.items():
+        fields[name] = _Field(types.Array(_NUMBA[kind], len(shape), "C"), shape, place)
+        place += 1
+    return fields, place
+
+
+FIELDS, WORDS = _layout()
 
 
 class WorkType(types.Type):
-    """Pointer to a Work. By value its arrays would be 140 arguments of every call."""
+    """Pointer to the record. By value its arrays would be hundreds of arguments of every call."""
 
-    def __init__(self, content: Any) -> None:
-        self.content = content
-        super().__init__(name=f"Pointer({content})")
+
+WORK = WorkType(name="Work")
 
 
 @register_model(WorkType)
 class _WorkModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.IntType(8).as_pointer())  # type: ignore[no-untyped-call]
+        super().__init__(manager, kind, _POINTER)  # type: ignore[no-untyped-call]
 
 
 @infer_getattr
 class _WorkFields(AttributeTemplate):
     key = WorkType
 
-    def generic_resolve(self, work: Any, name: str) -> Any:  # type: ignore[override]
-        return work.content.types[work.content.fields.index(name)]
+    def generic_resolve(self, _work: Any, name: str) -> Any:  # type: ignore[override]
+        return FIELDS[name].kind
 
 
-def _load(builder: Any, pointer: Any, kind: Any) -> Any:
-    """Load a structure leaf by leaf, so that unused leaves are dropped."""
-    if not isinstance(kind, ir.Aggregate):
-        return builder.load(pointer)
-    value = _Constant(kind, ir.Undefined)
-    for i in range(len(kind)):
-        leaf = builder.gep(pointer, [ir.IntType(32)(0), ir.IntType(32)(i)], inbounds=True)
-        value = builder.insert_value(value, _load(builder, leaf, kind.gep(_Constant(ir.IntType(32), i))), i)
+def _word(builder: Any, work: Any, place: int, kind: Any) -> Any:
+    """Pointer to a word of the record."""
+    return builder.bitcast(builder.gep(work, [_WORD(8 * place)], inbounds=True), kind.as_pointer())
+
+
+def _fixed(builder: Any, work: Any, place: int, kind: Any) -> Any:
+    """A word that never changes: an address, a size, a number of the batch. Told so, the compiler keeps it in a
+    register instead of looking again after each store.
+    """
+    value = builder.load(_word(builder, work, place, kind))
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value
 
 
 @lower_getattr_generic(WorkType)  # type: ignore[no-untyped-call]
-def _load_field(context: Any, builder: Any, work: Any, value: Any, name: str) -> Any:
-    kind = context.get_value_type(work.content)
-    index = ir.IntType(32)(work.content.fields.index(name))
-    pointer = builder.gep(builder.bitcast(value, kind.as_pointer()), [ir.IntType(32)(0), index], inbounds=True)
-    field = work.content.types[work.content.fields.index(name)]
-    return _borrowed(context, builder, field, _load(builder, pointer, pointer.type.pointee))
+def _load_field(context: Any, builder: Any, _work: Any, work: Any, name: str) -> Any:
+    kind, shape, place = FIELDS[name]
+    if name in NUMBERS:
+        return builder.load(_word(builder, work, place, context.get_value_type(kind)))
+    if not isinstance(kind, types.Array):
+        return _fixed(builder, work, place, context.get_value_type(kind))
+    lengths = []
+    for axis, length in enumerate(shape or (None,) * kind.ndim):
+        at = place + 1 + axis if length is None else FIELDS[length].place if isinstance(length, str) else None
+        lengths.append(_WORD(length) if at is None else _fixed(builder, work, at, _WORD))
+    size = _WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    strides, pack = [size], cast(Any, cgutils.pack_array)
+    for length in reversed(lengths):
+        strides.insert(0, builder.mul(strides[0], length))
+    model, value = context.data_model_manager[kind], _Constant(context.get_value_type(kind), ir.Undefined)
+    parts = {
+        "meminfo": _Constant(_POINTER, None),
+        "parent": _Constant(_POINTER, None),
+        "nitems": reduce(builder.mul, lengths),
+        "itemsize": size,
+        "data": _fixed(builder, work, place, context.get_data_type(kind.dtype).as_pointer()),
+        "shape": pack(builder, lengths),
+        "strides": pack(builder, strides[1:]),
+    }
+    for part, entry in parts.items():
+        value = model.set(builder, value, entry, part)
+    return value
+
+
+@lower_setattr_generic(WorkType)  # type: ignore[no-untyped-call]
+def _store_field(_context: Any, builder: Any, _signature: Any, args: Any, name: str) -> None:
+    assert name in NUMBERS, f"{name} does not change"
+    work, value = args
+    builder.store(value, _word(builder, work, FIELDS[name].place, value.type))
 
 
 @_intrinsic
-def reference(_context: Any, content: Any) -> Any:
-    """Pointer to a copy on the caller's stack; the caller keeps the arrays alive."""
+def lay_out(_context: Any, batch: Any, memory: Any) -> Any:
+    """The record of a batch, on the caller's stack: what it is given, and the addresses of what it works on."""
 
-    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        slot = cgutils.alloca_once_value(builder, args[0])  # type: ignore[no-untyped-call]
-        return builder.bitcast(slot, ir.IntType(8).as_pointer())
+    def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        work = builder.bitcast(_alloca(builder, ir.ArrayType(_WORD, WORDS)), _POINTER)
 
-    return WorkType(content)(content), generate
+        def store(place: int, value: Any) -> None:
+            builder.store(value, _word(builder, work, place, value.type))
+
+        for k, (name, kind) in enumerate(zip(BATCH, batch.types, strict=True)):
+            place, value = FIELDS[name].place, builder.extract_value(args[0], k)
+            if isinstance(kind, types.Array):
+                given = context.make_array(kind)(context, builder, value)
+                store(place, given.data)
+                for axis in range(kind.ndim):
+                    store(place + 1 + axis, builder.extract_value(given.shape, axis))
+                if name == "sizes":
+                    for j, size in enumerate(SIZES):
+                        entry = builder.gep(given.data, [_WORD(j)])
+                        store(FIELDS[size].place, builder.load(entry))
+            else:
+                store(place, value)
+        for name, kind in NUMBERS.items():
+            store(FIELDS[name].place, _Constant(context.get_value_type(_NUMBA[kind]), 0))
+        free = builder.ptrtoint(context.make_array(memory)(context, builder, args[1]).data, _WORD)
+        for name, (kind, shape) in MEMORY.items():
+            store(FIELDS[name].place, free)
+            size = _WORD(np.dtype(kind).itemsize)
+            for length in shape:
+                if isinstance(length, str):
+                    count = builder.load(_word(builder, work, FIELDS[length].place, _WORD))
+                else:
+                    count = _WORD(length)
+                size = builder.mul(size, count)
+            free = builder.add(free, size)
+        # What follows is told that these words never change: it must not know that they have just been written.
+        opaque = ir.FunctionType(_POINTER, [_POINTER])
+        return builder.asm(opaque, "", "=r,0,~{memory}", [work], True)
+
+    return WORK(batch, memory), generate
+
+
+# -- Calls ---------------------------------------------------------------------------------------------------------
 
 
 @_intrinsic
@@ -171,10 +210,9 @@ def _call(_context: Any, _address: Any, _out: Any, _inputs: Any, _user: Any) -> 
     signature = types.void(types.intp, types.intp, types.intp, types.intp)
 
     def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        pointer = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer, pointer]).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [_POINTER] * 3).as_pointer()
         function = builder.inttoptr(args[0], kind)
-        builder.call(function, [builder.inttoptr(argument, pointer) for argument in args[1:]])
+        builder.call(function, [builder.inttoptr(argument, _POINTER) for argument in args[1:]])
         return context.get_dummy_value()
 
     return signature, generate
@@ -188,8 +226,9 @@ def _evaluate_rest(w: Any, which: int, out: int) -> None:
 
 
 @compiled
-def evaluate(w: Any, which: int, out: int) -> None:
-    """Call a function of the program on the current inputs; ``out`` is the address of the result."""
+def evaluate(w: Any, which: int, result: Any) -> None:
+    """Call a function of the program on the current inputs."""
+    out = result.ctypes.data
     _call(w.code[which, 0], out, w.inputs.ctypes.data, w.code[which, 1])
     if w.code.shape[0] > FUNCTIONS:
         _evaluate_rest(w, which, out)
@@ -198,10 +237,23 @@ def evaluate(w: Any, which: int, out: int) -> None:
 @compiled
 def set_inputs(w: Any, y: Any, ydot: Any) -> None:
     """State and rates of the next call."""
-    n = y.shape[0]
+    n, inputs = w.n, w.inputs
     for j in range(n):
-        w.inputs[1 + j] = y[j]
-        w.inputs[1 + n + j] = ydot[j]
+        inputs[1 + j] = y[j]
+        inputs[1 + n + j] = ydot[j]
+
+
+@compiled
+def put(w: Any, offset: float, y: Any, ydot: Any) -> None:
+    """Inputs of the next call, this time after the start of the step."""
+    w.inputs[0] = w.base + (w.tau + offset)
+    set_inputs(w, y, ydot)
+
+
+@compiled
+def row_of(table: Any, i: int) -> int:
+    """Row of run i in a table that has one for each run, or one for all."""
+    return min(i, int(table.shape[0]) - 1)
 
 
 @compiled
@@ -236,85 +288,10 @@ def finite(values: Any) -> bool:
     return total == 0.0
 
 
-@_intrinsic
-def _take(_context: Any, cursor: Any, shape: Any, kind: Any) -> Any:
-    """An array on the memory the cursor, a vector of one address, points to; moves the cursor to its end."""
-    array = types.Array(kind.instance_type, len(shape), "C")
+# -- Tables times stages -------------------------------------------------------------------------------------------
 
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        place = context.make_array(signature.args[0])(context, builder, args[0]).data
-        start = builder.load(place)
-        size = context.get_constant(types.intp, array.dtype.bitwidth // 8)
-        lengths = cgutils.unpack_tuple(builder, args[1])  # type: ignore[no-untyped-call]
-        strides = [size]
-        for length in reversed(lengths):
-            strides.insert(0, builder.mul(strides[0], length))
-        builder.store(builder.add(start, strides[0]), place)
-        made = context.make_array(array)(context, builder)
-        data = builder.inttoptr(start, made.data.type)
-        populate_array(made, data=data, shape=lengths, strides=strides[1:], itemsize=size, meminfo=None)  # type: ignore[no-untyped-call]
-        return made._getvalue()
-
-    return array(cursor, shape, kind), generate
-
-
-@partial(compiled, counted=True)
-def lay_out(batch: Any, cursor: Any) -> Work:
-    """Workspace of a trajectory on the zeros from the cursor's address on; leaves their end there. No memory is
-    touched. The three arrays of derivatives follow each other, as the compiled function writes them.
-    """
-    algebraic, chains, groups = batch.algebraic, batch.chains, batch.groups
-    n_parameters, n_margins = batch.parameters.shape[2], batch.kinds.shape[0]
-    n, links, n_ledger = algebraic.shape[0], chains.shape[0], groups.shape[0]
-    core = chains[0, 0] if links > 0 else n
-    cells = n - core
-    return Work(
-        batch.code,
-        algebraic,
-        chains,
-        groups,
-        batch.kinds,
-        _take(cursor, (1 + 2 * n + n_parameters,), np.float64),
-        _take(cursor, (GUESSED + 1,), np.float64),
-        _take(cursor, (REFUSED + 1,), np.int64),
-        _take(cursor, (WOBBLE_SUMS + 3, n), np.float64),
-        _take(cursor, (ROWS, n), np.float64),
-        _take(cursor, (ROWS, n), np.float64),
-        _take(cursor, (ROWS, n), np.float64),
-        _take(cursor, (ROWS, n), np.float64),
-        _take(cursor, (ROWS, n), np.float64),
-        _take(cursor, (3, n), np.complex128),
-        _take(cursor, (2, core, core), np.float64),
-        _take(cursor, (2, core, links), np.float64),
-        _take(cursor, (2, cells, 3), np.float64),
-        _take(cursor, (core, core), np.float64),
-        _take(cursor, (core, links), np.float64),
-        _take(cursor, (cells, 3), np.float64),
-        _take(cursor, (3, core, core), np.complex128),
-        _take(cursor, (3, core, links), np.complex128),
-        _take(cursor, (3, cells, 3), np.complex128),
-        _take(cursor, (4, core), np.int64),
-        _take(cursor, (n, 9), np.float64),
-        _take(cursor, (SCAN_POINTS + 3, n), np.float64),
-        _take(cursor, (SCAN_POINTS + 3, n), np.float64),
-        _take(cursor, (Q_NUDGED + 1, n_ledger), np.float64),
-        _take(cursor, (7, n_ledger), np.float64),
-        _take(cursor, (8, n_ledger), np.float64),
-        _take(cursor, (n, 9), np.float64),
-        _take(cursor, (n_ledger, 9), np.float64),
-        _take(cursor, (M_LAST_SIDE + 1, n_margins), np.float64),
-        _take(cursor, (n_margins,), np.int64),
-    )
-
-
-_loop: Any = cgutils.for_range
-_strided_loop: Any = cgutils.for_range_slice
-
-WIDTH = 4
-"""States in a vector."""
-
-ROWS = 7 + WIDTH - 1
-"""Rows of a matrix of seven stages with room for the last vector, even of a single state."""
+_NUMBER = ir.DoubleType()
+_VECTOR = ir.VectorType(_NUMBER, WIDTH)
 
 
 @_intrinsic
@@ -328,41 +305,26 @@ def combine(
 
     def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         table, width, rows, terms, values, states, out = args
-        place = _places(builder)
-        total = cgutils.alloca_once(builder, _VECTOR)  # type: ignore[no-untyped-call]
+
+        def place(start: Any, row: Any, width: Any, column: Any, kind: Any) -> Any:
+            entry = builder.add(builder.mul(row, width), column)
+            return builder.inttoptr(builder.add(start, builder.mul(entry, _WORD(8))), kind.as_pointer())
+
+        total = _alloca(builder, _VECTOR)
         with (
             _loop(builder, rows) as row,
-            _strided_loop(builder, states.type(0), states, states.type(WIDTH), inc=True) as (first, _),
+            _strided_loop(builder, _WORD(0), states, _WORD(WIDTH), inc=True) as (first, _),
         ):
             builder.store(_Constant(_VECTOR, [0.0] * WIDTH), total)
             with _loop(builder, terms) as term:
                 factor = builder.load(place(table, row.index, width, term.index, _NUMBER))
                 value = builder.load(place(values, term.index, states, first, _VECTOR), align=8)
-                product = builder.fmul(_spread(builder, factor), value)
-                builder.store(builder.fadd(builder.load(total), product), total)
+                # The factor in every place of a vector.
+                nothing, lanes = _Constant(_VECTOR, ir.Undefined), ir.VectorType(ir.IntType(32), WIDTH)
+                single = builder.insert_element(nothing, factor, ir.IntType(32)(0))
+                factors = builder.shuffle_vector(single, nothing, _Constant(lanes, [0] * WIDTH))
+                builder.store(builder.fadd(builder.load(total), builder.fmul(factors, value)), total)
             builder.store(builder.load(total), place(out, row.index, states, first, _VECTOR), align=8)
         return context.get_dummy_value()
 
     return signature, generate
-
-
-_NUMBER = ir.DoubleType()
-_VECTOR = ir.VectorType(_NUMBER, WIDTH)
-
-
-def _places(builder: Any) -> Any:
-    """Pointer to the entry (row, column) of a matrix that begins at an address."""
-
-    def place(start: Any, row: Any, width: Any, column: Any, kind: Any) -> Any:
-        entry = builder.add(builder.mul(row, width), column)
-        address = builder.add(start, builder.mul(entry, start.type(8)))
-        return builder.inttoptr(address, kind.as_pointer())
-
-    return place
-
-
-def _spread(builder: Any, number: Any) -> Any:
-    """A vector of the same number."""
-    nothing = _Constant(_VECTOR, ir.Undefined)
-    first = builder.insert_element(nothing, number, ir.IntType(32)(0))
-    return builder.shuffle_vector(first, nothing, _Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
