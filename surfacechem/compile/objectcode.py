@@ -1,8 +1,8 @@
 """The compiled stepper without its compiler: machine code that Numba has made, loaded and called by itself.
 
-Importing Numba takes half of the time of a brief process. The code needs nothing of it but memory, which is given here:
-it is loaded by LLVM alone, in a tenth of that time. A call costs some ten microseconds more than Numba's own, which is
-why only processes that make few of them use it.
+Importing Numba takes half of the time of a brief process. The code needs nothing of it: it is loaded by LLVM alone, in
+a tenth of that time. A call costs some ten microseconds more than Numba's own, which is why only processes that make
+few of them use it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +23,9 @@ from surfacechem.compile.cache import keep_file, sealed, unsealed, untrusted
 
 FILE = "kernel.object"
 
-HEAD = 64
-"""Bytes before the data of an allocation: count of references, destructor and its data, address, size, allocator."""
-
 UNUSED = (
     "NRT_Free",
+    "NRT_MemInfo_call_dtor",
     "NRT_adapt_ndarray_from_python",
     "numba_do_raise",
     "numba_gil_ensure",
@@ -36,7 +33,7 @@ UNUSED = (
     "numba_runtime_build_excinfo_struct",
     "numba_unpickle",
 )
-"""What only the entry from Python calls, which is not used here."""
+"""What only the entry from Python calls, which is not used here: in its place stands what ends the process."""
 
 LONGEST = 60.0
 """Time [s] after which a process that loads the code has failed."""
@@ -90,10 +87,12 @@ class Kernel:
 
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()
-        for symbol, function in _symbols().items():
-            llvm.add_symbol(symbol, ctypes.cast(function, ctypes.c_void_p).value)
         machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        missing = llvm.parse_assembly("\n".join(f"declare void @{name}()" for name in UNUSED))
+        self._engine = llvm.create_mcjit_compiler(missing, machine)
+        abort = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
+        for symbol in UNUSED:  # in this engine alone: Numba may be at work in the same process
+            self._engine.add_global_mapping(missing.get_function(symbol), abort)
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
         self._address = self._engine.get_function_address(name)
@@ -102,16 +101,14 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> None:
         """Call the kernel; the interpreter goes on in other threads meanwhile."""
-        words = [word for argument in arguments for word in _words(argument)]
-        self._call = self._call or self._typed(words)
+        words = _words(arguments)
+        if self._call is None:
+            kinds = [ctypes.c_double if isinstance(word, float) else ctypes.c_int64 for word in words]
+            code = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *kinds)
+            self._call = code(self._address)
         status = self._call(ctypes.addressof(self._nothing), ctypes.addressof(self._error), *words)
         if status != 0:
             raise RuntimeError(f"the compiled stepper ended with status {status}")
-
-    def _typed(self, words: Sequence[Any]) -> Any:
-        """The code as a function of words like these."""
-        kinds = [ctypes.c_double if isinstance(word, float) else ctypes.c_int64 for word in words]
-        return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *kinds)(self._address)
 
 
 def _words(argument: Any) -> Sequence[Any]:
@@ -123,23 +120,3 @@ def _words(argument: Any) -> Sequence[Any]:
     if isinstance(argument, np.ndarray):
         return (0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides)
     return (argument,)
-
-
-@cache
-def _symbols() -> dict[str, Any]:
-    """What the code calls: memory; for the rest something that ends the process."""
-    library: Any = ctypes.CDLL(None)
-    library.malloc.restype, library.malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
-    library.free.argtypes = [ctypes.c_void_p]
-
-    def allocate(size: int, alignment: int) -> int:
-        start: int = library.malloc(size + HEAD + alignment)
-        data = -(-(start + HEAD) // alignment) * alignment
-        (ctypes.c_size_t * 6).from_address(start)[:] = [1, 0, 0, data, size, 0]
-        return start
-
-    return {
-        "NRT_MemInfo_alloc_aligned": ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint32)(allocate),
-        "NRT_MemInfo_call_dtor": ctypes.CFUNCTYPE(None, ctypes.c_void_p)(library.free),
-        **dict.fromkeys(UNUSED, library.abort),
-    }
