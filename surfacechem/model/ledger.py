@@ -124,16 +124,24 @@ def _account(build: Build, power: Power) -> None:
 
 
 def totals(build: Build) -> None:
-    """Energies, entropies and the fluxes into the bodies."""
+    """Energies, entropies, the fluxes into the bodies, the heat of reaction, and the modes, as outputs."""
+    stored: dict[str, list[tuple[Node | None, Expression]]] = {}
+    inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
+    for node in (*build.thermal.nodes.values(), *inside):
+        for member, F in node.energies.items():
+            if F != 0:
+                stored.setdefault(member, []).append((node, F))
+    if build.interface.temperature is None and build.psi != 0:  # no medium, and so no temperature of its own
+        stored[INTERFACE] = [(None, build.psi)]
+    suffixes = {INTERFACE: "c"} | {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
     energies, entropies = [], []
-    for member, parts in _stored(build).items():
-        names = [body.name for body in build.scene.bodies]
-        suffix = str(names.index(member) + 1) if member in names else "c"
+    for member, parts in stored.items():
         U = _sum([balances.internal_energy(F, node.T) if node else F for node, F in parts])
-        energies.append(build.name(Quantity(f"U_{suffix}", "J/m^2", f"internal energy of {member}"), U))
+        quantity = Quantity(f"U_{suffixes[member]}", "J/m^2", f"internal energy of {member}")
+        energies.append(build.name(quantity, U))
         S = _sum([balances.entropy(F, node.T) for node, F in parts if node])
         if S != 0:
-            quantity = Quantity(f"S_{suffix}", "J/(m^2 K)", f"entropy of {member}")
+            quantity = Quantity(f"S_{suffixes[member]}", "J/(m^2 K)", f"entropy of {member}")
             entropies.append(build.name(quantity, S))
     moved = (f"E_{kind}_{axis}" for axis in build.motion.far_fields for kind in ("spring", "kinetic"))
     energies += [symengine.Symbol(name) for name in moved if build.is_named(name)]
@@ -141,43 +149,11 @@ def totals(build: Build) -> None:
     build.name(Quantity("S_total", "J/(m^2 K)", "total entropy"), sum(entropies, symengine.Integer(0)))
     _fluxes(build)
     _enthalpy(build)
-    _name_modes(build)
-
-
-def _name_modes(build: Build) -> None:
-    """Modes, and the bonding state where coverages of a mechanism stand for it, as outputs."""
     for mode in build.modes:
         words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
         build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
-    if build.interface.bonds:
+    if build.interface.bonds:  # coverages of a mechanism stand for the bonding state
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
-
-
-def _stored(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
-    """Nodes and free energies of every member that stores energy; no node where there is no medium."""
-    found: dict[str, list[tuple[Node | None, Expression]]] = {}
-    inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
-    for node in (*build.thermal.nodes.values(), *inside):
-        for member, F in node.energies.items():
-            if F != 0:
-                found.setdefault(member, []).append((node, F))
-    if build.interface.temperature is None and build.psi != 0:
-        found["interface"] = [(None, build.psi)]
-    return found
-
-
-def _enthalpy(build: Build) -> None:
-    """Heat of reaction and contact enthalpy per bonding site, where bonds alone change on the interface."""
-    bonds = [x for x in build.rates if str(x) not in GEOMETRY and depends(build.psi, x)]
-    if not bonds or any(law.taken is not None for law in build.interface.reactions):
-        return
-    text = "heat of reaction at constant temperature and gap, positive where exothermic"
-    build.name(Quantity("q_reaction", "W/m^2", text), _heat_of_reaction(build))
-    if build.variables.has("N_c"):
-        borne = sum((symengine.Symbol(g) * derivative(build.psi, symengine.Symbol(g)) for g in GAPS), 0)
-        site = build.variables.get("N_c", "the contact enthalpy")
-        text = "contact enthalpy per bonding site"
-        build.name(Quantity("e_c", "J", text), (symengine.Symbol("U_c") - borne) / site)
 
 
 def _sum(terms: list[Expression]) -> Expression:
@@ -185,7 +161,24 @@ def _sum(terms: list[Expression]) -> Expression:
     return terms[0] if len(terms) == 1 else symengine.Add(*terms)
 
 
+def _enthalpy(build: Build) -> None:
+    """Heat of reaction and contact enthalpy per bonding site, where bonds alone change on the interface."""
+    bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
+    if not any(depends(build.psi, x) for x in bonds) or any(law.taken is not None for law in build.interface.reactions):
+        return
+    node = build.thermal.node_of.get(INTERFACE)
+    U = balances.internal_energy(build.psi, node.T) if node else build.psi
+    heat = -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
+    text = "heat of reaction at constant temperature and gap, positive where exothermic"
+    build.name(Quantity("q_reaction", "W/m^2", text), heat)
+    if build.variables.has("N_c"):
+        borne = sum((symengine.Symbol(g) * derivative(build.psi, symengine.Symbol(g)) for g in GAPS), 0)
+        site = build.variables.get("N_c", "the contact enthalpy")
+        build.name(Quantity("e_c", "J", "contact enthalpy per bonding site"), (symengine.Symbol("U_c") - borne) / site)
+
+
 def _fluxes(build: Build) -> None:
+    """Heat into each body from the interface, with the accounts of what its balance says of it."""
     flows = list(passages(build))
     fluxes = []
     for k, body in enumerate(build.scene.bodies, start=1):
@@ -218,9 +211,19 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
     """
     node = build.thermal.node_of[body.name]
     sharing = build.thermal.sharing(body.name)
-    channels, others = _received(build, body, flows)
+    near = {INTERFACE, *(other.name for other in build.scene.bodies)}
+    channels: dict[str, Expression] = {}
+    elsewhere = symengine.Integer(0)
+    for flow in (flow for flow in flows if body.name in (flow.source, flow.target)):
+        sign, other = (1, flow.source) if flow.target == body.name else (-1, flow.target)
+        if other not in near:
+            elsewhere += sign * flow.rate
+        for channel, heat in flow.channels.items() if other in near else ():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
     if len(channels) > 1 and not sharing:
-        channels = {name: _part(build, k, body, name, heat) for name, heat in channels.items()}
+        for name, heat in channels.items():
+            text = f"heat flux from the interface into {body.name} by {name}"
+            channels[name] = build.areal(Quantity(f"q_{k}_{name}", "W/m^2", text), heat)
     flux = symengine.Add(*channels.values())
     if sharing and node.prescribed:
         if sharing != [INTERFACE]:
@@ -229,72 +232,11 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
         into_interface = (flow.into(INTERFACE) for flow in flows)
         flux = flux + symengine.Add(*into_interface) - moved
     elif body.name in node.energies:
-        rate = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {})
-        recovered = rate - symengine.Add(*others)
+        recovered = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {}) - elsewhere
         flux = recovered if sharing else flux
         if not node.prescribed:
-            if sharing and not build.thermal.slabs:
-                _by_source(build, k, body, flux)
             return flux, recovered
     return flux, flux
-
-
-def _received(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str, Expression], list[Expression]]:
-    """Heat into a body from the interface and the other body, by what carries it, and what it gets from elsewhere."""
-    near = {INTERFACE, *(other.name for other in build.scene.bodies)}
-    channels: dict[str, Expression] = {}
-    elsewhere = []
-    for flow in flows:
-        sign, other = (1, flow.source) if flow.target == body.name else (-1, flow.target)
-        if body.name not in (flow.source, flow.target):
-            continue
-        if other not in near:
-            elsewhere.append(sign * flow.rate)
-            continue
-        for channel, heat in flow.channels.items():
-            channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
-    return channels, elsewhere
-
-
-def _part(build: Build, k: int, body: Body, name: str, heat: Expression) -> Expression:
-    text = f"heat flux from the interface into {body.name} by {name}"
-    return build.areal(Quantity(f"q_{k}_{name}", "W/m^2", text), heat)
-
-
-def _by_source(build: Build, k: int, body: Body, flux: Expression) -> None:
-    """Name what makes the heat of a body that shares its temperature: its part, by capacity, of each source.
-
-    The rest is exchanged with what has another temperature, supplied from outside, or thermo-elastic.
-    """
-    node = build.thermal.node_of[body.name]
-    known = build.is_named(f"C_{node.name}")
-    whole = symengine.Symbol(f"C_{node.name}") if known else balances.conditioned(node.capacity(), build.about)
-    share = -node.T * balances.second(node.energies[body.name], node.T) / whole
-    dissipated = [power for power in build.powers if power.kind == DISSIPATION and power.target == INTERFACE]
-    rubbed = symengine.Add(*(power.amount for power in dissipated if power.source == MECHANICS))
-    made = {"friction": rubbed, "reaction": _heat_of_reaction(build)}
-    parts = {name: share * heat for name, heat in made.items() if heat != 0}
-    exchanges = _exchanges(build)
-    if not parts or len(parts) + exchanges < 2:
-        return
-    named = [_part(build, k, body, name, heat) for name, heat in parts.items()]
-    if exchanges:
-        _part(build, k, body, "exchange", flux - symengine.Add(*named))
-
-
-def _exchanges(build: Build) -> bool:
-    """Whether anything but friction and reactions brings heat to the bodies and the interface."""
-    supplied = any(build.variables.was_read(Q) for Q in ("Q_1", "Q_2", "Q_c"))
-    moved = any(str(x) in GEOMETRY for x in build.rates) or bool(build.motion.far_fields)
-    return bool(build.scene.heat) or supplied or moved
-
-
-def _heat_of_reaction(build: Build) -> Expression:
-    """Heat of all reactions: minus the change of the internal energy with the bonds."""
-    node = build.thermal.node_of.get(INTERFACE)
-    U = balances.internal_energy(build.psi, node.T) if node else build.psi
-    bonds = {x: rate for x, rate in build.rates.items() if str(x) not in GEOMETRY}
-    return -symengine.Add(*(derivative(U, x) * rate for x, rate in bonds.items()))
 
 
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:

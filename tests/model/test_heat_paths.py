@@ -20,7 +20,7 @@ from surfacechem.laws.contact_conductance import CooperMikicYovanovich, Pressure
 from surfacechem.laws.factors import Proportional
 from surfacechem.laws.friction import Coulomb, Stribeck
 from surfacechem.laws.heat import Conductance, GapConductance, GapTable, GasGap, Radiation
-from surfacechem.laws.kinetics import LinearAffinity, Relaxation
+from surfacechem.laws.kinetics import Relaxation
 from surfacechem.laws.loading import Hold, Ramp, Table
 from surfacechem.model.assemble import assemble
 from surfacechem.model.checks import conductance_warnings
@@ -101,39 +101,6 @@ def test_lost_heat_is_booked_and_both_laws_hold():
     for channel, heat in (("friction", values["D_coulomb"]), ("reaction", values["D_linear_affinity"])):
         for k, share in (("1", 0.3), ("2", 0.6)):
             assert values[f"q_{k}_{channel}"] == pytest.approx(share * heat, rel=1e-13)
-
-
-def test_fluxes_by_source_sum_to_the_total_in_perfect_contact():
-    potentials = [BondEnergy(K_0=300.0, K_2=40.0), InterfaceCapacity(C_c=0.2)]
-    loading = {"p": Hold(level=1e5), "v": Hold(level=0.02)}
-    scene = scenes.perfect_contact(
-        potentials, [LinearAffinity(c_r=1e16)], frictions=[Coulomb(mu=0.3)], loading=loading, C_1=2.0, C_2=3.0
-    )
-    values = solved(scene, 0.0, 0.1, 1.0)
-    for k, C in (("1", 2.0), ("2", 3.0)):
-        friction, reaction = values[f"q_{k}_friction"], values[f"q_{k}_reaction"]
-        assert friction + reaction == pytest.approx(values[f"q_{k}"], rel=1e-12)
-        capacity = C * values["T"] / 300.0
-        assert friction == pytest.approx(values["D_coulomb"] * capacity / values["C_T"], rel=1e-12)
-    assert not [item.name for item in values.system.outputs if item.name.endswith("_exchange")]
-
-
-def test_what_is_exchanged_completes_the_sources():
-    values = solved(scenes.one_sided(), 0.0, 0.1, 1.0)
-    assert values["q_1_reaction"] + values["q_1_exchange"] == pytest.approx(values["q_1"], rel=1e-12)
-    heated = scenes.perfect_contact(
-        [BondEnergy(K_0=30.0)],
-        [LinearAffinity(c_r=1e16)],
-        heat=[path("lower", "surroundings", 5.0)],
-        surroundings=Hold(level=280.0),
-    )
-    values = solved(heated, 0.0, 0.1)
-    out = values["q_1a"]
-    assert values["q_1_exchange"] == pytest.approx(out / 2, rel=1e-9)
-    assert values["q_2_exchange"] == pytest.approx(-out / 2, rel=1e-9)
-
-
-# -- closures ---------------------------------------------------------------------------------------------------------
 
 
 def through_medium(heat) -> Scene:
