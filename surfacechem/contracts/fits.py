@@ -6,7 +6,7 @@ long as they can be, so that the kinks lie between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,20 +64,6 @@ def fit(function: Callable[[Array], Array], low: float, high: float) -> tuple[Pi
         pieces.append(_polynomial(function, start, high) or _longest(function, start, high))
         start = pieces[-1].high
     return tuple(pieces)
-
-
-def divided(pieces: Sequence[Piece], count: int) -> tuple[Piece, ...]:
-    """The same function in so many pieces; NoFitError where it has more."""
-    found = list(pieces)
-    if len(found) > count:
-        span = f"between {found[0].low:g} and {found[-1].high:g} K"
-        raise NoFitError(f"{len(found)} polynomials are needed {span}, {count} were at the start.")
-    while len(found) < count:
-        widest = max(range(len(found)), key=lambda i: found[i].high - found[i].low)
-        piece = found[widest]
-        middle = (piece.low + piece.high) / 2
-        found[widest : widest + 1] = [_moved(piece, piece.low, middle), _moved(piece, middle, piece.high)]
-    return tuple(found)
 
 
 def _moved(piece: Piece, low: float, high: float) -> Piece:

@@ -15,7 +15,6 @@ from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
-from surfacechem.model.refit import Fit
 from surfacechem.model.sliding.rate_and_state import stands_for_velocity
 from surfacechem.model.system import (
     START,
@@ -144,7 +143,6 @@ def _system(build: Build) -> System:
         follows={str(x): value for x, value in build.motion.follows.items()},
         given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
         pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},
-        fit=next(iter(build.noted(Fit)), None),
         warnings=(*build.interface.remarks, *build.warnings),
         outside=_outside(build),
         origin=partial(assemble, build.scene),

@@ -17,7 +17,6 @@ from surfacechem.model import balances
 from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register, Sink
 from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
-from surfacechem.model.refit import Fit
 from surfacechem.model.system import (
     Account,
     Capped,
@@ -75,7 +74,7 @@ class Motion:
     """Rates of the gaps that move by a balance."""
 
 
-Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor | Fit
+Note = Range | Capped | Pair | Pace | Caution | Profile | Conductor
 Record = Thermal | Bond | Energy | HeatPath | State | Account | Margin | Constraint | Equilibrium | Power | Note | str
 """What components state; a string is a warning."""
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.expressions import Expression
 from surfacechem.model.automaton import Edge, Equilibrium, Mode, Register, Sink, When, masked
-from surfacechem.model.refit import Fit
 from surfacechem.quantities import VELOCITIES, Quantity
 from surfacechem.scene import Engine
 
@@ -311,8 +310,6 @@ class System:
     conductors: tuple[Conductor, ...] = ()
     conductances: Mapping[tuple[str, str], Sequence[Expression]] = field(default_factory=dict)
     """Conductances in parallel between two ends [W/(m^2 K)]."""
-    fit: Fit | None = None
-    """How the properties of the medium's fluid follow a run; None where nothing reads any."""
     outside: Outside | None = None
     constants: Mapping[str, tuple[Spec, float]] = field(default_factory=dict)
     """Parameters of laws that are left at their defaults, by path: numbers in the equations, which no run may change

@@ -30,10 +30,6 @@ DIFFERENCE = 8 * SQRT_EPS
 """A few of the steps by which Cantera's integrator differentiates, which bounds must not take for the solution."""
 
 
-WIDER = 5
-"""How often the range of a fluid's properties is doubled and more."""
-
-
 class EndError(Exception):
     """The scene does not go on at a state, with the reason in words."""
 
@@ -45,18 +41,6 @@ def _refuse_folds(system: System) -> None:
             f"the scene loses a quasi-static equilibrium ({folds[0]}), at which the gap is infinitely fast, so that an "
             "integrator without our search cannot come near. Give the gap a damper or a mass, or run the case alone."
         )
-
-
-def _widest(system: System, values: dict[str, float]) -> dict[str, float]:
-    """The values with the properties of a fluid for as many temperatures as there are, since a network runs once."""
-    fit = system.fit
-    if fit is None:
-        return values
-    values = fit.started(values)
-    for _ in range(WIDER):
-        wider = fit.wider(values, np.array([values[end] for end in fit.bounds]))
-        values = wider or values
-    return values
 
 
 class EmbeddedScene:
@@ -73,7 +57,7 @@ class EmbeddedScene:
             system, self.reactions = coupling.with_multipliers(assemble(scene))
             _refuse_folds(system)
             self.model = Model(system)
-            self.values = _widest(system, self.model.values())
+            self.values = self.model.values()
             self.problem = self.model.problem(Run(times=(0.0, FOREVER)), self.values, passing=False)
         except InputError as error:
             raise case.located(error) from None

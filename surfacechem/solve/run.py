@@ -345,55 +345,28 @@ class Model:
     ) -> list[Trajectory]:
         """Runs whose arcs are solved in batches; each has its part of their time."""
         before = PREPARING.seconds
-        fit = self.system.fit
-        pairs = [(run, fit.started(values)) for run, values in pairs] if fit else pairs
         problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
         method.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
-        flows = [self._flow(*pair, problem, nudged) for pair, problem in zip(pairs, problems, strict=True)]
+        flows = [self._flow(problem) for problem in problems]
         ends = solve_together(flows, method, threads)
         seconds = (time.perf_counter() - start - (PREPARING.seconds - prepared)) / len(pairs)
         self.compile_seconds += PREPARING.seconds - before
         done = []
-        for (run, _), (values, result, jumps, ended) in zip(pairs, ends, strict=True):
+        for (run, values), (result, jumps, ended) in zip(pairs, ends, strict=True):
             status, reason = ended or self.verdict(result, values)
             done.append(Trajectory(self, run, result, values, status, reason, seconds, jumps))
         return done
 
-    def _flow(self, run: Run, values: Mapping[str, float], problem: Problem, nudged: bool) -> Flow[tuple[Any, ...]]:
-        """A run as a flow: its values, its result, its jumps, and how it ended where a jump ended it.
-
-        Media are fitted again where it leaves the range of their fits.
-        """
-        fit = self.system.fit
-        while True:
-            jumps: list[Jump] = []
-            ended = None
-            if self.jumper is None:
-                result = yield from without_stall(problem, self.system.sliding)
-            else:
-                hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
-                result, instant = (yield from hybrid.run()), hybrid.instant
-                jumps = instant.jumps
-                if instant.reason:
-                    word = "failed" if instant.status is Status.FAILED else "stopped"
-                    ended = word, f"{instant.reason} at t = {result.t:.9g} s"
-            wider = fit.wider(values, self._visited(result, fit.temperature)) if fit else None
-            if not wider:
-                return values, result, tuple(jumps), ended
-            values = wider
-            problem = self.problem(run, values, nudged=nudged)
-
-    def _visited(self, result: Result, temperature: str) -> Array:
-        """A temperature at all steps and at the end."""
-        t, y, ydot = np.array([result.t]), result.y[None], result.ydot[None]
-        if (steps := result.steps) is not None:  # a run may end at its start
-            t, y, ydot = np.append(steps.t, t), np.vstack([steps.y, y]), np.vstack([steps.ydot, ydot])
-        names = [state.name for state in self.system.states]
-        if temperature in names:
-            return y[:, names.index(temperature)]
-        outputs = [item.name for item in self.system.outputs]
-        return self.evaluate(result, t, y, ydot)[:, outputs.index(temperature)]
+    def _flow(self, problem: Problem) -> Flow[tuple[Result, tuple[Jump, ...], tuple[str, str] | None]]:
+        """A run as a flow: its result, its jumps, and how it ended where a jump ended it."""
+        if self.jumper is None:
+            return (yield from without_stall(problem, self.system.sliding)), (), None
+        hybrid = Hybrid(self.system, self.jumper, problem, len(self.margins))
+        result, instant = (yield from hybrid.run()), hybrid.instant
+        word = "failed" if instant.status is Status.FAILED else "stopped"
+        ended = (word, f"{instant.reason} at t = {result.t:.9g} s") if instant.reason else None
+        return result, tuple(instant.jumps), ended
 
     def verdict(self, result: Result, values: Mapping[str, float]) -> tuple[str, str]:
         """How a run ended, and why, in words."""
@@ -401,15 +374,11 @@ class Model:
         if result.status is Status.FINISHED:
             return "finished", f"reached the end at {where}"
         if result.status is Status.EVENT:
-            margin, fit = self.margins[int(result.events.index[-1])], self.system.fit
+            margin = self.margins[int(result.events.index[-1])]
             if is_led_back(self.system, self.program, margin, result):
                 return "failed", f"{margin.reason} at {where}: {ROUNDED}"
-            fitted = fit is not None and margin.name == fit.margin
-            if fit and fitted:
-                why = fit.reason(values, self._visited(result, fit.temperature)[-1])
-            else:
-                at = np.array([result.t])
-                why = self.system.reason(margin, self.inputs(result, at, result.y[None], result.ydot[None])[0])
+            at = np.array([result.t])
+            why = self.system.reason(margin, self.inputs(result, at, result.y[None], result.ydot[None])[0])
             return "stopped", f"{why} at {where}"
         return cause(self.system, self.program, self.margins, result, values)
 

@@ -1,26 +1,24 @@
 """The medium between the bodies: its properties as functions of the interface temperature, for the laws that ask.
 
-A property of a fluid is a polynomial in pieces whose coefficients are parameters; they hold between two temperatures,
-and a run that reaches these goes on with others. The thermal free energy is the double integral of such a polynomial,
-so that capacity, entropy and energy belong together exactly.
+A property of a fluid is a polynomial in pieces between two temperatures, where a run ends. The thermal free energy
+is the double integral of such a polynomial, so that capacity, entropy and energy belong together exactly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 import symengine
 
-from surfacechem.contracts.fits import DEGREE, NoFitError, Piece, divided
-from surfacechem.contracts.terms import Fluid, Load, Property, Spec
+from surfacechem.contracts.fits import Piece
+from surfacechem.contracts.terms import Fluid, Property, Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, log
 from surfacechem.model.build import Build
-from surfacechem.model.refit import Fit, first_range
 from surfacechem.model.system import Caution, Margin
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.scene import Medium
@@ -101,46 +99,114 @@ FLUID_PATH = "interface.medium.fluid"
 ENERGY = "capacity_m"
 """Heat capacity per volume over T; minus its double integral is the free energy."""
 
-PIECES = 4
-"""Fewest pieces of a fit."""
+REACHES = (math.inf, 2.0, 1.1)
+"""Properties are fitted as far as the fluid goes; so many times the temperatures of a case where that fails."""
 
-SPARE = 2
-"""Pieces beyond those that the first range takes, for the kinks of a wider one."""
-
-REMEDY = "Give `interface.medium.temperatures`: those that the run will reach."
+REMEDY = "give `interface.medium.temperatures` that the run will reach"
 
 KELVIN = Spec("K", "where a piece of the fit ends")
 NUMBER = Spec("1", "coefficient of the fit")
 
 
-@dataclass(frozen=True)
-class Coefficients:
-    """The fits of a fluid as values of parameters, by path."""
+class FluidFit:
+    """The expressions of a fluid's properties, each fitted once over the temperatures that a run may reach."""
 
-    fluid: Fluid
-    counts: dict[str, int] = field(default_factory=dict)
-    """Number of pieces of each property."""
+    def __init__(self, build: Build, fluid: Fluid) -> None:
+        self.build, self.fluid = build, fluid
+        self.T = build.variables.get("T_c", "the medium", "interface.medium")
+        assert build.interface.medium is not None
+        loads = [build.loads[node.name] for node in build.thermal.nodes.values() if node.prescribed]
+        starts = [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]
+        starts += [T for node in build.thermal.free if (T := build.scene.initial.get(node.name)) is not None]
+        self.known = [*starts, *build.interface.medium.temperatures] or [build.scene.T_0 or 300.0]
+        self.start = sum(self.known) / len(self.known)
+        self.ranges: set[tuple[float, float]] = set()
+        self._watch_walls()
 
-    def __call__(self, low: float, high: float, T_start: float) -> Mapping[str, float]:
-        """Values between two temperatures; the energy is zero with its slope at ``T_start`` [K]."""
-        values = {f"{FLUID_PATH}.low": low, f"{FLUID_PATH}.high": high}
-        for quantity, count in self.counts.items():
-            pieces = self._pieces(quantity, count, low, high)
-            for i, piece in enumerate(pieces):
-                values[f"{FLUID_PATH}.{quantity}.ends[{i}]"] = piece.high
-                values |= {f"{FLUID_PATH}.{quantity}[{i}][{k}]": c for k, c in enumerate(piece.coefficients)}
-            if quantity == ENERGY:
-                for i, (constant, slope) in enumerate(_joints(pieces, T_start)):
-                    values[f"{FLUID_PATH}.{quantity}.constant[{i}]"] = constant
-                    values[f"{FLUID_PATH}.{quantity}.slope[{i}]"] = slope
-        return values
+    def _watch_walls(self) -> None:
+        """Tell where a wall is beyond the range of a film whose properties are those at its own temperature."""
+        span, thermal = self.fluid.range(self.start), self.build.thermal
+        for body in self.build.scene.bodies:
+            wall = thermal.nodes[thermal.members[body.name]].T
+            if wall != self.T:
+                rest = f"at the wall of {body.name}, while the film keeps the properties that it has at {self.T}."
+                self.build.add(Caution(span.high - wall, f"{span.reason_high} {rest}"))
+                self.build.add(Caution(wall - span.low, f"{span.reason_low} {rest}"))
 
-    def _pieces(self, quantity: str, count: int, low: float, high: float) -> tuple[Piece, ...]:
-        try:
-            return divided(self.fluid.fit(quantity, low, high), count)
-        except NoFitError as error:
-            message = f"the fit of {quantity} of {self.fluid.name} cannot go on: {error} {REMEDY}"
-            raise InputError(message, path="interface.medium") from None
+    def property(self, name: str) -> Expression:
+        """A property as a named quantity, constant beyond its range."""
+        ends, pieces, _ = self._fitted(name)
+        text, unit, inside = "piece of the fit of a property", VARIABLES[name].unit, []
+        for i, (scaled, coefficients) in enumerate(pieces):
+            of_x = Quantity(f"{name}_{i}_x", "1", "scaled temperature of the piece below")
+            x = self.build.name(of_x, scaled, output=False)
+            powers = sum(c * x**k for k, c in enumerate(coefficients))
+            inside.append(self.build.name(Quantity(f"{name}_{i}", unit, text), powers, output=False))
+        # At the ends of the range the scaled temperature is -1 and 1.
+        first = sum(c * (-1) ** k for k, c in enumerate(pieces[0][1]))
+        last = sum(pieces[-1][1])
+        branches = zip((first, *inside, last), (*(end > self.T for end in ends), True), strict=True)
+        return self.build.name(VARIABLES[name], symengine.Piecewise(*branches))
+
+    def energy(self) -> Expression:
+        """Thermal free energy per volume [J/m^3], zero with its slope at the start."""
+        ends, pieces, fit = self._fitted(ENERGY)
+        branches = []
+        for i, ((x, coefficients), joint) in enumerate(zip(pieces, _joints(fit, self.start), strict=True)):
+            half = (ends[i + 1] - ends[i]) / 2
+            integral = sum(c * x ** (k + 2) / symengine.Integer((k + 1) * (k + 2)) for k, c in enumerate(coefficients))
+            constant, slope = (
+                self._number(f"{ENERGY}_{part}_{i}", f"{ENERGY}.{part}[{i}]", value)
+                for part, value in zip(("constant", "slope"), joint, strict=True)
+            )
+            condition = ends[i + 1] > self.T if i < len(pieces) - 1 else True
+            branches.append((constant + slope * self.T - half**2 * integral, condition))
+        return symengine.Piecewise(*branches)
+
+    def _fitted(
+        self, quantity: str
+    ) -> tuple[list[Expression], list[tuple[Expression, list[Expression]]], tuple[Piece, ...]]:
+        """Ends of the pieces, scaled temperature and coefficients of each, and the pieces as numbers."""
+        fit = self._fit(quantity)
+        keys = [(f"{quantity}_ends_{i}", f"{quantity}.ends[{i}]") for i in range(len(fit) + 1)]
+        numbers = (fit[0].low, *(piece.high for piece in fit))
+        ends = [self._number(*key, number, KELVIN) for key, number in zip(keys, numbers, strict=True)]
+        pieces = []
+        for i, (piece, (low, high)) in enumerate(zip(fit, pairwise(ends), strict=True)):
+            keys = [(f"{quantity}_{i}_{k}", f"{quantity}[{i}][{k}]") for k in range(len(piece.coefficients))]
+            coefficients = [self._number(*key, c) for key, c in zip(keys, piece.coefficients, strict=True)]
+            pieces.append(((2 * self.T - low - high) / (high - low), coefficients))
+        self._end_there(ends, fit)
+        return ends, pieces, fit
+
+    def _fit(self, quantity: str) -> tuple[Piece, ...]:
+        """The fit over the widest range for which there is one."""
+        span = self.fluid.range(self.start)
+        for reach in REACHES:
+            low, high = max(min(self.known) / reach, span.low), min(max(self.known) * reach, span.high)
+            try:
+                return self.fluid.fit(quantity, low, high)
+            except InputError:
+                if reach == REACHES[-1]:
+                    raise
+        raise AssertionError
+
+    def _end_there(self, ends: Sequence[Expression], fit: Sequence[Piece]) -> None:
+        """A run ends where a fit does; most properties have the same range."""
+        low, high = fit[0].low, fit[-1].high
+        if (low, high) in self.ranges:
+            return
+        self.ranges.add((low, high))
+        span = self.fluid.range(self.start)
+        fitted = f"the properties of {self.fluid.name} are fitted no further ({REMEDY})"
+        beyond = span.reason_low if low == span.low else fitted, span.reason_high if high == span.high else fitted
+        margins = (self.T - ends[0], low, beyond[0]), (ends[-1] - self.T, high, beyond[1])
+        for margin, end, reason in margins:
+            name = f"{self.T} within the range of the fluid"
+            self.build.add(Margin(name, margin, f"{reason} at {self.T} = {end:.6g} K"))
+
+    def _number(self, symbol: str, key: str, value: float, spec: Spec = NUMBER) -> Expression:
+        return self.build.constant(symbol, f"{FLUID_PATH}.{key}", spec, value, internal=True)
 
 
 def _joints(pieces: Sequence[Piece], T_start: float) -> list[tuple[float, float]]:
@@ -166,92 +232,3 @@ def _integrals(piece: Piece, T: float) -> tuple[float, float]:
     twice = np.polynomial.polynomial.polyint(once)
     value, slope = (float(np.polynomial.polynomial.polyval(x, c)) for c in (twice, once))
     return -(half**2) * value, -half * slope
-
-
-class FluidFit:
-    """Makes the expressions of a fluid's properties, and remembers which were asked for."""
-
-    def __init__(self, build: Build, fluid: Fluid) -> None:
-        self.build = build
-        self.T = build.variables.get("T_c", "the medium", "interface.medium")
-        assert build.interface.medium is not None
-        self.held = (*_held(build), *build.interface.medium.temperatures)
-        self.states = tuple(node.name for node in build.thermal.free)
-        starts = [build.scene.initial.get(state) for state in self.states]
-        known = [*self.held, *(T for T in starts if T is not None)] or [build.scene.T_0 or 300.0]
-        self.coefficients = Coefficients(fluid)
-        self.low, self.high, self.start = first_range(fluid, known)
-        limits = {f"{FLUID_PATH}.low": self.low, f"{FLUID_PATH}.high": self.high}
-        self.ends = [self._number(f"T_m_{end}", end, limits, KELVIN) for end in ("low", "high")]
-        for end, sign in zip(self.ends, (1, -1), strict=True):
-            reason = f"{fluid.name} has no properties beyond its range"
-            build.margins.append(Margin(Fit.margin, sign * (self.T - end), reason))
-        self._watch_walls(fluid)
-        low, high = limits
-        build.notes.append(Fit(fluid, str(self.T), self.held, self.states, self.coefficients, (low, high)))
-
-    def _watch_walls(self, fluid: Fluid) -> None:
-        """Tell where a wall is beyond the range of a film whose properties are those at its own temperature."""
-        span = fluid.range(self.start)
-        thermal = self.build.thermal
-        for body in self.build.scene.bodies:
-            wall = thermal.nodes[thermal.members[body.name]].T
-            if wall != self.T:
-                rest = f"at the wall of {body.name}, while the film keeps the properties that it has at {self.T}."
-                self.build.notes.append(Caution(span.high - wall, f"{span.reason_high} {rest}"))
-                self.build.notes.append(Caution(wall - span.low, f"{span.reason_low} {rest}"))
-
-    def property(self, name: str) -> Expression:
-        """A property as a named quantity, constant beyond its range."""
-        (low, *bounds), pieces, _ = self._fitted(name)
-        text, unit, inside = "piece of the fit of a property", VARIABLES[name].unit, []
-        for i, (scaled, coefficients) in enumerate(pieces):
-            of_x = Quantity(f"{name}_{i}_x", "1", "scaled temperature of the piece below")
-            x = self.build.name(of_x, scaled, output=False)
-            powers = sum(c * x**k for k, c in enumerate(coefficients))
-            inside.append(self.build.name(Quantity(f"{name}_{i}", unit, text), powers, output=False))
-        # At the ends of the range the scaled temperature is -1 and 1.
-        first = sum(c * (-1) ** k for k, c in enumerate(pieces[0][1]))
-        last = sum(pieces[-1][1])
-        branches = [(first, low > self.T), *zip(inside, (bound > self.T for bound in bounds), strict=True)]
-        return self.build.name(VARIABLES[name], symengine.Piecewise(*branches, (last, True)))
-
-    def energy(self) -> Expression:
-        """Thermal free energy per volume [J/m^3]."""
-        ends, pieces, values = self._fitted(ENERGY)
-        branches = []
-        for i, (x, coefficients) in enumerate(pieces):
-            half = (ends[i + 1] - ends[i]) / 2
-            integral = sum(c * x ** (k + 2) / symengine.Integer((k + 1) * (k + 2)) for k, c in enumerate(coefficients))
-            constant, slope = (
-                self._number(f"{ENERGY}_{part}_{i}", f"{ENERGY}.{part}[{i}]", values) for part in ("constant", "slope")
-            )
-            condition = ends[i + 1] > self.T if i < len(pieces) - 1 else True
-            branches.append((constant + slope * self.T - half**2 * integral, condition))
-        return symengine.Piecewise(*branches)
-
-    def _fitted(
-        self, quantity: str
-    ) -> tuple[list[Expression], list[tuple[Expression, list[Expression]]], Mapping[str, float]]:
-        """Ends of the pieces, scaled temperature and coefficients of each, and the numbers that these stand for."""
-        fluid, counts = self.coefficients.fluid, self.coefficients.counts
-        counts[quantity] = max(PIECES, len(fluid.fit(quantity, self.low, self.high)) + SPARE)
-        values = Coefficients(fluid, {quantity: counts[quantity]})(self.low, self.high, self.start)
-        ends = [self.ends[0]]
-        ends += [self._number(f"{quantity}_ends_{i}", f"{quantity}.ends[{i}]", values) for i in range(counts[quantity])]
-        pieces = []
-        for i, (low, high) in enumerate(pairwise(ends)):
-            keys = [(f"{quantity}_{i}_{k}", f"{quantity}[{i}][{k}]") for k in range(DEGREE + 1)]
-            coefficients = [self._number(symbol, key, values) for symbol, key in keys]
-            pieces.append(((2 * self.T - low - high) / (high - low), coefficients))
-        return ends, pieces, values
-
-    def _number(self, symbol: str, key: str, values: Mapping[str, float], spec: Spec = NUMBER) -> Expression:
-        path = f"{FLUID_PATH}.{key}"
-        return self.build.constant(symbol, path, spec, values[path], internal=True)
-
-
-def _held(build: Build) -> list[float]:
-    """Prescribed temperatures at the start."""
-    loads: list[Load] = [build.loads[node.name] for node in build.thermal.nodes.values() if node.prescribed]
-    return [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]
