@@ -105,6 +105,9 @@ VARIABLES = _table(
 )
 """What laws may read. Temperatures of bodies and interface resolve to the node that carries them."""
 
+GAPS = frozenset(("g_n", "g_t", "u_t", "u_t2"))
+"""Distances between the bodies, which may be exactly zero."""
+
 VELOCITIES = frozenset(("v_n", "v_t", "v", "v_2", "speed"))
 
 INTERNAL = frozenset(("t", "T_from", "T_to", "ln_theta", "gamma_m", "f_m", "dmu_dphi"))

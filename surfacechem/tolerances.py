@@ -34,6 +34,11 @@ ROUNDING = 4096 * EPS
 has at most some 1e7 of them.
 """
 
+CROSSED = 512 * EPS
+"""Guards below this part of their magnitude, and times closer than this part of them, are one, 1.1e-13: SOLVED of the
+step onto an event, and eight times that for what is added up between two looks at it.
+"""
+
 SQRT_EPS = EPS**0.5
 """Step of a one-sided difference, 1.5e-8, where truncation and rounding are equal; also how closely the place of a
 smooth minimum is known, since its value changes with the square of the distance.
@@ -66,6 +71,14 @@ MOMENT = 1e-12
 what is summed along it, to the next power of ten.
 """
 
+SOON = 1e-9
+"""Part of the time that has passed within which nothing of interest happens: a thousand times MOMENT, which a clock
+tells apart, and far below what any output does.
+"""
+
+BRIEF = 1e-6
+"""Part of a run that counts as brief: a thousand times SOON, so that steps may still follow what happens in it."""
+
 NOTHING = 1e-9
 """Amount of a variable, in its SI unit, that means nothing: a billionth of an area or of a fraction, a nanopascal, a
 nanokelvin. No run is asked for more digits than nine, which leaves that of a variable of order one.
@@ -97,6 +110,26 @@ MICROMETRE = 1e-6
 
 PICOMETRE = 1e-12
 """Length [m] without a meaning for bodies: a hundredth of an atom."""
+
+NANOMETRE = 1e-9
+"""Gap [m] below which the size of a gap counts as this one: surfaces are no smoother."""
+
+ATOM = SOLVED * MICROMETRE
+"""Gap [m] that counts as none, 1.4e-20: what a search leaves of a micrometre, far below any atom."""
+
+NONE_OF_SCALE = 1e-6
+"""Part of its scale that is no more of a state, times rtol: the default absolute tolerance. Scales are those of the
+largest values in use, and states matter over some six decades below them.
+"""
+
+DEFAULT_RTOL = 1e-11
+"""Relative tolerance of a run: errors of smooth ones stay below 1e-10, and energy closes to 1e-10 of what is exchanged.
+"""
+
+GONE = 1e-30
+"""A margin that has shrunk to this part of its largest value is closed at any speed: the square of SQRT_EPS * SHALLOW,
+below what any rounding or tolerance leaves of it.
+"""
 
 TIGHTEST = 1e-13
 """Tightest relative tolerance that is chosen for a run: below some 450 EPS errors of steps are their rounding."""

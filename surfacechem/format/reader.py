@@ -38,8 +38,8 @@ from surfacechem.format.sections import (
 from surfacechem.quantities import VARIABLES
 from surfacechem.results.accuracy import first_tolerance
 from surfacechem.scene import Body, Conduction, Interface, Medium, Mounting, Scene, Sites, Stage
-from surfacechem.solve.run import DEFAULT_RTOL, OWN, Run
-from surfacechem.tolerances import NOTHING
+from surfacechem.solve.run import OWN, Run
+from surfacechem.tolerances import DEFAULT_RTOL, NOTHING
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism

@@ -55,7 +55,8 @@ from surfacechem.model.components.interface import LOADABLE
 from surfacechem.model.components.mounting import TRACTIONS
 from surfacechem.quantities import VARIABLES
 from surfacechem.scene import MOST_CELLS, Conduction, Mounting
-from surfacechem.solve.run import DEFAULT_RTOL, OWN
+from surfacechem.solve.run import OWN
+from surfacechem.tolerances import DEFAULT_RTOL
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 

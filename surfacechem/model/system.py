@@ -145,6 +145,8 @@ class Margin:
     """What to change where it is closed from the start."""
     path: str = ""
     """What of a case it belongs to."""
+    stability: str = ""
+    """The state that it tells to be stable, where it does."""
     peak: bool = False
     """Whether a step has to end here and no more, so that it does not pass over a peak; it is no event of the scene."""
     domain: bool = False

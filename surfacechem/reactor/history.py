@@ -8,7 +8,8 @@ from surfacechem.errors import InputError
 from surfacechem.reactor.embedded import EmbeddedScene
 from surfacechem.results.solution import Solution
 from surfacechem.solve.contract import Array, Counters, Events, Problem, Result, Status
-from surfacechem.solve.run import DEFAULT_RTOL, Run, Trajectory
+from surfacechem.solve.run import Run, Trajectory
+from surfacechem.tolerances import DEFAULT_RTOL
 
 
 class History:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, PICOMETRE, TINY
+from surfacechem.tolerances import CBRT_EPS, DIGITS, NEGLIGIBLE, NOTHING, PICOMETRE, TINY
 
 Array = NDArray[np.float64]
 Curve = Callable[[Sequence[float] | Array], Array]
@@ -23,7 +23,7 @@ Curve = Callable[[Sequence[float] | Array], Array]
 CLOSEST: dict[str, Any] = {"xtol": TINY, "rtol": (1 + NEGLIGIBLE) * DIGITS, "maxiter": 300, "disp": False}
 """How closely a root of the tractions is found: to rounding, a little more than the least that Brent's method takes."""
 
-FIRST, GROWTH, MARCH = 1e-9, 1.02, 2400
+FIRST, GROWTH, MARCH = NOTHING, 1.02, 2400
 """First step of the search for the next equilibrium, relative to the gap, its growth, and the number of steps."""
 
 REACH = FIRST * (GROWTH ** (MARCH - 1) - 1) / (GROWTH - 1)
@@ -90,7 +90,7 @@ Indices = NDArray[np.intp]
 Field = Callable[[Array], Array]
 """Driving tractions at ways of the gaps from where they begin, both of shape (points, gaps)."""
 
-RTOL, BEGINS = 1e-4, NEGLIGIBLE
+RTOL, BEGINS = 0.1 * NEGLIGIBLE, NEGLIGIBLE
 """Tolerance of the motion, relative to the way so far; it begins within this part of its first push."""
 
 STEPS = 20_000

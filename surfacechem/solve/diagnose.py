@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
-from surfacechem.model.system import STABLE, Margin, Pace, State, System
+from surfacechem.model.system import Margin, Pace, State, System
 from surfacechem.solve.contract import REASONS, Points, Result, Status
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SOLVED
+from surfacechem.tolerances import GONE, NEGLIGIBLE, NONE_OF_SCALE, ROUNDING, SOLVED, SOON
 
 FEW, SHARP = 100.0, ROUNDING
 """Steps in a period, fewer than which follow nothing, and the part of the time that a step can still resolve."""
@@ -41,20 +41,11 @@ STALLED = NEGLIGIBLE
 """A margin that has shrunk to this part of its largest value, and has less than this part of the time that has passed
 left to close, explains why a run cannot go on."""
 
-GONE = 1e-30
-"""A margin that has shrunk to this part of its largest value is closed for all that can be told, at any speed."""
-
 RESOLVED = SOLVED
 """Part of the time that has passed within which the last digits of a margin do not tell whether it shrinks."""
 
-RUNAWAY = 1e-9
-"""Part of the time that has passed within which a state that runs away would change by itself."""
-
 BOUNDLESS = 1e12
 """Size of a state that runs away, in units of its scale."""
-
-SMALL = 1e-6
-"""Size of a state that is none, in units of its scale."""
 
 ROUNDED = (
     "the rates lead back from it; they are so far apart that the last digits of the fast ones have carried it there"
@@ -76,7 +67,7 @@ def cause(
         names = " and ".join(state.at_start[0].name for state in algebraic)
         reason = f"no {names} satisfies the balances that have no inertia or capacity"
         if all(state.is_temperature for state in algebraic):
-            stable = next(margin for margin in system.margins if margin.name == f"{STABLE}{algebraic[0].name}")
+            stable = next(margin for margin in system.margins if margin.stability == algebraic[0].name)
             reason = system.reason(stable, np.nan_to_num(inputs))
         elif any(state.is_temperature for state in algebraic):
             reason += ": ignition, or sliding that nothing steadies"
@@ -145,9 +136,9 @@ def runaway(states: Sequence[State], result: Result) -> str | None:
         j = int(np.argmax(beyond))
         return f"{states[j].name} grows beyond all bounds, to {result.y[j]:.3g} {states[j].quantity.unit}"
     with np.errstate(over="ignore", invalid="ignore"):
-        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + SMALL * scales))
+        speed = np.nan_to_num(np.abs(result.ydot) / (np.abs(result.y) + NONE_OF_SCALE * scales))
     j = int(np.argmax(speed))
-    if not speed[j] * result.t > 1 / RUNAWAY:
+    if not speed[j] * result.t > 1 / SOON:
         return None
     if states[j].given is not None:
         # A velocity without inertia takes the age of the contact with it.

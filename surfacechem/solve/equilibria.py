@@ -25,7 +25,7 @@ from surfacechem.solve.branches import (
     stiffness,
     unstable_way,
 )
-from surfacechem.tolerances import NEGLIGIBLE, ROUNDING, SOLVED
+from surfacechem.tolerances import ATOM, NANOMETRE, NEGLIGIBLE, ROUNDING, SOLVED
 
 Array = NDArray[np.float64]
 Heat = Callable[[Array], Array]
@@ -33,12 +33,6 @@ Heat = Callable[[Array], Array]
 
 DRIFT = 100.0
 """Traction out of balance that the integration explains, relative to its parts and in units of the tolerance."""
-
-NANOMETRE = 1e-9
-"""Gap [m] below which the size of a gap counts as this one: surfaces are no smoother."""
-
-ATOM = 1e-20
-"""Gap [m] that counts as none: the rounding of a micrometre, far below any atom."""
 
 BALANCED = ROUNDING
 """Tractions out of balance that count as none, relative to their parts: those of a run hold its rounding."""

@@ -13,9 +13,7 @@ from surfacechem.expressions import derivative
 from surfacechem.model.automaton import FOLD
 from surfacechem.solve.branches import zero_ahead
 from surfacechem.solve.equilibria import DRIFT, Array, Equilibria, Lost, Point, Way, compiled
-
-SOON = 1e-9
-"""Part of the time of a fold within which nothing but the gaps changes."""
+from surfacechem.tolerances import SOON
 
 
 class Folds:

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.model.system import START, System
+from surfacechem.quantities import GAPS
 from surfacechem.solve.contract import Counters, Events, Points, Problem, Result, Solver, Status
-from surfacechem.solve.equilibria import ATOM, Point
-from surfacechem.solve.instant import BRIEF, ENDLESS, MANY, MISSED, REACHED, Instant
+from surfacechem.solve.equilibria import Point
+from surfacechem.solve.instant import ENDLESS, MANY, MISSED, REACHED, Instant
 from surfacechem.solve.jumps import Jumper
-from surfacechem.tolerances import ULPS
+from surfacechem.tolerances import ATOM, BRIEF, ULPS
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")
@@ -212,7 +213,7 @@ class Hybrid:
 
     def _across_touch(self, point: Point) -> Point | None:
         """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
-        gaps = np.array([state.quantity.unit == "m" for state in self.system.states])
+        gaps = np.array([state.name in GAPS for state in self.system.states])
         closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
         return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
 

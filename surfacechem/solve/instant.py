@@ -7,7 +7,6 @@ the flow between has led. What is due is carried out edge by edge; the ledger ga
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,38 +19,23 @@ from surfacechem.solve.equilibria import BALANCED, DRIFT, Point
 from surfacechem.solve.jumps import Jump, Jumper, Slack, booked
 from surfacechem.solve.load_path import LoadStep
 from surfacechem.solve.radau.solver import consistent
-from surfacechem.tolerances import PICOMETRE, SOLVED
+from surfacechem.tolerances import BRIEF, CROSSED, MICROMETRE, NEGLIGIBLE, PICOMETRE, SOLVED, SOON
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-NOISE = 1e-13
-"""Guards below this part of their magnitude count as zero: some hundred roundings, those of a step onto it included."""
-
 REACHED = SOLVED
 """Part of the time within which two moments are one: a step onto an event solves for its time."""
-
-BRIEF = 1e-6
-"""Part of a run that counts as brief."""
 
 AT_ONCE = 12
 """Edges at one moment from which on they are chatter."""
 
-SHARPENED = 1e-9
-"""Part of a run after which the peaks of the states may be forgotten again: a choice, far above the rounding of time
-and far below what is of interest. What follows itself without end within it is chatter even where it would calm down.
-"""
-
 NO_PUSH = "nothing pushes it off where it rests; with a mass or a damper any disturbance would"
 
 
-ALOFT, SOON = 1.5, 1e-4
-"""A time beyond that of the return, in parts of it, and the part of a stretch below which the first step is fitted to
-it."""
-
-GAP = 1e-6
-"""Size [m] that such a margin has at least where it does not rebound: what is opened slowly begins by rounding."""
-
+ALOFT, FITTED = 1.5, 0.1 * NEGLIGIBLE
+"""A time beyond that of the return, in parts of it, and the part of an arc below which the first step is fitted to it:
+what is longer a step meets by itself."""
 
 MANY = 1000
 """Rebounds of a run from which on they are what its steps were used for."""
@@ -86,7 +70,7 @@ class Rebounds:
     def pieces(self, start: float, end: float) -> Array:
         """Pieces of a stretch in its own time: one of its own for what returns so soon that a step might miss it."""
         soon = ALOFT * self._aloft(start)
-        inside = [soon] if 0 < soon < SOON * (end - start) else []
+        inside = [soon] if 0 < soon < FITTED * (end - start) else []
         return np.array([0.0, *inside, end - start])
 
     def seen(self, start: float, sizes: Array) -> Array:
@@ -94,7 +78,7 @@ class Rebounds:
         if not self.margins:
             return sizes
         own = sizes.copy()
-        own[self.margins] = 0.0 if self._aloft(start) else np.maximum(sizes[self.margins], GAP)
+        own[self.margins] = 0.0 if self._aloft(start) else np.maximum(sizes[self.margins], MICROMETRE)
         return own
 
     def missed(self, result: Result) -> bool:
@@ -187,12 +171,12 @@ class Instant:
         guards = self.program.margins
         if guards is None:
             return point
-        while not self._chatters(point.t) or self._calmed(point):
+        while self._may_go_on(point):
             seen = self.consistent(point) if self.jumper.guards_read_rates else point
-            now, playing = guards(seen.inputs()), self.in_play(point)
-            sizes = self.sizes(point)
+            now, playing, sizes = guards(seen.inputs()), self.in_play(point), self.sizes(point)
             due = self._due(now[self.first :], playing[self.first :], sizes[self.first :], point)
-            if self.jumps and (closed := self._closed(now, playing, sizes, due is not None)):
+            closed = self._closed(now, playing, sizes, due is not None) if self.jumps else []
+            if closed:
                 margin = self.system.moving_margins()[closed[0]]
                 self.status, self.reason = Status.EVENT, self.system.reason(margin, self.jumps[-1].after.inputs())
                 return None
@@ -203,45 +187,66 @@ class Instant:
             if jumped is None:
                 return None
             point = jumped
-        self._end_of_chatter(self.jumps[-1])
+        last = self.jumps[-1]
+        if last.edge.fold is None or not np.array_equal(last.before.y, last.after.y):
+            endless = f"transitions follow each other without end (chatter): {last.edge.reason}"
+            self.status, self.reason = Status.FAILED, endless
+            return None
+        # A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run.
+        while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
+            self.jumps.pop()
+        self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"
         return None
+
+    def _may_go_on(self, point: Point) -> bool:
+        """Whether edges may follow at a moment; not where they chatter, more of them than any cause needs.
+
+        That may only seem so where what moves now is rounding of what has moved before: it is forgotten first. Rebounds
+        that follow each other faster than time can tell have come to rest.
+        """
+        t, recent = point.t, len(self.jumps) - self._resolved
+        if recent < AT_ONCE or self.jumps[-AT_ONCE].t < t - REACHED * max(t, BRIEF * self.end):
+            return True
+        if t > self._sharpened + SOON * self.end:
+            self._sharpened, self._resolved, self.peaks = t, len(self.jumps), self.scales.copy()
+            return True
+        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
+        if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == t:
+            return False
+        point.parameters[rests], self._resolved = t, len(self.jumps)
+        return True
 
     def _due(self, now: Array, playing: Mask, sizes: Array, point: Point) -> int | None:
         """The edge whose guard is closed, or is zero and closing; the drift of the integration is not closed."""
-        small = NOISE * sizes
-        drift = np.maximum(DRIFT * self.rtol * sizes, small)
-        closed = playing & (now < -drift)
+        small = CROSSED * sizes
+        closed = playing & (now < -np.maximum(DRIFT * self.rtol * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
             near &= self.jumper.guard_rates(self.consistent(point)) < 0
-            closed |= np.array([one and not self._leads_back(j, point) for j, one in enumerate(near)])
+            # Rounding undoes nothing: no edge leads to modes that have been left at this very moment.
+            left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
+            for j in np.flatnonzero(near).tolist():
+                closed[j] = not any(np.array_equal(self.jumper.modes_after(j, point), modes) for modes in left)
         return int(closed.argmax()) if closed.any() else None
-
-    def _leads_back(self, index: int, point: Point) -> bool:
-        """Whether an edge leads to modes that have been left at this very moment: rounding undoes nothing."""
-        left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
-        return bool(left) and any(np.array_equal(self.jumper.modes_after(index, point), modes) for modes in left)
-
-    @cached_property
-    def _of_modes(self) -> list[bool]:
-        """Which limits read states that have no past: they are found anew as modes change."""
-        found = {state.symbol for state in self.system.states if state.algebraic}
-        return [bool(self.system.expand(m.expression).free_symbols & found) for m in self.system.moving_margins()]
 
     def _closed(self, now: Array, playing: Mask, sizes: Array, due: bool) -> list[int]:
         """Limits beyond which a jump has carried the state; not what modes say that are left at this moment."""
         # Beyond the end of a law, be it by rounding, what it says has no meaning.
         margins = self.system.moving_margins()[: self.first]
-        least = [0.0 if m.domain else -NOISE * size for m, size in zip(margins, sizes, strict=False)]
+        least = [0.0 if m.domain else -CROSSED * size for m, size in zip(margins, sizes, strict=False)]
         closed = [i for i in range(self.first) if self.terminal[i] and playing[i] and now[i] < least[i]]
-        closed += [i for i in self.limits if playing[i] and now[i] <= NOISE * sizes[i]]
-        return [i for i in closed if not (due and self._of_modes[i])]
+        closed += [i for i in self.limits if playing[i] and now[i] <= CROSSED * sizes[i]]
+        if not (due and closed):
+            return closed
+        # Limits that read states without a past are found anew as modes change.
+        found = {state.symbol for state in self.system.states if state.algebraic}
+        return [i for i in closed if not self.system.expand(margins[i].expression).free_symbols & found]
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""
         largest, drift = float(self.sizes(point)[self.first + index]), DRIFT * self.rtol
         balanced = BALANCED if self.system.edges[index].times else drift
-        slack = Slack(NOISE * largest, drift * largest, balanced, self.rtol)
+        slack = Slack(CROSSED * largest, drift * largest, balanced, self.rtol)
         step = self.step if self.step is not None and self.step.before.t == point.t else None
         before = self.jumps[-1].t if self.jumps else self.start
         begun, length, reached = self.flowed
@@ -256,35 +261,3 @@ class Instant:
         changes = [booked(jump, account, self.jumper.states) for account in self.system.ledger]
         self.booked = self.booked + np.array(changes)
         return jump.after
-
-    # -- edges that follow each other without end -----------------------------------------------------------------
-
-    def _chatters(self, t: float) -> bool:
-        """Whether more edges have followed each other without time going on than any cause needs."""
-        recent = len(self.jumps) - self._resolved
-        return recent >= AT_ONCE and self.jumps[-AT_ONCE].t >= t - REACHED * max(t, BRIEF * self.end)
-
-    def _calmed(self, point: Point) -> bool:
-        """Whether what follows itself without end comes to an end, though nothing has stopped it so far.
-
-        It may only seem to do so where what moves now is rounding of what has moved before: that is forgotten first.
-        Rebounds that follow each other faster than time can tell have come to rest.
-        """
-        if point.t > self._sharpened + SHARPENED * self.end:
-            self._sharpened, self._resolved, self.peaks = point.t, len(self.jumps), self.scales.copy()
-            return True
-        rests = next((j for j, p in enumerate(self.system.parameters) if p.path == RESTS), None)
-        if rests is None or self.jumps[-1].edge.returns is None or point.parameters[rests] == point.t:
-            return False
-        point.parameters[rests], self._resolved = point.t, len(self.jumps)
-        return True
-
-    def _end_of_chatter(self, last: Jump) -> None:
-        """A fold that lets go of a gap again and again and leaves it where it is counts once, and ends the run."""
-        if last.edge.fold is None or not np.array_equal(last.before.y, last.after.y):
-            endless = f"transitions follow each other without end (chatter): {last.edge.reason}"
-            self.status, self.reason = Status.FAILED, endless
-            return
-        while self.jumps[-2:-1] and self.jumps[-2].edge is last.edge and self.jumps[-2].t == last.t:
-            self.jumps.pop()
-        self.status, self.reason = Status.EVENT, f"{last.edge.reason}, but {NO_PUSH}"

@@ -19,11 +19,11 @@ from surfacechem.expressions import derivative, magnitude
 from surfacechem.model.automaton import INTERFACE, RESTS, Edge
 from surfacechem.model.balances import elastic_energy
 from surfacechem.model.system import Account, System
-from surfacechem.solve.equilibria import ATOM, BALANCED, Equilibria, Lost, Point, compiled
+from surfacechem.solve.equilibria import BALANCED, Equilibria, Lost, Point, compiled
 from surfacechem.solve.folds import Folds
 from surfacechem.solve.jump_heat import JumpHeat
 from surfacechem.solve.load_path import LoadPath, LoadStep
-from surfacechem.tolerances import DIGITS, ROUNDING
+from surfacechem.tolerances import ATOM, DIGITS, ROUNDING
 
 Array = NDArray[np.float64]
 
@@ -425,11 +425,16 @@ class Jumper:
         now = self._books(jump.after.inputs())
         before, after = float(books[1]), float(now[1])
         gain = after - before + jump.entropy_out
-        size = max(abs(before), abs(after), abs(jump.entropy_out))
-        known = ROUNDING * size + self._entropy_rounding(jump, noise)
+        # What does not count: rounding, and what the noise of the state that a guard measures makes.
+        rows = np.repeat(jump.before.inputs()[None], 2, axis=0)
+        if jump.edge.measure:
+            rows[1, 1 + self.states.index(jump.edge.measure)] += noise
+        still, moved = self._books(rows)[:, 1]
+        small = ROUNDING * max(abs(before), abs(after), abs(jump.entropy_out))
+        small += DIGITS * self._magnitudes(rows[0])[1] + abs(moved - still)
         done = zip(self.system.given, (now[2:] - books[2:]).tolist(), strict=True)
         work = {**jump.work, **{name: jump.work.get(name, 0.0) + moved for name, moved in done}}
-        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -known else VIOLATES, work=work)
+        return replace(jump, entropy=gain, verdict=ADMISSIBLE if gain >= -small else VIOLATES, work=work)
 
     @cached_property
     def _magnitudes(self) -> Function:
@@ -440,11 +445,3 @@ class Jumper:
     def _rounding(self, point: Point, energy: float) -> float:
         """Energy that does not count at a point, beside what it was before [J/m^2]."""
         return DIGITS * max(float(self._magnitudes(point.inputs())[0]), abs(energy))
-
-    def _entropy_rounding(self, jump: Jump, noise: float) -> float:
-        """Entropy that does not count: its rounding, and what the noise of the state that a guard measures makes."""
-        rows = np.repeat(jump.before.inputs()[None], 2, axis=0)
-        if jump.edge.measure:
-            rows[1, 1 + self.states.index(jump.edge.measure)] += noise
-        before, moved = self._books(rows)[:, 1]
-        return float(DIGITS * self._magnitudes(rows[0])[1] + abs(moved - before))

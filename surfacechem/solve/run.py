@@ -28,15 +28,12 @@ from surfacechem.solve.jumps import Jump, Jumper
 from surfacechem.solve.radau.solver import output_rates
 from surfacechem.solve.segments import Passing
 from surfacechem.solve.start import stable_start
-from surfacechem.tolerances import EPS
+from surfacechem.tolerances import DEFAULT_RTOL, EPS, NONE_OF_SCALE
 
 Array = NDArray[np.float64]
 
 GROUPS = {"energy supply": 0, "dissipation": 0, "heat": 0, "entropy supply": 1, "entropy production": 1, "bonds": 2}
 """Accounts whose quadratures are measured together."""
-
-DEFAULT_RTOL = 1e-11
-"""Errors of smooth runs stay below 1e-10 and energy closes to 1e-10 of what is exchanged."""
 
 SAMPLES, CLOSER = 60.0, 7.3
 """Looks at the equations in a run, and how many times more in the second one, which must not share its blindness.
@@ -49,9 +46,6 @@ AT_ONCE = 10_000
 
 OWN = "radau"
 """The method of this package."""
-
-ABSOLUTE = 1e-6
-"""Default absolute tolerance of a state, relative to rtol times its scale."""
 
 STATE, POSITIVE = Spec("", "initial value"), Spec("", "initial value", above=0)
 """Initial values need only be finite here, and have a logarithm where that is the state; margins say the rest."""
@@ -142,25 +136,21 @@ class Trajectory:
         if steps is not None and len(steps.t):
             states = np.concatenate([states, steps.y])
             named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)])
-        names = [state.name for state in self.model.system.states]
-        outputs = [item.name for item in self.model.system.outputs]
-        return dict(zip(names, states.T, strict=True)) | dict(zip(outputs, named.T, strict=True))
+        system = self.model.system
+        names = [state.name for state in system.states] + [item.name for item in system.outputs]
+        return dict(zip(names, (*states.T, *named.T), strict=True))
 
     @cached_property
     def within_bounds(self) -> dict[str, Array]:
-        """Named quantities at the output times and at every step, where rounding has carried no bonds below none."""
+        """The same where rounding has carried no bonds below none."""
         result, steps = self.result, self.result.steps
         bonds = {account.law for account in self.model.system.ledger if account.kind == "bonds"}
-        columns = np.array([state.name in bonds for state in self.model.system.states])
-        points: list[tuple[Array, Array, Array, NDArray[np.int64] | None]]
-        points = [(result.times, result.outputs, self.rates, None)]
-        points += [(steps.t, steps.y, steps.ydot, steps.segment)] if steps else []
-        if all(np.all(y[:, columns] >= 0) for _, y, _, _ in points):
+        least = np.array([0.0 if state.name in bonds else -np.inf for state in self.model.system.states])
+        if np.all(result.outputs >= least) and (steps is None or np.all(steps.y >= least)):
             return self.everywhere
-        within = [(t, np.where(columns, np.maximum(y, 0), y), rates, segment) for t, y, rates, segment in points]
-        clipped = [self.model.evaluate(result, *point) for point in within]
-        names = [item.name for item in self.model.system.outputs]
-        return dict(zip(names, np.concatenate(clipped).T, strict=True))
+        steps = steps and replace(steps, y=np.maximum(steps.y, least))
+        clipped = replace(result, outputs=np.maximum(result.outputs, least), steps=steps)
+        return replace(self, result=clipped).everywhere
 
     @cached_property
     def outputs(self) -> Array:
@@ -247,9 +237,7 @@ class Model:
         ``passing`` ends pieces where given variables pass what is narrow, too; ``nudged`` loads differ in their last
         digit.
         """
-        system = self.system
-        initial = {state.name: state.from_given(values) for state in system.states}
-        end = run.times[-1]
+        system, end = self.system, run.times[-1]
         segments = self._segments(end, values)
         scales = np.array([state.finest or state.scale for state in system.states])
         parameters = pieces.segment_parameters(system, segments[:-1], run.rtol, values)
@@ -257,12 +245,24 @@ class Model:
             fastest = max((values[path] for path in system.cycles), default=0.0)
             segments, parameters = self.passing.pieces(segments, parameters, fastest, run.max_steps)
         pieces.start_modes(system, parameters, values)
-        self._check_start(values, parameters[0], initial)
+        first = {**values, **dict(zip([p.path for p in system.parameters], parameters[0].tolist(), strict=True))}
+        initial = {state.name: state.from_given(values) for state in system.states}
+        check_start(system, first, initial)
         if nudged:
             pieces.nudge(system, parameters)
-        start = self._start(np.array(list(initial.values())), parameters)
+        y = np.array(list(initial.values()))
+        if system.equilibria:
+            settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
+            if settled is None:
+                raise InputError(
+                    "there is no gap at which the tractions are in equilibrium at the start.", path="mechanics"
+                )
+            y = settled.y
+            parameters = np.where(settled.parameters != parameters[0], settled.parameters, parameters)
+        start = stable_start(system, self.program, y, parameters[0])
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
-            self._check_start(values, parameters[0], dict(zip(initial, start.tolist(), strict=True)))
+            first |= dict(zip([p.path for p in system.parameters], parameters[0].tolist(), strict=True))
+            check_start(system, first, dict(zip(initial, start.tolist(), strict=True)))
         return Problem(
             program=self.program,
             y0=start,
@@ -270,7 +270,7 @@ class Model:
             segments=segments,
             parameters=parameters,
             rtol=run.rtol,
-            atol=scales * (run.atol if run.atol is not None else ABSOLUTE * run.rtol),
+            atol=scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
             margins=(
                 *(Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins),
                 *(Margin.bear() if edge.strict else Margin.stop() for edge in system.edges),
@@ -281,24 +281,6 @@ class Model:
             spacing=end / run.samples,
             in_play=system.in_play(parameters[0]),
         )
-
-    def _check_start(self, values: Mapping[str, float], parameters: Array, initial: Mapping[str, float]) -> None:
-        """Refuse an initial state outside the range of a law, in the modes that hold there."""
-        paths = [parameter.path for parameter in self.system.parameters]
-        check_start(self.system, {**values, **dict(zip(paths, parameters.tolist(), strict=True))}, initial)
-
-    def _start(self, y: Array, table: Array) -> Array:
-        """The initial state with its quasi-static gaps in equilibrium, and guesses that lead to a stable state."""
-        if self.system.equilibria:
-            parameters = table[0].copy()
-            settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters))
-            if settled is None:
-                raise InputError(
-                    "there is no gap at which the tractions are in equilibrium at the start.", path="mechanics"
-                )
-            y = settled.y
-            table[:] = np.where(settled.parameters != parameters, settled.parameters, table)
-        return stable_start(self.system, self.program, y, table[0])
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from surfacechem.compile.program import Function, compile_function
 from surfacechem.expressions import Expression, derivative
 from surfacechem.model.system import TOLERANCE, System
-from surfacechem.tolerances import EPS, NEGLIGIBLE
+from surfacechem.tolerances import CROSSED, EPS, NEGLIGIBLE
 
 Array = NDArray[np.float64]
 
@@ -90,9 +90,6 @@ ENOUGH = 10
 HALVINGS = 64
 """What takes any part of a run to the last bit of its time."""
 
-TOLD_APART = 512 * EPS
-"""Relative difference of times that are one, 1.1e-13: a piece between them would be rounding of where it begins."""
-
 
 class Passing:
     """The places of a system that time alone leads past."""
@@ -122,8 +119,8 @@ class Passing:
         found = self._found(looked_at.tobytes(), table[:, self._columns].tobytes(), parts)
         beside = np.searchsorted(segments, found)
         gaps = np.minimum(found - segments[beside - 1], segments[beside] - found)
-        found = found[gaps > TOLD_APART * found]
-        apart = np.diff(found, prepend=0.0) > TOLD_APART * found
+        found = found[gaps > CROSSED * found]
+        apart = np.diff(found, prepend=0.0) > CROSSED * found
         found = found[apart]
         within = np.searchsorted(segments, found) - 1
         return np.insert(segments, within + 1, found), np.insert(table, within + 1, table[within], axis=0)

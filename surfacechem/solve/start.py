@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import Program
 from surfacechem.errors import InputError
-from surfacechem.model.system import STABLE, System
+from surfacechem.model.system import System
 from surfacechem.solve.radau.solver import consistent
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def stable_start(system: System, program: Program, y: Array, parameters: Array) 
 def _are_stable(system: System, program: Program, y: Array, parameters: Array) -> NDArray[np.bool_]:
     """Which first guesses lead to states in which all limits of stability are open."""
     playing = system.in_play(parameters)
-    checks = [i for i, m in enumerate(system.moving_margins()) if m.name.startswith(STABLE) and playing[i]]
+    checks = [i for i, m in enumerate(system.moving_margins()) if m.stability and playing[i]]
     if not checks or program.margins is None:
         return np.ones(len(y), dtype=bool)
     found = consistent(program, 0.0, y, np.zeros_like(y), parameters)

@@ -219,7 +219,7 @@ def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
     if not slope.free_symbols & {state.symbol for state in build.states}:
         reason = f"no heat path determines the temperature {node.name}"
         other = reason
-    return Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other))
+    return Margin(f"{STABLE}{node.name}", slope, reason, below=(produced, other), stability=node.name)
 
 
 def _with_velocity(build: Build, heat: Expression, T: Expression) -> Expression:

@@ -249,7 +249,7 @@ def _sliding_row(build: Build, kind: Formulation, slides: Expression, driving: E
             "mass or a damper.",
             PLACE,
         )
-    build.margins.append(Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(build, slides)))
+    build.margins.append(Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(build, slides), stability=str(v)))
 
 
 def _still(

@@ -191,7 +191,7 @@ def _steady(build: Build, sides: Sequence[Side]) -> Expression:
     build.rows.switched("turn", SLIDES * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
     stable = -derivative(build.expanded(along), SPEED)
-    build.margins.append(Margin(f"{STABLE}speed", stable, UNSTABLE, when={SLIDES: (1,)}))
+    build.margins.append(Margin(f"{STABLE}speed", stable, UNSTABLE, when={SLIDES: (1,)}, stability="speed"))
     return still
 
 
