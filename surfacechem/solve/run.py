@@ -137,7 +137,7 @@ class Trajectory:
             states = np.concatenate([states, steps.y])
             named = np.concatenate([named, self.model.evaluate(result, steps.t, steps.y, steps.ydot, steps.segment)])
         system = self.model.system
-        names = [state.name for state in system.states] + [item.name for item in system.outputs]
+        names = [*(state.name for state in system.states), *system.output_columns]
         return dict(zip(names, (*states.T, *named.T), strict=True))
 
     @cached_property
