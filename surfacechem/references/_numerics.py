@@ -224,14 +224,3 @@ def _asymptotic(n: int, x: Array) -> Array:
         term = -term * k / x
         total = total + term
     return total
-
-
-def lambert_of_exp(a: Array) -> Array:
-    r""":math:`W_0(e^a)`, the w > 0 with :math:`w+\ln w=a`, for any a.
-
-    >>> lambert_of_exp(np.array([1.0, 1e4]))
-    array([1.00000000e+00, 9.99079058e+03])
-    """
-    from scipy.special import wrightomega
-
-    return np.asarray(wrightomega(a))

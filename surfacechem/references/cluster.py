@@ -13,7 +13,6 @@ from surfacechem.errors import InputError
 from surfacechem.references._numerics import (
     Separable,
     increasing_root,
-    lambert_of_exp,
     remainder,
     scaled_expint,
     short_integral,
@@ -147,7 +146,9 @@ class RebindingCluster(Cluster):
     @property
     def critical_load(self) -> float:
         """Largest force per site, in units of the force scale, that has a steady state: F_*."""
-        return float(lambert_of_exp(np.array(math.log(self.k_on / self.k_off) - 1.0)))
+        from scipy.special import wrightomega  # W_0 of an exponential, which may overflow
+
+        return float(wrightomega(math.log(self.k_on / self.k_off) - 1.0))
 
     @property
     def critical_traction(self) -> float:

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references._numerics import lambert_of_exp
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
 
 
@@ -62,8 +61,10 @@ class LatticeGasSprings(Reference):
     @property
     def peak_gap(self) -> float:
         """Gap [m] at which the traction in equilibrium is largest."""
+        from scipy.special import wrightomega  # W_0 of an exponential, which may overflow
+
         thermal = BOLTZMANN * self.T
-        w = float(lambert_of_exp(np.array(self.epsilon / thermal - 0.5 - math.log(2.0))))
+        w = float(wrightomega(self.epsilon / thermal - 0.5 - math.log(2.0)))
         return math.sqrt((1.0 + 2.0 * w) * thermal / self.k_b)
 
     @property

@@ -9,7 +9,6 @@ from test_references import RELATIVE, assert_exact, bell, build, cluster, table
 
 from surfacechem.errors import InputError
 from surfacechem.references import get
-from surfacechem.references._numerics import lambert_of_exp
 
 
 @pytest.mark.parametrize("row", range(20))
@@ -119,16 +118,6 @@ def test_lifetime_close_to_the_fold_is_asymptotic():
     assert ratios[2] < 1e-3
 
 
-@pytest.mark.parametrize("phi_i", [0.15, 0.5, 1.0, 0.05])
-def test_cluster_with_rebinding_satisfies_its_equation(phi_i):
-    bonds = get("rebinding-cluster")(**cluster(0.2, 1.0), phi_i=phi_i)
-    t = np.linspace(0.05, 0.9, 7) * min(bonds.end_time, 8.0)
-    step = 1e-4 * t
-    before, phi, after = (bonds.solution(t + k * step)["phi"] for k in (-1, 0, 1))
-    assert_exact((after - before) / (2 * step), 1 - phi - phi * np.exp(bonds.load / phi), relative=1e-5, absolute=1e-9)
-    assert bonds.breaks == (phi_i < 0.1)
-
-
 def test_springs_in_equilibrium():
     data = table("x_latticegas_equilibrium")
     film = build("lattice-gas-springs", data.parameters, epsilon=data.parameters["eps"])
@@ -154,13 +143,6 @@ def test_springs_relax_at_a_held_gap():
     assert_exact(film.solution(t)["phi"], -equilibrium * np.expm1(-3.0 / equilibrium * t))
 
 
-@pytest.mark.parametrize("a", [-700.0, -30.0, 0.0, 0.999, 1.001, 30.0, 700.0, 1e4, 1e12])
-def test_lambert_of_exponentials(a):
-    with mpmath.workdps(40):
-        w = mpmath.lambertw(mpmath.exp(mpmath.mpf(a))).real
-        assert_exact(lambert_of_exp(np.array(a)), float(w), relative=1e-15 * max(1.0, -a))
-
-
 def test_cure_that_nothing_starts_is_refused():
     with pytest.raises(InputError, match="nothing starts the reaction"):
         get("kamal-cure-constant-capacity")(A_1=0.0, A_2=1.0, T_i=300.0)
@@ -171,15 +153,6 @@ def test_isothermal_first_order_cure_is_exponential():
     t = np.array([0.0, 1e-12, 0.1, 1.0, 20.0])
     assert_exact(layer.solution(t)["phi"], -np.expm1(-2.0 * t))
     assert_exact(layer.solution(t)["unreacted"], np.exp(-2.0 * t))
-
-
-def test_cure_from_where_it_stands():
-    """A second run from the middle of the first is the rest of it."""
-    given = {"A_1": 4e5, "E_1": 7e4, "A_2": 2e6, "E_2": 6e4, "m": 0.5, "n": 1.5, "delta_T": 120.0}
-    whole = get("kamal-cure-constant-capacity")(**given, T_i=360.0)
-    middle = whole.solution(180.0)
-    rest = get("kamal-cure-constant-capacity")(**given, T_i=middle["T"].item(), phi_i=middle["phi"].item())
-    assert_exact(rest.solution([5.0, 50.0])["phi"], whole.solution([185.0, 230.0])["phi"])
 
 
 def test_ignition_without_cancellation():

@@ -64,28 +64,6 @@ class TestFriction:
         for name in ("period", "slip_time", "v_max", "heat_per_cycle"):
             assert attrgetter(CALLED.get(name, name))(slider) == pytest.approx(row[name], rel=1e-14)
 
-    def test_mean_traction_is_that_of_sliding(self):
-        slider = get("stick-slip")(**FRICTION, V=0.3)
-        nodes, weights = np.polynomial.legendre.leggauss(60)
-        total, start = 0.0, slider.onset_time
-        for span in (slider.slip.duration, slider.stick_time):
-            t = start + 0.5 * span * (1.0 + nodes)
-            total += 0.5 * span * float(weights @ slider.solution(t)["spring_traction"])
-            start += span
-        assert total / slider.period == pytest.approx(4e4, rel=1e-13)
-
-    @pytest.mark.parametrize("V", [1e-3, 0.3, 100.0])
-    def test_stick_slip_solves_newtons_law(self, V):
-        """Mass times acceleration is spring minus friction, while the spring follows V t - slip."""
-        slider = get("stick-slip")(**FRICTION, V=V)
-        t = slider.onset_time + slider.slip.duration * np.linspace(0.1, 0.9, 9)
-        h = 1e-3 * slider.slip.duration
-        before, now, after = (slider.solution(t + step) for step in (-h, 0.0, h))
-        acceleration = (after["v"] - before["v"]) / (2 * h)
-        scale = np.max(np.abs(now["spring_traction"])) + 4e4
-        assert_exact(10.0 * acceleration, now["spring_traction"] - 4e4, absolute=1e-5 * scale)
-        assert_exact(now["spring_traction"], 1e8 * (V * t - now["u_t"]), absolute=1e-8 * scale)
-
     def test_equal_friction_never_rests(self):
         slider = get("stick-slip")(m=10.0, k=1e8, V=1e-3, t_s=4e4, t_k=4e4)
         assert slider.stick_time == 0.0
@@ -165,20 +143,6 @@ class TestCohesion:
         with pytest.raises(InputError, match="there is no jump"):
             _ = get("cohesive-pull-off")(**ZONE, k=1e14, w_dot=1.0).opening
 
-    @pytest.mark.parametrize("k", [1e2, 1e8, 1e13, 3.6e13, 3.67e13, 1e14, 1e20])
-    def test_the_gap_is_in_balance_and_the_energy_closes(self, k):
-        """Work of the far field is energy of spring and zone plus heat."""
-        bodies = get("cohesive-pull-off")(**ZONE, k=k, w_dot=1.0)
-        end = 3e-8 if bodies.stable else 1.2 * bodies.opening.w
-        t = np.linspace(0.0, end, 200)
-        exact = bodies.solution(t)
-        assert np.all(np.diff(exact["g_n"]) > 0.0)
-        assert_exact(k * (exact["w_n"] - exact["g_n"]), exact["t_n"], absolute=16 * EPS * k * end)
-        jumped = exact["heat"] > 0.0
-        assert jumped.any() != bodies.stable
-        if not bodies.stable:
-            assert np.all(jumped == (t > bodies.opening.w))
-
     def test_heating_by_cycles_of_opening_and_closing(self):
         bodies = get("cohesive-pull-off")(**ZONE, k=1e13, w_dot=1e-8)
         off, on = bodies.opening, bodies.closing
@@ -203,18 +167,6 @@ class TestCohesion:
         reached = gap.solution(gap.time(4e-8))
         # In the bottleneck a rounding of time is a small distance; beyond it, it is the speed.
         assert reached["g_n"] == pytest.approx(4e-8, rel=1e-13 + 8 * EPS * gap.time(4e-8) * reached["v_n"] / 4e-8)
-
-    @pytest.mark.parametrize("delta_w", [1e-7, 1e-10, 1e-16])
-    def test_overdamped_gap_obeys_its_equation(self, delta_w):
-        gap = get("overdamped-pull-off")(**ZONE, k=1e13, c=2e5, delta_w=delta_w)
-        t = gap.end_time * np.array([1e-6, 0.1, 0.4, 0.7, 0.99])
-        h = 1e-4 * t
-        before, now, after = (gap.solution(np.minimum(t + s, gap.end_time)) for s in (-h, 0.0, h))
-        rate = (after["g_n"] - before["g_n"]) / (2 * h)
-        assert_exact(rate, now["v_n"], relative=1e-3)
-        force = 1e13 * (gap.w - now["g_n"]) - now["t_n"]
-        assert_exact(2e5 * now["v_n"], force, absolute=8 * EPS * 1e13 * gap.w)
-        assert gap.solution(0.0)["g_n"] == 0.0
 
     def test_isentropic_cooling(self):
         columns, expect = read("h_isentropic_cohesive_cooling")
@@ -273,10 +225,3 @@ class TestSuddenDebonding:
         if bonds.verdict == "impossible":
             with pytest.raises(InputError, match="no real value"):
                 bonds.solution(0.0)
-
-    def test_between_the_verdicts(self):
-        """At (t/t_0)^2 = kappa nothing changes; at kappa - 1 the bodies would be at zero temperature."""
-        given = {"C": 1.0, "T_0": 1.0, "T_i": 1.0, "k": 1.0}
-        for kappa, t, verdict in ((1.0, 1.0, "admissible"), (2.0, 1.0, "impossible")):
-            assert get("sudden-debonding")(**given, K_0=kappa, t_n=t).verdict == verdict
-        assert get("sudden-debonding")(**given, K_0=1.0, t_n=1.0).final_temperature == 1.0
