@@ -5,7 +5,7 @@ Divided differences of the exponential are what the response of a linear system 
 :math:`t^2\exp[0,-\lambda t,-\gamma t]`. No difference of nearly equal exponentials is ever formed.
 
 Sources: McCurdy, Ng & Parlett (1984), Math. Comp. 43, 501-528 (differences); Abramowitz & Stegun (1964), 5.1
-(exponential integrals); Corless, Gonnet, Hare, Jeffrey & Knuth (1996), Adv. Comput. Math. 5, 329-359 (Lambert's W).
+(exponential integrals).
 """
 
 from __future__ import annotations

@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from surfacechem.results.accuracy import Accuracy
 from surfacechem.results.audit import Audit, audit
 from surfacechem.results.dataset import DATASET_NAMES, Results, profile_columns, quantity_columns
-from surfacechem.results.detailed_balance import Verdict, verdicts
 from surfacechem.results.event_table import event_columns, event_findings, event_violations, event_waits
-from surfacechem.results.extremes import capped_rates, cautions
+from surfacechem.results.findings import Verdict, findings, verdicts
 from surfacechem.results.netcdf import Column, versions
 from surfacechem.solve import solver
 from surfacechem.solve.contract import Status
 from surfacechem.solve.run import Run, Trajectory
-from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
-
-LOST = NEGLIGIBLE / 10
-"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
-digits none is left that counts.
-"""
-
-LARGE, WITHIN = 1e-2, 10
-"""Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
 
 RECORDED = ("times", "atol", "max_steps")
 """Settings of a run that a dataset records where they are not those of its case; others are attributes."""
@@ -84,49 +72,10 @@ class Solution(Results):
             *(str(verdict) for verdict in self.verdicts if not verdict.consistent),
             *event_findings(trajectory.jumps),
             *event_waits(trajectory),
-            *self._extrapolations(),
-            *capped_rates(trajectory),
-            *cautions(trajectory),
-            *self._lost_fluxes(),
-            *self._inaccurate(),
+            *findings(trajectory, self.accuracy),
             *trajectory.model.system.warnings,
             *self.notes,
         )
-
-    def _inaccurate(self) -> list[str]:
-        """An error well beyond what was asked for, or so large that the result is none."""
-        found = self.accuracy
-        if found is not None and math.isnan(found.error) and self.status == "finished":
-            return [f"the error is not known: {found.source.partition(': ')[2]}"]
-        if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
-            return []
-        wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
-        worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
-        return [f"the error of {worst} is {found.error:.1e}{wanted}"]
-
-    def _lost_fluxes(self) -> list[str]:
-        """Fluxes through conductances so large that the temperature difference is rounding."""
-        fluxes = {name: size for name, size in self.trajectory.roundings.items() if name.startswith("q_")}
-        everywhere, duration = self.trajectory.everywhere, self.trajectory.result.t
-        largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
-        # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
-        content = self.trajectory.roundings.get("E_total", 0.0) / EPS
-        felt = FLOOR * max(_largest(everywhere["E_total"]), content)
-        lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
-        advice = "let the two share one temperature, or use the heat_into variables, which are exact"
-        return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
-
-    def _extrapolations(self) -> list[str]:
-        """Laws that the run has used outside their range."""
-        found = []
-        for limit in self.trajectory.model.system.ranges:
-            values = self.trajectory.everywhere[limit.variable]
-            low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
-            rounding = ROUNDING * max(abs(low), abs(high))
-            if low < limit.low - rounding or high > limit.high + rounding:
-                span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
-                found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
-        return found
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
@@ -195,7 +144,7 @@ class Solution(Results):
         heat = self.trajectory.everywhere.get("q_reaction")
         if heat is None:
             return {}
-        felt = self.trajectory.run.rtol * _largest(heat)
+        felt = self.trajectory.run.rtol * float(np.max(np.abs(heat), initial=0.0))
         found = [name for name, sign in CLASSES.items() if np.any(sign * heat > felt)]
         return {"reaction": " and ".join(found) or "isothermic"}
 
@@ -211,7 +160,3 @@ class Solution(Results):
         if self.trajectory.result.status is Status.STOPPED:
             departures["max_steps"] = self.trajectory.result.counters.steps  # seconds are not the same twice
         return {"departures": json.dumps(departures)} if departures else {}
-
-
-def _largest(values: Any) -> float:
-    return float(np.max(np.abs(values), initial=0.0))

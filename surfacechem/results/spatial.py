@@ -24,7 +24,7 @@ from surfacechem.contracts import grids
 from surfacechem.model.system import System
 from surfacechem.results.accuracy import MARGIN, UNKNOWN, Accuracy, CellErrors
 from surfacechem.results.error_estimates import EVENTS, apart
-from surfacechem.results.solution import WITHIN
+from surfacechem.results.findings import WITHIN
 from surfacechem.scene import Body, Conduction, Scene
 from surfacechem.solve.run import Run, Trajectory
 

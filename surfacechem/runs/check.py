@@ -15,7 +15,7 @@ from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import System
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.results.extremes import cautioned
+from surfacechem.results.findings import cautioned
 from surfacechem.scene import Scene
 from surfacechem.solve.contract import Problem
 from surfacechem.solve.diagnose import paces

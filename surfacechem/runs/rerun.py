@@ -71,17 +71,17 @@ class Record:
 
 def read(path: str | Path) -> Record:
     """The attributes and variables of a netCDF file."""
-    return reading(Path(path), lambda: _read(Path(path)))
 
+    def record() -> Record:
+        import netCDF4
 
-def _read(path: Path) -> Record:
-    import netCDF4
+        with netCDF4.Dataset(path) as file:
+            file.set_auto_mask(False)
+            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+            variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
+        return Record(Path(path), attributes, variables)
 
-    with netCDF4.Dataset(path) as file:
-        file.set_auto_mask(False)
-        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-        variables = {name: np.asarray(variable[...]) for name, variable in file.variables.items()}
-    return Record(path, attributes, variables)
+    return reading(Path(path), record)
 
 
 def run_again(record: Record) -> Solution | SweepSolution:

@@ -257,7 +257,8 @@ class Simulation:
 
         section = self.case.sweep
         if over is not None:
-            given = {"over": {path: _listed(values) for path, values in over.items()}}
+            lists = {path: x.tolist() if isinstance(x, np.ndarray) else x for path, x in over.items()}
+            given = {"over": lists}
             section = read_sweep(from_plain(given, Place(path="sweep")), section)
         if section is None:
             raise InputError(
@@ -294,8 +295,3 @@ class Simulation:
         if unknown is not None:
             raise InputError(f"no parameter '{unknown}' to change.{suggestion(unknown, self.system.changeable)}")
         return {path: parse(value, units[path], name=path) for path, value in changes.items()}
-
-
-def _listed(values: object) -> object:
-    """Arrays as lists."""
-    return values.tolist() if isinstance(values, np.ndarray) else values

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import symengine
@@ -47,15 +46,11 @@ def history(system: System, variable: str) -> Expression:
         raise InputError(f"no law reads a prescribed {variable}.", path="sweep.until")
     expression = system.expand(named.expression)
     moving = {x for state in system.states for x in (state.symbol, state.dot)}
-    if expression.free_symbols & moving or not _is_line(expression, system.t):
+    slope = derivative(expression, system.t)
+    if expression.free_symbols & moving or slope == 0 or system.t in slope.free_symbols:
         message = f"{variable} is no ramp; give it one under `loading`: {{ramp: {{rate: ...}}}}."
         raise InputError(message, path="sweep.until")
     return expression
-
-
-def _is_line(expression: Expression, t: Any) -> bool:
-    slope = derivative(expression, t)
-    return slope != 0 and t not in slope.free_symbols
 
 
 def evolves_bonds(system: System) -> bool:
@@ -66,24 +61,26 @@ def evolves_bonds(system: System) -> bool:
 
 def breaks_bonds(system: System) -> bool:
     """Whether bonds evolve that only break, so that each has one force at which it does."""
-    return evolves_bonds(system) and not _forms_bonds(system)
-
-
-def _forms_bonds(system: System) -> bool:
-    """Whether bonds form where there are none: then the loss of bonds is no count of ruptures."""
+    if not evolves_bonds(system):
+        return False
+    # Where bonds form when there are none the loss of bonds is no count of ruptures.
     names = {state.symbol for state in system.states if state.name == "phi" or state.name.startswith("theta_")}
     gone = _total(system, system.expand(symengine.Symbol("phi"))).subs(dict.fromkeys(names, 0))
     point = {p.symbol: p.at(0.0) for p in system.parameters} | {s.symbol: s.initial for s in system.states}
     point |= {s.dot: 0 for s in system.states} | {system.t: 0}
     value = symengine.sympify(gone).subs(point)
-    return bool(names) and not value.free_symbols and float(value) > 0
+    return not (names and not value.free_symbols and float(value) > 0)
 
 
 def with_rupture(system: System, variable: str) -> System:
     """The system that also records where its bonds break as the variable grows, and ends when all are broken."""
     unit = next(item.quantity.unit for item in system.named if item.name == variable)
     speed = derivative(history(system, variable), system.t)
-    survival = _survival(system)
+    # The bonding state over its initial value, which is a parameter.
+    phi = system.expand(symengine.Symbol("phi"))
+    paths = {p.path: p.symbol for p in system.parameters}
+    start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
+    survival = phi / phi.subs(start)
     falling = _total(system, survival)
     left = Quantity("survival", "1", "bonds that are left, of those at the start")
     density = Quantity(f"density_{variable}", f"1/{unit}", f"density of ruptures over {variable}")
@@ -101,14 +98,6 @@ def with_rupture(system: System, variable: str) -> System:
     )
 
 
-def _survival(system: System) -> Expression:
-    """Bonding state over its initial value, which is a parameter."""
-    phi = system.expand(symengine.Symbol("phi"))
-    paths = {p.path: p.symbol for p in system.parameters}
-    start = {s.symbol: paths[f"initial.{s.name}"] for s in system.states if f"initial.{s.name}" in paths}
-    return phi / phi.subs(start)
-
-
 def _total(system: System, expression: Expression) -> Expression:
     """Time derivative along a run; rates of bonds are put in where they are known, as they are better than slopes."""
     bonds = {account.law: system.expand(account.rate) for account in system.ledger if account.kind == "bonds"}
@@ -121,14 +110,14 @@ def _total(system: System, expression: Expression) -> Expression:
 def statistics(trajectory: Trajectory, variable: str) -> Statistics:
     """Statistics of a run of a system :func:`with_rupture`; not a number where the run does not tell."""
     model, result = trajectory.model, trajectory.result
-    names = [item.name for item in model.system.outputs]
-    column, density = names.index(variable), names.index(f"density_{variable}")
+    columns = model.system.output_columns
+    column, density = columns[variable], columns[f"density_{variable}"]
     told = [*(margin.reason for margin in model.margins), *(item.reason for item in model.system.edges)]
     reasons = np.array(told)[result.events.index]
     at = model.evaluate(result, result.events.t, result.events.y, result.events.ydot)
     halves, peaks = at[reasons == MEDIAN], np.concatenate([trajectory.outputs[:1], at[reasons == MODE]])
     end = model.evaluate(result, np.array([result.t]), result.y[None], result.ydot[None])[0]
-    survivors = end[names.index("survival")]
+    survivors = end[columns["survival"]]
     accounts = [account.quantity.name for account in model.system.ledger]
     integral = result.ledger[accounts.index(f"mean_{variable}")]
     return Statistics(

@@ -27,7 +27,7 @@ from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
 from surfacechem.quantities import BOLTZMANN, GAS_CONSTANT
-from surfacechem.results.detailed_balance import ROUNDED
+from surfacechem.results.findings import ROUNDED
 
 Array = NDArray[np.float64]
 

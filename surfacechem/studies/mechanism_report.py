@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts.units import parse
 from surfacechem.errors import InputError, Place
 from surfacechem.mechanism.source import Source
-from surfacechem.results.detailed_balance import said
+from surfacechem.results.findings import said
 from surfacechem.runs.listing import WIDTH, source
 from surfacechem.runs.summaries import columns
 from surfacechem.studies.mechanism_rates import Curves, cycle_verdict, cycles

@@ -181,11 +181,11 @@ def test_forces_that_overflow(exponent):
 def test_runs_with_edges_or_fits_share_batches_and_stay_what_they_are(case, path, values, monkeypatch):
     case, rounds, solve_all = surfacechem.load(case), [], Radau.solve_all
     monkeypatch.setattr(Radau, "solve_all", lambda *given: rounds.append(len(given[1])) or solve_all(*given))
-    one, two = (case.sweep({path: values}, threads=n).sweep for n in (1, 2))
+    one, two = (case.sweep({path: values}, threads=n) for n in (1, 2))
     assert rounds[0] == len(values) > 1
     for i in range(len(values)):
         alone = case.run(one.plan.points[i]).trajectory
-        for run in (one[i], two[i]):
+        for run in (one.runs[i], two.runs[i]):
             assert run.outputs.tobytes() == alone.outputs.tobytes()
             assert run.result.steps.y.tobytes() == alone.result.steps.y.tobytes()
             assert [jump.t for jump in run.jumps] == [jump.t for jump in alone.jumps]

@@ -1,0 +1,173 @@
+"""What a reader of a run has to know, in words, beside its balances and events.
+
+Pairs of rates that contradict the equilibrium of the potential, rates so fast that none resolves them, laws out of
+their sense or range, fluxes and errors that are no result.
+
+Where the interface is in equilibrium every reaction runs as often forward as back, so that k_f/k_r is the equilibrium
+constant K(g, T), the elastic energy of the bonds included. A reversible law has this by construction; two laws that run
+one way each have it only if their parameters say so.
+
+Source: Onsager (1931), Phys. Rev. 37, 405 (detailed balance); Sauer, Duong & Mandadapu (2021), section 4.3 (entropy).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import symengine
+from numpy.typing import NDArray
+
+from surfacechem.expressions import EXPONENT_CAP
+from surfacechem.model.system import System
+from surfacechem.results.accuracy import Accuracy
+from surfacechem.results.audit import Audit
+from surfacechem.solve.run import Trajectory
+from surfacechem.tolerances import EPS, FLOOR, NEGLIGIBLE, ROUNDING
+
+LOST = NEGLIGIBLE / 10
+"""A flux that the last bit of a temperature changes by more than this part of the largest flux is no result: of four
+digits none is left that counts.
+"""
+
+LARGE, WITHIN = 1e-2, 10
+"""Relative error that is told as a warning, and how many times what was asked for may be missed without one."""
+
+ROUNDED = NEGLIGIBLE
+"""Departures below this are rounding of published numbers."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Range of ln(k_f/k_r) - ln K(g, T) along a run, and whether they produced entropy all the time."""
+
+    title: str
+    low: float
+    high: float
+    dissipates: bool
+
+    @property
+    def largest(self) -> float:
+        """Largest departure."""
+        return max(abs(self.low), abs(self.high))
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the rates keep detailed balance, up to rounding of their parameters."""
+        return self.largest <= ROUNDED
+
+    def __str__(self) -> str:
+        """The verdict in words."""
+        entropy = "entropy production stayed positive" if self.dissipates else "it DESTROYED ENTROPY"
+        return f"{self.title}: {said(self.low, self.high)}; {entropy}"
+
+
+def said(low: float, high: float) -> str:
+    """A range of departures in words.
+
+    >>> said(-2.3, 0.0)
+    'k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp(-2.3) at most'
+    """
+    worst = low if abs(low) > abs(high) else high
+    if not math.isfinite(worst):
+        return "one of the two never runs, so that k_f/k_r is not K(g, T)"
+    if abs(worst) <= ROUNDED:
+        return f"k_f/k_r is K(g, T) to within {abs(worst):.1e}"
+    return f"k_f/k_r departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
+
+
+def verdicts(trajectory: Trajectory, audit: Audit) -> tuple[Verdict, ...]:
+    """The verdict on each pair of rates, over all outputs and steps."""
+    found = []
+    for pair in trajectory.model.system.pairs:
+        values = trajectory.everywhere[pair.departure]
+        if len(values):  # a run that ends at its start has none
+            low, high = float(np.min(values)), float(np.max(values))
+            found.append(Verdict(pair.title, low, high, pair.law not in audit.violations))
+    return tuple(found)
+
+
+def findings(trajectory: Trajectory, accuracy: Accuracy | None) -> list[str]:
+    """Everything but the verdicts, in words."""
+    system, rows = trajectory.model.system, np.empty((0, 0))
+    if system.capped or system.cautions:  # arguments of compiled functions at the outputs and steps
+        model, result, steps = trajectory.model, trajectory.result, trajectory.result.steps
+        rows = model.inputs(result, result.times, result.outputs, trajectory.rates)
+        if steps is not None:
+            rows = np.concatenate([rows, model.inputs(result, steps.t, steps.y, steps.ydot)])
+    return [
+        *_extrapolations(trajectory),
+        *_capped_rates(system, rows),
+        *cautioned(system, rows),
+        *_lost_fluxes(trajectory),
+        *_inaccurate(trajectory, accuracy),
+    ]
+
+
+def _capped_rates(system: System, rows: NDArray[np.float64]) -> list[str]:
+    """Laws whose rate was beyond exp(EXPONENT_CAP) at one of several states."""
+    found = []
+    for law in system.capped if len(rows) else ():
+        # Interpreted, since they are needed once.
+        exponents = [system.expand(expression) for expression in law.exponents]
+        values = symengine.Lambdify(system.inputs, exponents, backend="lambda")(rows)
+        largest = float(np.nanmax(values, initial=-np.inf))
+        if largest > EXPONENT_CAP:
+            found.append(
+                f"{law.title}: the logarithm of its rate coefficient (SI) reached {largest:.4g}; above "
+                f"{EXPONENT_CAP:g} the rate goes on along its tangent: it is instantaneous, but not the one stated"
+            )
+    return found
+
+
+def cautioned(system: System, rows: NDArray[np.float64]) -> list[str]:
+    """The cautions that apply at one of several states, which are the arguments of compiled functions."""
+    if not (system.cautions and len(rows)):
+        return []
+    expressions = [system.expand(item.expression) for item in system.cautions]
+    values = symengine.Lambdify(system.inputs, expressions, backend="lambda")(rows).reshape(len(rows), -1)
+    least, size = np.nanmin(values, axis=0), np.nanmax(np.abs(values), axis=0)
+    return [item.text for item, x in zip(system.cautions, least < -ROUNDING * size, strict=True) if x]
+
+
+def _inaccurate(trajectory: Trajectory, found: Accuracy | None) -> list[str]:
+    """An error well beyond what was asked for, or so large that the result is none."""
+    if found is not None and math.isnan(found.error) and trajectory.status == "finished":
+        return [f"the error is not known: {found.source.partition(': ')[2]}"]
+    if found is None or not found.error > (LARGE if found.asked is None else WITHIN * found.asked):
+        return []
+    wanted = "" if found.asked is None else f", where {found.asked:.0e} was asked"
+    worst = max(found.variables, key=lambda name: found.variables[name], default="the result")
+    return [f"the error of {worst} is {found.error:.1e}{wanted}"]
+
+
+def _lost_fluxes(trajectory: Trajectory) -> list[str]:
+    """Fluxes through conductances so large that the temperature difference is rounding."""
+    fluxes = {name: size for name, size in trajectory.roundings.items() if name.startswith("q_")}
+    everywhere, duration = trajectory.everywhere, trajectory.result.t
+    largest = max((_largest(everywhere[name]) for name in fluxes), default=0.0)
+    # What rounding alone carries over the whole run counts against the heat that there is, wherever its zero lies.
+    content = trajectory.roundings.get("E_total", 0.0) / EPS
+    felt = FLOOR * max(_largest(everywhere["E_total"]), content)
+    lost = [name for name, size in fluxes.items() if size > LOST * largest and size * duration > felt]
+    advice = "let the two share one temperature, or use the heat_into variables, which are exact"
+    return [f"{', '.join(lost)}: lost to rounding, as the conductance is very large; {advice}"] if lost else []
+
+
+def _extrapolations(trajectory: Trajectory) -> list[str]:
+    """Laws that the run has used outside their range."""
+    found = []
+    for limit in trajectory.model.system.ranges:
+        values = trajectory.everywhere[limit.variable]
+        low, high = float(np.min(values, initial=math.inf)), float(np.max(values, initial=-math.inf))
+        rounding = ROUNDING * max(abs(low), abs(high))
+        if low < limit.low - rounding or high > limit.high + rounding:
+            span = f"{limit.variable} ran from {low:.6g} to {high:.6g}"
+            found.append(f"{limit.law} is an extrapolation: {span}, its range is {limit.low:g} to {limit.high:g}")
+    return found
+
+
+def _largest(values: Any) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
