@@ -7,18 +7,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from surfacechem.contracts.terms import Friction, UnderPressure, parameter
-from surfacechem.expressions import (
-    Expression,
-    absolute,
-    asinh_exp,
-    decay,
-    exp,
-    log,
-    positive,
-    power,
-    sinh_exp,
-    where,
-)
+from surfacechem.expressions import Expression, absolute, asinh_exp, decay, exp, log, positive, power, sinh_exp, where
 
 
 class Coulomb(UnderPressure, Friction):

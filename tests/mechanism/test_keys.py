@@ -147,11 +147,7 @@ def test_refused(what, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            "5.13e8 m^2/mol/s",
-            "5.13e8",
-            "A(s) + B(s) <=> AB(s): A: 5.13e+08 without a unit counts in powers of",
-        ),
+        ("5.13e8 m^2/mol/s", "5.13e8", "A(s) + B(s) <=> AB(s): A: 5.13e+08 without a unit counts in powers of"),
         ("Ea: 0", "Ea: 50", "Ea: 50 without a unit counts in J/kmol. Write it with its unit, such as `Ea: 50 kJ/mol`"),
         ("1.0e-4 mol/m^2", "1.0e-4", "phase film: site-density: 0.0001 without a unit counts in kmol/m^2"),
         ("h0: -172.3808 kJ/mol", "h0: -172.3808", "species AB(s): h0: -172.381 without a unit counts in J/kmol"),
@@ -180,16 +176,8 @@ LOADED = """\
     [
         ("x-beta", "x_beta", "unknown key 'x_beta'. Did you mean 'x-beta'?"),
         ("type: Bell", "type: Bel", "rate type 'Bel' is not lowered. Did you mean 'Bell'?"),
-        (
-            "x-beta: 0.4 nm",
-            "x-slip: 0.4 nm",
-            "'x-slip' is no key of interface-Bell; it belongs to interface-tw",
-        ),
-        (
-            "  type: Bell\n",
-            "",
-            "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, ",
-        ),
+        ("x-beta: 0.4 nm", "x-slip: 0.4 nm", "'x-slip' is no key of interface-Bell; it belongs to interface-tw"),
+        ("  type: Bell\n", "", "'x-beta' is no key of interface-Arrhenius; it belongs to interface-Bell, "),
         ("0.4 nm", "0.4", "x-beta: 0.4 has no unit, and `units` says nothing about it; write it in m, such as"),
         ("0.4 nm", "0.4 pN", "x-beta = 0.4 pN is not a quantity in m"),
         ("type: Bell", "type: Dudko-Hummer-Szabo", "a rate of type Dudko-Hummer-Szabo needs `barrier`"),
