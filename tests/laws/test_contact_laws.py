@@ -80,23 +80,6 @@ def test_finite_everywhere(law):
             assert np.isfinite(function([values[name] for name in names])).all(), values
 
 
-@each_gap_law
-def test_traction_is_the_slope_of_the_energy(law):
-    """Difference quotients with 60 digits, also across the joints of pieces, where the energy is smooth."""
-    given = example(law, 2)
-    parameters = {symengine.Symbol(name): mpmath.mpf(getattr(given, name)) for name, _ in law.specs()}
-    energy = symbolic(given.bind({str(symbol): symbol for symbol in parameters}))
-    point = {g: mpmath.mpf("0.3"), g_t: mpmath.mpf("0.2"), phi: mpmath.mpf("0.5"), bonded: mpmath.mpf(1)} | parameters
-    point[symengine.Symbol("N_c")] = mpmath.mpf(3)
-    step = mpmath.mpf(10) ** -25
-    for x in {g, g_t, phi} & energy.free_symbols:
-        slope = derivative(energy, x)
-        for value in map(mpmath.mpf, (0, 0.3, -0.3, 0.7)):
-            above, below = (number(energy, point | {x: value + side * step}) for side in (1, -1))
-            exact, difference = number(slope, point | {x: value}), (above - below) / (2 * step)
-            assert abs(exact - difference) <= 1e-14 * (1 + abs(exact)), "constants are doubles"
-
-
 def test_bond_springs_in_chemical_equilibrium():
     """Against the exact table; the traction along equilibrium has its peak at sqrt(2K/3E) and does the work K/2."""
     columns, rows, expect = read("h_damage_equilibrium")
@@ -183,17 +166,6 @@ def test_strength_that_varies_gives_entropy_affinity_and_capacity():
     assert at(elastic, **here) == pytest.approx(-t_0 * 0.7 * 300 / 320**2 * 3 * math.exp(-2), rel=1e-14)
 
 
-def test_range_that_varies_gives_the_complete_terms():
-    """g_0(T) too: mixed derivatives agree, and the energy of touching surfaces carries its own entropy."""
-    zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e15).bind({"g_0": 1e-8 * T / T_0})
-    energy = zone.energy(g_n=g)
-    for x in (-1e-8, 4e-9):
-        here = {"g_n": x, "T_c": 320.0, "T_0": 300.0}
-        left, right = derivative(derivative(energy, T), g), derivative(derivative(energy, g), T)
-        assert at(left, **here) == pytest.approx(at(right, **here), rel=1e-14, abs=1e-12)
-    assert at(-derivative(energy, T), g_n=-1e-8, T_c=320.0, T_0=300.0) == pytest.approx(math.e * 1e-2 / 300, rel=1e-14)
-
-
 def test_adhesion_breaks_where_the_elastic_energy_exceeds_it():
     law = AdhesionIntensity(C_N=1e12, C_T=2e12, w=0.5, E_n=1e14)
     M = derivative(symbolic(law), phi)
@@ -241,18 +213,6 @@ def test_sphere_plane_is_the_sum_over_all_pairs(gap):
     repulsion = sum(quad(of_ring, a, b, epsabs=0.0, epsrel=1e-10)[0] for a, b in pairwise(edges))
     law = LennardJonesSpherePlane(**SITES, R=R, area=area)
     assert area * at(derivative(symbolic(law), g), g_n=gap) == pytest.approx(-repulsion, rel=1e-8)
-
-
-def test_derjaguin_is_the_limit_of_a_large_sphere():
-    ratio = []
-    for R in (1e-8, 1e-7, 1e-6):
-        sphere = {**SITES, "R": R, "area": 1.0}
-        exact, approximate = (
-            at(derivative(symbolic(law(**sphere)), g), g_n=1e-9)
-            for law in (LennardJonesSpherePlane, LennardJonesDerjaguin)
-        )
-        ratio.append(1 - exact / approximate)
-    assert ratio == pytest.approx([(1e-9 / (2 * R + 1e-9)) ** 2 for R in (1e-8, 1e-7, 1e-6)], rel=1e-3)
 
 
 def test_van_der_waals_sphere_is_the_sum_of_its_shells():

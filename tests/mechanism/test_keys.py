@@ -174,6 +174,7 @@ LOADED = """\
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
+        ("  x-beta: 0.4 nm\n", "", "a rate of type Bell needs `x-beta`: distance to the transition state [m]"),
         ("x-beta", "x_beta", "unknown key 'x_beta'. Did you mean 'x-beta'?"),
         ("type: Bell", "type: Bel", "rate type 'Bel' is not lowered. Did you mean 'Bell'?"),
         ("x-beta: 0.4 nm", "x-slip: 0.4 nm", "'x-slip' is no key of interface-Bell; it belongs to interface-tw"),
@@ -198,7 +199,9 @@ def test_keys_of_a_rate_type_are_those_of_its_class(old, new, words, tmp_path):
         ("{stifness: 1 pN/nm}", "species AB(s): bond: unknown key 'stifness'. Did you mean 'stiffness'?"),
         ("{stiffness: 1}", "species AB(s): bond: stiffness: 1 has no unit"),
         ("{stiffness: 1 pN/nm, rest-length: 20}", "species AB(s): bond: rest-length: 20 has no unit"),
-        ("{rest-length: 20 nm}", "needs `stiffness`"),
+        ("{rest-length: 20 nm}", "species AB(s): bond needs `stiffness`: stiffness of the bond [N/m]."),
+        ("{stiffness: 1 pN}", "species AB(s): bond: stiffness = 1 pN is not a quantity in N/m."),
+        ("{stiffness: -1 N/m}", "species AB(s): bond: stiffness = -1 is outside its range: >= 0."),
         ("5 pN/nm", "bond: this must be a mapping, not '5 pN/nm'"),
     ],
 )

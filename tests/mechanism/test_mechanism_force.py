@@ -73,20 +73,6 @@ def file(tmp_path):
     return write
 
 
-def test_rates_and_constants_by_hand(file):
-    curves = Curves(load_mechanism(file("Bell")))
-    work = FORCES**2 / (2 * STIFFNESS * KT)
-    np.testing.assert_allclose(
-        curves.log_forward("R1", TEMPERATURE, FORCES), FORCES * 0.4e-9 / KT, rtol=1e-12, atol=1e-13
-    )
-    np.testing.assert_allclose(
-        curves.log_equilibrium("R2", TEMPERATURE, FORCES), math.log(K_0) - work, rtol=1e-12, atol=1e-13
-    )
-    (pair,) = curves.pairs
-    expected = FORCES * 0.6e-9 / KT - work
-    np.testing.assert_allclose(curves.departure(pair, TEMPERATURE, FORCES), expected, rtol=1e-12, atol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["Dembo", "attachment"])
 def test_springs_know_their_energy(name, file):
     curves = Curves(load_mechanism(file(name)))
@@ -96,17 +82,6 @@ def test_springs_know_their_energy(name, file):
     solution = surfacechem.load(file(name).with_name("case.yaml")).run()
     assert np.max(np.abs(solution.dataset.departure_R1_R2)) < 1e-11
     assert solution.warnings == ()
-
-
-def test_a_reversible_bell_bond_is_consistent_by_construction(file):
-    curves = Curves(load_mechanism(file("reversible")))
-    reverse = curves.log_reverse("R1", TEMPERATURE, FORCES)
-    expected = math.log(K_0) + FORCES * 0.4e-9 / KT - FORCES**2 / (2 * STIFFNESS * KT)
-    np.testing.assert_allclose(reverse, expected, rtol=1e-12)
-    assert verdict(curves, "R1", Span(T, T), Span(0.0, 1e-11)).startswith("consistent by construction")
-    solution = surfacechem.load(file("reversible").with_name("case.yaml")).run()
-    assert solution.verdicts == ()
-    assert solution.audit.violations == ()
 
 
 def test_the_run_says_how_far_a_pair_departs(file):
@@ -123,17 +98,6 @@ def test_the_run_says_how_far_a_pair_departs(file):
         f"departs from the equilibrium constant K(g, T) by a factor exp({worst:.3g}) at most"
         in solution.attributes["detailed_balance"]
     )
-
-
-def test_the_sheet_shows_force_and_the_figure_has_a_row_for_it(file):
-    curves = Curves(load_mechanism(file("Bell")))
-    text = sheet(curves, Span(T, T), Span(0.0, 40e-12))
-    assert "Against the force on bond(s), at 300 K" in text
-    rows = [line.split() for line in text.splitlines()]
-    row = next(row[-5:] for row in rows if row[:2] == ["R1", "R2"] and len(row) == 11)
-    expected = FORCES[:5] * 0.6e-9 / KT - FORCES[:5] ** 2 / (2 * STIFFNESS * KT)
-    assert [float(value) for value in row] == pytest.approx(expected, rel=5e-3, abs=1e-9)
-    assert len(figure(curves, Span(280.0, 360.0), Span(0.0, 40e-12)).axes) == 4
 
 
 def test_a_direction_that_is_switched_off_is_shown(file):

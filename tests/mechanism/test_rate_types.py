@@ -9,9 +9,8 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from mechanisms import KMOL, call, mechanism_texts, partial_molar, states, values
+from mechanisms import KMOL, call, mechanism_texts, states, values
 from surfacechem.errors import InputError
-from surfacechem.expressions import EXPONENT_CAP
 from surfacechem.laws.bonding import LatticeGas
 from surfacechem.laws.bonds import Bell, DemboSpring, DudkoHummerSzabo, GapAttachment, TwoPathway
 from surfacechem.laws.kinetics import ExponentialAffinity, KamalSourour, LinearAffinity
@@ -132,41 +131,6 @@ def test_every_rate_type_is_in_the_comparison():
     assert compared | {"linear-affinity", "exponential-affinity", "Arrhenius"} == set(names())
 
 
-@given(
-    equation=st.sampled_from(["bond <=> free", "free <=> bond", "2 bond <=> 2 free"]),
-    kind=st.sampled_from([("Bell", BELL), ("Dembo", DEMBO), ("two-pathway", PATHS), ("Dudko-Hummer-Szabo", DUDKO)]),
-    stiffness=st.floats(0.0, 5e-3),
-    gap=st.floats(-5e-9, 1.4e-8),  # up to where every exponent is below the cap of exp
-    T=st.floats(250.0, 400.0),
-    share=st.floats(1e-6, 1 - 1e-6),
-)
-@settings(max_examples=60, deadline=None)
-def test_bond_energy_is_an_enthalpy_and_load_a_factor(tmp_path_factory, equation, kind, stiffness, gap, T, share):
-    """Cantera's rates and chemical potentials of a bond whose enthalpy contains the spring, times the load's factor."""
-    folder = tmp_path_factory.mktemp("elastic")
-    bond = {"stiffness": f"{stiffness!r} N/m", "rest-length": "1 nm"}
-    read = mechanism(folder, [reaction(equation, *kind)], bond)
-    energy = stiffness * (gap - 1e-9) ** 2 / 2
-    plain = json.loads(read.text)
-    plain["reactions"][0] = {"equation": equation, "rate-constant": RATE}
-    plain["species"][1] = species("bond", -20.0 + energy * AVOGADRO / 1e3, -30.0)
-    surface = ct.Interface(yaml=json.dumps(plain))
-    surface.TP = T, ct.one_atm
-    surface.coverages = [1 - share, share]
-    force = stiffness * (gap - 1e-9)
-    point = values(read, T, surface.coverages) | {"g_n": gap, "f_theta_bond": force}
-    (law,) = read.reactions
-    factor = math.exp(law.log_factor(f=force, T_c=T))
-    exponent = law.log_factor(f=force, T_c=T) + max(law.standard_affinity(T, gap), 0.0)
-    assert exponent < EXPONENT_CAP
-    forward, reverse = call(law.forward, point), call(law.reverse, point)
-    assert forward == pytest.approx(surface.forward_rates_of_progress[0] * KMOL * factor, rel=1e-12)
-    digits = 1e-12 * (1 + energy / (BOLTZMANN * T))
-    assert reverse == pytest.approx(surface.reverse_rates_of_progress[0] * KMOL * factor, rel=digits)
-    mu = [row[0] for row in partial_molar(read, point)]
-    assert mu == pytest.approx(surface.chemical_potentials / 1e3, rel=digits, abs=1e-12 * 8.3 * T)
-
-
 LOADS = [("Bell", BELL), ("Dembo", DEMBO), ("Dembo-formation", DEMBO), ("two-pathway", PATHS)]
 LOADS += [("Dudko-Hummer-Szabo", DUDKO), ("gap-attachment", TETHER)]
 
@@ -193,17 +157,6 @@ def test_loads_multiply_the_rates_of_random_mechanisms(tmp_path_factory, data, f
         theirs = surface.forward_rates_of_progress[i], surface.reverse_rates_of_progress[i]
         for ours, rate in zip((law.forward, law.reverse), theirs, strict=True):
             assert call(ours, point) == pytest.approx(rate * KMOL * factor, rel=2e-12, abs=1e-290)
-
-
-def test_bonds_under_load_end_in_the_equilibrium_of_their_springs(tmp_path):
-    """A reversible Bell reaction leads where the stretched bonds balance, whatever the force does to its speed."""
-    read = mechanism(tmp_path, [reaction("bond <=> free", "Bell", BELL)], {"stiffness": "1 pN/nm"})
-    for gap in (0.0, 3e-9, 6e-9, 9e-9):
-        trajectory = solved(scene(read, {"g_n": Hold(level=gap)}), [0.0, 1e4])
-        energy = -20e3 / AVOGADRO + 300.0 * 30.0 / AVOGADRO + 1e-3 * gap**2 / 2
-        phi = 1 / (1 + math.exp(energy / (BOLTZMANN * 300.0)))
-        assert trajectory.result.outputs[-1, 1] == pytest.approx(phi, rel=1e-9)
-        assert audit(trajectory).violations == ()
 
 
 def test_two_bond_species_share_the_load_by_their_stiffness(tmp_path):
@@ -268,13 +221,8 @@ def test_a_load_that_all_bonds_share_breaks_them(tmp_path):
 
 
 WRONG = [
-    ({"type": "Bell"}, "reaction bond <=> free: a rate of type Bell needs `x-beta`: distance to the transition"),
-    ({"x-beta": "0.4 nm"}, "reaction bond <=> free: 'x-beta' is no key of interface-Arrhenius; it belongs to"),
-    ({"type": "Bell", "x-bta": "0.4 nm"}, "unknown key 'x-bta'. Did you mean 'x-beta'?"),
-    ({"type": "Bell", "x-beta": "0.4 pN"}, "reaction bond <=> free: x-beta = 0.4 pN is not a quantity in m."),
     ({"type": "Bell", "x-beta": 0.4}, "x-beta: 0.4 is a length of 0.4 m, which no bond has; write it as `0.4 nm`."),
     ({"type": "Bell", "x-beta": [1, 2]}, "reaction bond <=> free: x-beta must be a number, not [1, 2]."),
-    ({"type": "Bel", "x-beta": "0.4 nm"}, "rate type 'Bel' is not lowered. Did you mean"),
     ({"type": "Dudko-Hummer-Szabo", **DUDKO, "nu": 2}, "nu = 2 is outside its range: > 0 and <= 1."),
     ({"equation": "bond => free", "type": "linear-affinity"}, "a rate by affinity runs both ways; write `<=>`."),
     ({"equation": "2 free => 2 bond", "type": "Kamal-Sourour", **CURE}, "one species that turns into another"),
@@ -287,18 +235,3 @@ def test_mistakes_are_named_with_their_line(tmp_path, change, message):
         mechanism(tmp_path, [{"equation": "bond <=> free", "rate-constant": RATE, **change}])
     assert message in str(error.value)
     assert "mechanism.yaml:1" in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("bond", "message"),
-    [
-        ({"stifness": "1 pN/nm"}, "species bond: bond: unknown key 'stifness'. Did you mean 'stiffness'?"),
-        ({"rest-length": "1 nm"}, "species bond: bond needs `stiffness`: stiffness of the bond [N/m]."),
-        ({"stiffness": "1 pN"}, "species bond: bond: stiffness = 1 pN is not a quantity in N/m."),
-        ({"stiffness": -1}, "species bond: bond: stiffness = -1 is outside its range: >= 0."),
-    ],
-)
-def test_mistakes_in_a_bond_are_named(tmp_path, bond, message):
-    with pytest.raises(InputError) as error:
-        mechanism(tmp_path, [], bond)
-    assert message in str(error.value)

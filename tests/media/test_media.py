@@ -359,13 +359,6 @@ def test_a_gas_film_in_contact_keeps_the_thickness_of_the_voids():
     np.testing.assert_allclose(pressed.dataset["T_1"], apart.dataset["T_1"], rtol=1e-9)
 
 
-def test_viscosity_laws_fall_with_temperature_and_rise_with_pressure():
-    roelands = Roelands(eta_0=0.04, Z=0.6, S_0=1.1)
-    assert roelands.value(T_c=350.0, p=0.0, T_0=313.0) < 0.04 < roelands.value(T_c=313.0, p=1e8, T_0=313.0)
-    slope = np.log(roelands.value(T_c=313.0, p=1e3, T_0=313.0) / 0.04) / 1e3
-    assert slope == pytest.approx(0.6 * (np.log(0.04) + 9.67) / 0.196e9, rel=1e-4)
-
-
 def test_a_run_that_reaches_the_pole_of_a_viscosity_stops():
     found = Medium(None, {"eta_m": Vogel(a=6e-5, b=90.0, c=165.0), "k_m": 0.1}, 2e-6)
     scene = lubricated(found, T=170.0, capacity=False)
