@@ -21,8 +21,8 @@ KMOL = 1000 * AVOGADRO
 SHIPPED = sorted(path.name for path in mechanisms().glob("*.yaml"))
 
 
-def load(name, bonds=None):
-    return _loaded(name, None if bonds is None else tuple(bonds))
+def load(name, bonds=()):
+    return _loaded(name, tuple(bonds))
 
 
 @cache

@@ -325,7 +325,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     }
 
     def load(path: Path, shown: str) -> Mechanism:
-        loaded = load_mechanism(path, section.phase, section.bonds, tree.place, evaluate, neighbours, shown)
+        loaded = load_mechanism(path, section.phase, section.bonds or (), tree.place, evaluate, neighbours, shown)
         return with_numbers(loaded, section.species, section.reactions)
 
     if content is None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from surfacechem.contracts.terms import option, parameter
+from surfacechem.contracts.terms import RateLaw, option, parameter
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.mixture import Formula, Species
 from surfacechem.mechanism.rates import MechanismReaction
@@ -51,24 +51,30 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> N
             raise InputError(message, state.place)
     for name, phase in surface.adjacent.items():
         state = given.get(name, Neighbour(place=place))
-        gas, known = phase.thermo_model in GASES, phase.species_names
-        unknown = [species for species in state.composition if species not in known]
-        total, problem = sum(state.composition.values()), ""
-        if (gas and state.pressure is None) or (len(known) > 1 and not state.composition):
-            missing = "pressure" if gas and state.pressure is None else "composition"
-            example = f"{{{'pressure: 1 atm, ' if gas else ''}composition: {{{known[0]}: 1}}}}"
-            problem = f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
-        elif unknown:
-            problem = f"the neighbour {name} has no species '{unknown[0]}'.{suggestion(unknown[0], known)}"
-        elif state.composition and abs(total - 1) > SUM_TOLERANCE:
-            problem = f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1."
-        if problem:
+        if problem := _problem(phase, state):
             raise InputError(problem, state.place)
         if state.composition:
             phase.X = dict(state.composition)
         if state.pressure is not None:
             phase.TP = phase.T, state.pressure
         phase.electric_potential = state.electric_potential
+
+
+def _problem(phase: Any, state: Neighbour) -> str:
+    """What is wrong with the state of a phase; nothing where it can be held so."""
+    name, known, given = phase.name, phase.species_names, state.composition
+    pressureless = phase.thermo_model in GASES and state.pressure is None
+    if pressureless or (len(known) > 1 and not given):
+        pressure = "pressure: 1 atm, " if phase.thermo_model in GASES else ""
+        example = f"{{{pressure}composition: {{{known[0]}: 1}}}}"
+        missing = "pressure" if pressureless else "composition"
+        return f"the neighbour {name} has no `{missing}`: give `neighbours: {{{name}: {example}}}`."
+    for species in given:
+        if species not in known:
+            return f"the neighbour {name} has no species '{species}'.{suggestion(species, known)}"
+    total = sum(given.values())
+    wrong = given and abs(total - 1) > SUM_TOLERANCE
+    return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
 def remarks(surface: Any) -> tuple[str, ...]:
@@ -126,15 +132,15 @@ class NeighbourReaction(EvaluatedReaction):
 class SurfaceEngine:
     """A Cantera surface as the source of the net rates of some of its reactions, and of what they take from neighbours.
 
-    ``reactions`` maps the position of each reaction in the surface to its law.
+    ``reactions`` are the laws of all its reactions, in its order.
     """
 
-    def __init__(self, surface: Any, species: Sequence[Species], reactions: Mapping[int, EvaluatedReaction]) -> None:
+    def __init__(self, surface: Any, species: Sequence[Species], reactions: Sequence[RateLaw]) -> None:
         self.surface = surface
-        self.positions = list(reactions)
-        open_ones = [i for i, law in reactions.items() if isinstance(law, NeighbourReaction)]
+        self.positions = [i for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)]
+        open_ones = [i for i, law in enumerate(reactions) if isinstance(law, NeighbourReaction)]
         energies = [f"{reactions[i].path}.{name}" for name in ("enthalpy", "gibbs") for i in open_ones]
-        self.gives = (*(f"{law.path}.value" for law in reactions.values()), *energies)
+        self.gives = (*(f"{reactions[i].path}.value" for i in self.positions), *energies)
         first = species[0]
         self.reads = ("T_c", first.concentration, *(item.variable for item in species))
         self._sites = first.sites

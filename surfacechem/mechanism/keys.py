@@ -6,7 +6,7 @@ whose bare number Cantera would misread. :class:`Check` holds a file against the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
@@ -153,7 +153,7 @@ class Check:
         if isinstance(state, Mapping):
             self._keys(state, (*STATE, *(WRITTEN_STATE if source.written else ())), "state")
             self._numbers(state, ("T",), "state")
-            self._known(state.get("coverages"), self.names, "state: coverages")
+            self._among(state.get("coverages"), self.names, "state: coverages: no species")
         for entry in source.reactions(phase):
             if self.evaluate and is_evaluated(entry, self.names, self.beside):
                 self._evaluated(entry)
@@ -179,28 +179,31 @@ class Check:
 
     def _all_species(self, entries: list[Any]) -> None:
         """Every species; those of neighbours are Cantera's affair, but one without a name may be a misspelt one."""
-        import cantera
-
-        error = self.source.error
-        known = [str(entry.get("name")) for entry in entries]
-        self.names = chosen(self.phase.get("species", "all"), known)
+        there = [str(entry.get("name")) for entry in entries]
+        self.names = chosen(self.phase.get("species", "all"), there)
         own = [entry for entry in entries if entry.get("name") in self.names]
         for entry in entries:
-            if not self.beside or "name" not in entry or entry["name"] in self.names:
+            if not self.beside or "name" not in entry or entry in own:
                 self._species(entry)
         for name in self.names:
-            if name not in known:
-                raise error(f"species: no species '{name}'.{suggestion(name, known)}", self.phase, "species")
-        declared = [str(element.get("symbol")) for element in self.source.data.get("elements") or []]
-        elements = self.phase.get("elements", [*cantera.Element.element_symbols, "E", *declared])
-        for entry in own if self.beside else entries:
-            for element in entry.get("composition") or {}:
-                if element not in elements:
-                    guess = suggestion(str(element), elements) if "elements" in self.phase else ""
-                    message = f"species {entry.get('name')}: composition: no element '{element}'.{guess}"
-                    raise error(message, entry["composition"], element)
+            if name not in there:
+                message = f"species: no species '{name}'.{suggestion(name, there)}"
+                raise self.source.error(message, self.phase, "species")
+        self._composition(own if self.beside else entries)
         for entry in own:
             self._dependence(entry)
+
+    def _composition(self, entries: list[Any]) -> None:
+        """Elements are those that the phase declares, else those that there are."""
+        import cantera
+
+        declared = [str(element.get("symbol")) for element in self.source.data.get("elements") or []]
+        elements = self.phase.get("elements", [*cantera.Element.element_symbols, "E", *declared])
+        for entry in entries:
+            composition = entry.get("composition") or {}
+            title = f"species {entry.get('name')}: composition: no element"
+            # The nearest of all elements that there are is no hint.
+            self._among(composition, elements, title, hint="elements" in self.phase)
 
     def _species(self, entry: Any) -> None:
         source, title = self.source, f"species {entry.get('name')}"
@@ -234,7 +237,7 @@ class Check:
             raise error(message, entry, KEY)
         if not isinstance(dependences, Mapping) or not all(isinstance(x, Mapping) for x in dependences.values()):
             raise error(f"{title}: write `{{species: {{model: linear, enthalpy: ...}}}}`.", entry, KEY)
-        self._known(dependences, self.names, title)
+        self._among(dependences, self.names, f"{title}: no species")
         for name, node in dependences.items():
             self._curve(entry, node, f"{title}: {name}")
 
@@ -249,7 +252,7 @@ class Check:
             if key.endswith("-coefficients") and (not isinstance(value, list) or len(value) != COEFFICIENTS):
                 message = f"{title}: {key} are {COEFFICIENTS} numbers; those that are not there are 0."
                 raise error(message, node, key)
-            pure = key in ("model", "units") or key.endswith(("-change", "-coverages"))
+            pure = key.endswith(("model", "units", "-change", "-coverages"))
             if not pure and unitless(value, given, AMOUNT):
                 message = (
                     f"{title}: {key} without a unit counts in kmol. Say what it counts in, such as "
@@ -257,9 +260,10 @@ class Check:
                 )
                 raise error(message, node, key)
         for group in TOGETHER:
-            missing, there = [key for key in group if key not in node], [key for key in group if key in node]
-            if missing and there:
-                raise error(f"{title}: {there[0]} needs `{missing[0]}` too.", node, there[0])
+            there, missing = set(group) & set(node), set(group) - set(node)
+            if there and missing:
+                first, needed = min(there, key=group.index), min(missing, key=group.index)
+                raise error(f"{title}: {first} needs `{needed}` too.", node, first)
 
     def _reaction(self, entry: Any) -> None:
         """A reaction that is lowered."""
@@ -279,7 +283,11 @@ class Check:
                 raise error(f"{title}: write `{key}: {{{', '.join(inner)}}}`, not {entry[key]!r}.", entry, key)
         self._inside(entry, law.keys, known, title)
         if known:
-            self._known(entry.get("orders"), known, f"{title}: orders")
+            self._among(entry.get("orders"), known, f"{title}: orders: no species")
+        self._arrhenius(entry, title)
+
+    def _arrhenius(self, entry: Any, title: str) -> None:
+        error = self.source.error
         rate = entry.get("rate-constant")
         if not isinstance(rate, Mapping):
             raise error(f"{title} has no `rate-constant: {{A, b, Ea}}`.", entry)
@@ -287,7 +295,8 @@ class Check:
             raise error(f"{title}: 'A' is negative: {REMEDIES['negative-A']}", rate, "A")
         orders = {**sides(str(entry["equation"]))[0], **(entry.get("orders") or {})}
         # Of first order A is a frequency, in 1/s whatever the units.
-        self._numbers(rate, ("Ea",) if sum(map(leading, orders.values())) == 1 else ("A", "Ea"), title, entry)
+        first = sum(map(leading, orders.values())) == 1
+        self._numbers(rate, ("Ea",) if first else ("A", "Ea"), title, entry)
 
     def _rate_type(self, entry: Any, title: str) -> type[InterfaceArrhenius]:
         """The rate type, which Cantera writes with or without its prefix; a plain rate needs none."""
@@ -348,7 +357,7 @@ class Check:
             if key != KEY and allowed:
                 self._keys(node, allowed, f"{title}: {key}")
             elif key == KEY:
-                self._known(node, known or node, f"{title}: {KEY}")
+                self._among(node, known or node, f"{title}: {KEY}: no species")
                 for name, terms in node.items():
                     if isinstance(terms, Mapping):
                         self._keys(terms, allowed, f"{title}: {KEY}: {name}")
@@ -365,12 +374,12 @@ class Check:
             if key not in allowed:
                 raise self.source.error(f"{title}: unknown key '{key}'.{suggestion(str(key), allowed)}", node, key)
 
-    def _known(self, node: Any, known: Iterable[str], title: str) -> None:
-        """Every key of what may be a mapping is a species."""
+    def _among(self, node: Any, known: Collection[str], problem: str, hint: bool = True) -> None:
+        """Every key of what may be a mapping is known; a ``hint`` is the nearest of those that are."""
         for name in node if isinstance(node, Mapping) else ():
             if name not in known:
-                message = f"{title}: no species '{name}'.{suggestion(str(name), known)}"
-                raise self.source.error(message, node, name)
+                guess = suggestion(str(name), known) if hint else ""
+                raise self.source.error(f"{problem} '{name}'.{guess}", node, name)
 
     def _units(self, node: Any) -> None:
         """The `units` of an entry are dimensions and units that exist."""

@@ -80,7 +80,7 @@ class Mechanism:
 def load_mechanism(
     path: Path,
     phase: str | None = None,
-    bonds: Sequence[str] | None = None,
+    bonds: Sequence[str] = (),
     place: Place | None = None,
     evaluate: bool = False,
     neighbours: Mapping[str, Neighbour] = NONE,
@@ -102,28 +102,21 @@ def load_mechanism(
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
     by_name = {item.name: item for item in species}
-    for bond in bonds or ():
+    for bond in bonds:
         if bond not in by_name:
             raise InputError(f"bonds: no species '{bond}' in the mechanism.{suggestion(bond, by_name)}", place)
-    chosen = [by_name[bond] for bond in dict.fromkeys(bonds or ())]
+    chosen = [by_name[bond] for bond in dict.fromkeys(bonds)]
     density = surface.site_density * MOLECULAR
     # A bond that takes two sites can form half as often, so that phi is the coverage of bonds in either case.
     possible = density / min((item.sites for item in chosen), default=1.0)
     temperatures = (float(surface.min_temp), float(surface.max_temp))
     mixture_place = source.place(entry, path="interface.mechanism")
     mixture = IdealMixture(species=species, temperatures=temperatures, place=mixture_place)
-    reactions: list[RateLaw] = []
-    for i, (reaction, item, outside) in enumerate(kept, start=1):
-        label = f"R{i}"
-        at = source.place(item, path=f"{REACTIONS}.{label}")
-        if outside:
-            reactions.append(_evaluated(reaction, label, species, at))
-        else:
-            reactions.append(_lowered(reaction, source, item, label, species, at))
-    evaluated = {i: law for i, law in enumerate(reactions) if isinstance(law, EvaluatedReaction)}
+    reactions = tuple(_reaction(source, f"R{i}", *one, species) for i, one in enumerate(kept, start=1))
+    engine = SurfaceEngine(surface, species, reactions)
     return Mechanism(
         potentials=(mixture,),
-        reactions=tuple(reactions),
+        reactions=reactions,
         variables=tuple(BondingVariable(s.variable, density / s.sites, f"coverage of {s.name}") for s in species),
         bonds=tuple(item.variable for item in chosen),
         sites=Sites(possible, possible),
@@ -131,7 +124,7 @@ def load_mechanism(
         species={item.name: item.variable for item in species},
         phase=str(entry["name"]),
         temperatures=temperatures,
-        engine=SurfaceEngine(surface, species, evaluated) if evaluated else None,
+        engine=engine if engine.gives else None,
         remarks=(*said, *remarks(surface)),
     )
 
@@ -253,57 +246,58 @@ def _kept(source: Source, phase: Any, surface: Any) -> list[tuple[Any, Any, bool
     return [(x, entry, is_evaluated(entry, names, beside) or x.rate.uses_electrochemistry) for x, entry in pairs]
 
 
-def _evaluated(reaction: Any, label: str, species: tuple[Species, ...], place: Place) -> RateLaw:
-    """The law of a reaction whose rate only Cantera can say."""
+def _reaction(
+    source: Source, label: str, reaction: Any, entry: Any, outside: bool, species: tuple[Species, ...]
+) -> RateLaw:
+    """The law of a reaction: a formula, or a number that comes from Cantera."""
+    title, place = f"reaction {reaction.equation}", source.place(entry, path=f"{REACTIONS}.{label}")
     names = dict.fromkeys((*reaction.reactants, *reaction.products))
-    whole = _change(reaction, {name: name for name in names})
-    change = {s.variable: whole[s.name] for s in species if s.name in whole}
-    elastic = [s.name for s in species if s.name in whole and s.spring is not None]
+    change = {name: reaction.products.get(name, 0.0) - reaction.reactants.get(name, 0.0) for name in names}
+    whole = {name: plain(nu) for name, nu in change.items() if nu}
+    variables = {item.name: item.variable for item in species}
+    given: dict[str, Any] = {
+        "number": label,
+        "equation": reaction.equation,
+        "change": {variables[name]: nu for name, nu in whole.items() if name in variables},
+        "reversible": bool(reaction.reversible),
+        "place": place,
+    }
+    if not outside:
+        return _lowered(reaction, source, entry, species, given)
+    elastic = [item.name for item in species if item.name in whole and item.spring is not None]
     # Cantera's thermo has no place for a gap.
     if reaction.reversible and elastic:
-        message = f"reaction {reaction.equation}: {elastic[0]} is elastic, which Cantera's equilibrium constant "
-        raise InputError(f"{message}does not know. Write two one-way reactions.", place)
-    given: dict[str, Any] = {"number": label, "equation": reaction.equation, "change": change, "whole": whole}
-    given |= {"reversible": bool(reaction.reversible), "value": 0.0, "place": place}
-    if len(change) == len(whole):
-        return EvaluatedReaction(**given)
-    return NeighbourReaction(enthalpy=0.0, gibbs=0.0, **given)
+        message = f"{title}: {elastic[0]} is elastic, which Cantera's equilibrium constant does not know. "
+        raise InputError(f"{message}Write two one-way reactions.", place)
+    given |= {"whole": whole, "value": 0.0}
+    closed = len(given["change"]) == len(whole)
+    return EvaluatedReaction(**given) if closed else NeighbourReaction(enthalpy=0.0, gibbs=0.0, **given)
 
 
 def _lowered(
-    reaction: Any, source: Source, entry: Any, label: str, species: tuple[Species, ...], place: Place
+    reaction: Any, source: Source, entry: Any, species: tuple[Species, ...], given: Mapping[str, Any]
 ) -> RateLaw:
-    """The law of a reaction as a formula."""
-    title, variables = f"reaction {reaction.equation}", {item.name: item.variable for item in species}
+    """The law of a reaction as a formula; ``given`` is what it has in common with those that are none."""
+    title, place = f"reaction {reaction.equation}", given["place"]
+    variables = {item.name: item.variable for item in species}
     law = kind_of(str(entry.get("type", "Arrhenius")))
     assert law is not None, "what is not lowered is evaluated, or was refused"
     forward = {variables[name]: order for name, order in {**reaction.reactants, **reaction.orders}.items()}
     if any(order < 0 for order in forward.values()):
         raise InputError(f"{title}: a negative order is infinite where the coverage vanishes; remove it.", place)
     who = f"a rate of type {law.kind.removeprefix('interface-')}"
-    read = partial(source.number, entry, entry)
     taking_part = {*reaction.reactants, *reaction.products, *reaction.orders}
     try:
         own: dict[str, Any] = {
             **law.parameters_of(reaction, variables, sum(forward.values())),
-            **own_parameters(law, law.own_keys(), entry, who, read),
+            **own_parameters(law, law.own_keys(), entry, who, partial(source.number, entry, entry)),
         }
         return law(
-            number=label,
-            equation=reaction.equation,
             orders=forward,
             products={variables[name]: nu for name, nu in reaction.products.items()},
-            change=_change(reaction, variables),
             species=tuple(item for item in species if item.name in taking_part),
-            reversible=bool(reaction.reversible),
-            place=place,
+            **given,
             **own,
         )
     except InputError as error:  # a number of Cantera's that is out of range
         raise InputError(f"{title}: {error.message}", error.place or place) from None
-
-
-def _change(reaction: Any, variables: Mapping[str, str]) -> dict[str, float]:
-    names = dict.fromkeys((*reaction.reactants, *reaction.products))
-    change = {name: reaction.products.get(name, 0.0) - reaction.reactants.get(name, 0.0) for name in names}
-    return {variables[name]: plain(nu) for name, nu in change.items() if nu}
