@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies, path, perfect_contact, varying
-from scenes_mechanics import TOGETHER
+from scenes import SITES, bodies, path, perfect_contact, together, varying
 from solved import solve
 
 from surfacechem.errors import InputError
@@ -89,7 +88,7 @@ def test_an_overdamped_slider_starts_from_rest():
     mount = Mounting(k=1.4e12, c_g=1.8e12)
     loading = {"F_t": Ramp(start=7e4, rate=1e5), "w_t": Hold(level=0.0), "p": Hold(level=4e5)}
     interface = Interface("T", frictions=[Coulomb(mu=0.9, mu_s=0.04)])
-    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER, tangential=mount)
+    scene = together(interface=interface, loading=loading, tangential=mount)
     trajectory = run(scene, 10.0)
     assert trajectory.status == "finished"
     # The limit of sticking is at least what sliding resists with: 3.6e5 Pa at t = 2.9 s; then c v + k u = F - 3.6e5 Pa.
@@ -100,7 +99,7 @@ def test_an_overdamped_slider_starts_from_rest():
 def test_an_impossible_jump_says_what_is_in_the_way():
     interface = Interface("T", [ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=1e14)])
     loading = {"F_n": Ramp(start=0.0, rate=1e5)}
-    trajectory = run(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, TOGETHER), 20.0)
+    trajectory = run(together(interface=interface, loading=loading), 20.0)
     assert trajectory.status == "stopped"
     assert "is impossible: no gap follows at which the tractions are in equilibrium" in trajectory.reason
     assert trajectory.result.t == pytest.approx(10.0, rel=1e-6)
@@ -109,8 +108,8 @@ def test_an_impossible_jump_says_what_is_in_the_way():
 def test_the_search_for_equilibrium_does_not_pass_through_the_pole_of_the_open_side():
     interface = Interface("T", [VanDerWaalsFlatFlat(A_H=1e-19), Penalty(E_n=1e13)])
     loading = {"w_n": Ramp(start=5e-9, rate=-1e-9)}
-    initial = TOGETHER | {"g_n": 5e-9}
-    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    initial = {"g_n": 5e-9}
+    scene = together(interface=interface, loading=loading, initial=initial, normal=Mounting(k=1e13))
     trajectory = run(scene, 10.0)
     # In contact the attraction is what it is at touch: A_H / (6 pi D_0^3).
     pull = 1e-19 / (6 * np.pi * 1.65e-10**3)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import SITES, bodies, perfect_contact, varying
+from scenes import SITES, bodies, perfect_contact, together, varying
 from solved import Solved, solve
 
 import surfacechem
@@ -64,14 +64,14 @@ def test_a_start_is_judged_in_the_modes_that_hold_there():
     initial = {"T": 300.0, "phi": 0.5, "g_n": -5e-10}
     mount, loading = Mounting(k=1e12, c_b=1e10), {"w_n": Hold(level=0.0)}
     with pytest.raises(InputError, match="relaxation"):
-        solve(Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=mount), 1.0)
+        solve(together(interface=interface, loading=loading, initial=initial, normal=mount), 1.0)
 
 
 def test_a_jump_to_where_a_law_has_no_energy_is_impossible():
     zone = ExponentialCohesiveZone(t_max=1e6, g_0=varying(1e-7, Proportional(of="phi", about=1.0)), E_n=1e14)
     interface = Interface("T", [zone], sites=SITES, limits=[TensileStrength(t_max=1e5)])
     loading, initial = {"w_n": Ramp(rate=1e-8)}, {"T": 300.0, "phi": 1.0}
-    scene = Scene(bodies("T", "T"), interface, (), loading, None, 300.0, initial, normal=Mounting(k=1e13))
+    scene = together(interface=interface, loading=loading, initial=initial, normal=Mounting(k=1e13))
     trajectory = solve(scene, 10.0)
     assert trajectory.jumps[-1].verdict == IMPOSSIBLE
     assert "which is impossible: the energy of the interface is not finite after it" in trajectory.reason
@@ -129,7 +129,7 @@ def test_a_gap_on_an_unstable_equilibrium_that_nothing_pushes_from_says_so():
     """Pressed together, opposite surfaces are held where they are least at rest: on top of the shear potential."""
     zone = XuNeedleman(Phi_n=1.0, g_0=1e-7, g_t0=1e-7, q=1.0, r=0.0)
     loading, mount = {"w_t": Hold(level=0.0), "g_n": Hold(level=-3e-7)}, Mounting(k=1e10)
-    scene = Scene(bodies("T", "T"), Interface("T", [zone]), (), loading, None, 300.0, {"T": 300.0}, tangential=mount)
+    scene = together([zone], (), loading, tangential=mount)
     trajectory = solve(scene, 1.0)
     assert trajectory.status == "stopped"
     assert trajectory.reason.startswith(
