@@ -123,23 +123,11 @@ def test_a_load_that_jumps_lets_go_at_once():
     assert trajectory.of("impact")[1].released == pytest.approx(M * speed**2 / 2)
 
 
-@pytest.mark.parametrize(
-    ("start", "pull", "expected"),
-    [
-        ({"v_n": 0.0}, -1.0, []),
-        ({"v_n": 0.0}, 0.0, []),
-        ({"v_n": 0.0}, 1.0, []),
-        ({"v_n": 1.0}, 0.0, []),
-        ({"v_n": -1.0}, 0.0, ["impact"]),
-        ({"v_n": -1.0}, 1.0, ["impact"]),
-    ],
-)
-def test_starts_at_touch(start, pull, expected):
-    trajectory = closed(scene(Mounting(m=1.0, e=0.5), {"F_n": Hold(level=pull)}, start | {"g_n": 0.0}), 1.0)
-    assert trajectory.events == expected
-    speed = start["v_n"] if start["v_n"] >= 0 else 0.5
-    pulled = max(pull, 0.0)
-    assert trajectory.end("g_n") == pytest.approx(speed + pulled / 2, rel=1e-12)
+@pytest.mark.parametrize(("v", "pull"), [(0.0, -1.0), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (-1.0, 1.0)])
+def test_starts_at_touch(v, pull):
+    trajectory = closed(scene(Mounting(m=1.0, e=0.5), {"F_n": Hold(level=pull)}, {"v_n": v, "g_n": 0.0}), 1.0)
+    assert trajectory.events == ["impact"] * (v < 0)
+    assert trajectory.end("g_n") == pytest.approx((v if v >= 0 else 0.5) + max(pull, 0.0) / 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("until", [1e-6, 1.0, 1e6])
@@ -332,7 +320,7 @@ def test_a_conductance_that_keeps_up_with_the_pressure_misses_the_instant(q):
 # -- the case, other methods, other codes ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("solver", ["lsoda", "scipy-radau", "cvode", "ida"])
+@pytest.mark.parametrize("solver", ["lsoda", "cvode"])
 def test_other_methods_see_the_impacts(solver):
     case = surfacechem.load("bouncing-plate")
     run = replace(case.case.run, solver=solver, rtol=1e-8)
@@ -354,11 +342,11 @@ def test_pressure_begins_at_once_under_a_damper_that_stands_still():
     trajectory = closed(given, 2.0)
     touch = trajectory.of("touch")[0]
     assert touch.t == pytest.approx(0.2 * math.log(3.0), rel=1e-9)
-    g_t = [s.name for s in trajectory.model.system.states].index("g_t")
-    assert 1e3 * touch.before.y[g_t] == pytest.approx(5.0, rel=1e-3)
-    assert touch.after.y[g_t] == touch.before.y[g_t]
+    before, after = (trajectory.state(touch, "g_t", side) for side in ("before", "after"))
+    assert 1e3 * before == pytest.approx(5.0, rel=1e-3)
+    assert after == before
     assert trajectory.events == ["slip forward", "touch", "slip forward"]
-    assert 1e3 * trajectory.jumps[-1].after.y[g_t] == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
+    assert 1e3 * trajectory.state(trajectory.jumps[-1], "g_t") == pytest.approx(0.5 * (100.0 * 0.1 + 10.0), rel=1e-3)
     assert trajectory.energy_error < 1e-10
 
 
