@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import bodies
+from scenes import SITES, bodies, together
+from solved import solve
 
 from surfacechem.contracts.terms import Varying
 from surfacechem.laws.bonding import BondEnergy
@@ -20,22 +21,13 @@ from surfacechem.laws.longrange import ElectrostaticFlatFlat, LennardJonesFlatFl
 from surfacechem.model.assemble import assemble
 from surfacechem.results.solution import Solution
 from surfacechem.runs.check import start_warnings
-from surfacechem.scene import Interface, Mounting, Scene, Sites
+from surfacechem.scene import Interface, Mounting, Scene
 from surfacechem.solve.run import Model, Run
 
 A_H, D_0, E_N = 6.5e-20, 1e-9, 1e18
 ATTRACTION = VanDerWaalsFlatFlat(A_H=A_H, D_0=D_0)
 PULL = A_H / (6 * math.pi * D_0**3)
-SITES = Sites(1e18, 1e18)
 PRESSURES = ("net", "contact")
-
-
-def solve(made, until=1.0):
-    return Model(assemble(made)).solve(Run(np.linspace(0.0, until, 11), 1e-10))
-
-
-def last(trajectory, name):
-    return trajectory.outputs[-1, [item.name for item in trajectory.model.system.outputs].index(name)]
 
 
 def in_contact(potentials, pressure="contact", g_n=0.0, w_n=0.0, k=1e14):
@@ -50,31 +42,31 @@ def in_contact(potentials, pressure="contact", g_n=0.0, w_n=0.0, k=1e14):
 
 def test_attraction_presses_the_surfaces_together():
     """Contact bears the pull of van der Waals; friction and conduction are of that pressure."""
-    found = solve(in_contact([Penalty(E_n=E_N), ATTRACTION]))
+    found = solve(in_contact([Penalty(E_n=E_N), ATTRACTION]), 1.0)
     g = -PULL / (E_N + 1e14)  # the far field stretches a little
-    assert last(found, "p_contact") == pytest.approx(-E_N * g, rel=1e-10)
-    assert last(found, "t_coulomb") == pytest.approx(-0.3 * E_N * g, rel=1e-10)
-    T_1, T_2 = (found.result.outputs[-1, [s.name for s in found.model.system.states].index(x)] for x in ("T_1", "T_2"))
+    assert found["p_contact"][-1] == pytest.approx(-E_N * g, rel=1e-10)
+    assert found["t_coulomb"][-1] == pytest.approx(-0.3 * E_N * g, rel=1e-10)
+    T_1, T_2 = (found.end(x) for x in ("T_1", "T_2"))
     h = 1e5 * -E_N * g / 1e9
-    assert last(found, "q_12") == pytest.approx(h * (T_1 - T_2), rel=1e-10)
-    net = solve(in_contact([Penalty(E_n=E_N), ATTRACTION], "net"))
-    assert last(net, "t_coulomb") == 0.0
+    assert found["q_12"][-1] == pytest.approx(h * (T_1 - T_2), rel=1e-10)
+    net = solve(in_contact([Penalty(E_n=E_N), ATTRACTION], "net"), 1.0)
+    assert net["t_coulomb"][-1] == 0.0
 
 
 def test_repulsion_of_a_lennard_jones_contact():
     """At the gap without traction repulsion and attraction are equal, A g_0 x^3 / 3 with x^6 = 15."""
     flats = LennardJonesFlatFlat(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
     rest = 3e-10 * 15 ** (-1 / 6)
-    found = solve(in_contact([flats], g_n=rest, w_n=rest))
+    found = solve(in_contact([flats], g_n=rest, w_n=rest), 1.0)
     A = 2 * math.pi * 2e19 * 3e19 * 4e-21
-    assert last(found, "p_contact") == pytest.approx(A * 3e-10 * math.sqrt(15) / 3, rel=1e-8)
-    assert abs(last(found, "t_n")) < 1e-6 * last(found, "p_contact")
+    assert found["p_contact"][-1] == pytest.approx(A * 3e-10 * math.sqrt(15) / 3, rel=1e-8)
+    assert abs(found["t_n"][-1]) < 1e-6 * found["p_contact"][-1]
 
 
 def test_without_attraction_both_pressures_are_one():
     zone = ExponentialCohesiveZone(t_max=1e6, g_0=1e-8, E_n=E_N)
     for potential in (Penalty(E_n=E_N), NormalStiffness(E_n=E_N), zone):
-        forces = [last(solve(in_contact([potential], pressure, w_n=-1e-9)), "t_coulomb") for pressure in PRESSURES]
+        forces = [solve(in_contact([potential], pressure, w_n=-1e-9), 1.0)["t_coulomb"][-1] for pressure in PRESSURES]
         assert forces[0] == forces[1] > 1e4
 
 
@@ -82,7 +74,7 @@ def test_a_given_pressure_is_that_of_the_contact():
     loading = {"p": Hold(level=1e5), "v": Hold(level=1e-3)}
     friction = Coulomb(mu=Varying(0.3, (Linear(of="p_contact", about=0.0, slope=1e-5),)), pressure="contact")
     made = Scene(bodies("T", "T"), Interface("T", (), [friction]), loading=loading, T_0=300.0, initial={"T": 300.0})
-    assert last(solve(made), "t_coulomb") == pytest.approx(0.3 * 2 * 1e5, rel=1e-14)
+    assert solve(made, 1.0)["t_coulomb"][-1] == pytest.approx(0.3 * 2 * 1e5, rel=1e-14)
 
 
 @pytest.mark.parametrize("attraction", [ATTRACTION, ElectrostaticFlatFlat(s_1=1e-3, s_2=-1e-3)], ids=lambda x: x.name())
@@ -101,16 +93,16 @@ def test_laws_of_the_net_pressure_beside_attraction_are_told(attraction):
     assert not told(replace(derjaguin, interface=replace(derjaguin.interface, frictions=[law])))
 
 
+DAMPED = Mounting(k=1e9, c_b=1e8)
+
+
 # -- static friction below sliding friction ------------------------------------------------------------------------
 
 
 def pulled(friction, T=300.0):
     loading = {"p": Hold(level=1e6), "w_t": Ramp(rate=1e-3)}
     bonds = {"potentials": [BondEnergy(K_0=1.0)], "reactions": [LinearAffinity(c_r=1e14)], "sites": SITES}
-    interface = Interface("T", frictions=[friction], **bonds)
-    initial = {"T": T, "phi": 1.0}
-    mount = Mounting(k=1e9, c_b=1e8)
-    return Scene(bodies("T", "T"), interface, loading=loading, T_0=300.0, initial=initial, tangential=mount)
+    return together(frictions=[friction], loading=loading, initial={"T": T, "phi": 1.0}, tangential=DAMPED, **bonds)
 
 
 LESS = {
@@ -140,7 +132,7 @@ def test_a_static_limit_below_sliding_friction_is_told(name):
     T = 360.0 if name == "of the temperature" else 300.0
     (text,) = told_by_check(pulled(LESS[name], T))
     assert "is below its sliding friction" in text
-    assert text in Solution(solve(pulled(LESS[name], T))).warnings
+    assert text in Solution(solve(pulled(LESS[name], T), 1.0)).warnings
 
 
 @pytest.mark.parametrize("name", MORE)
@@ -152,7 +144,7 @@ def test_a_limit_that_falls_as_the_interface_heats_is_told_by_the_run():
     made = pulled(BondedCoulomb(mu=0.3, mu_b=0.31, mu_ub=0.31))
     hot = replace(made, loading=made.loading | {"Q_1": Hold(level=1e5)})
     assert not told_by_check(hot)
-    assert "is below its sliding friction" in " ".join(Solution(solve(hot)).warnings)
+    assert "is below its sliding friction" in " ".join(Solution(solve(hot, 1.0)).warnings)
 
 
 # -- bonds across an open gap --------------------------------------------------------------------------------------
@@ -160,9 +152,7 @@ def test_a_limit_that_falls_as_the_interface_heats_is_told_by_the_run():
 
 def bonding(c_r=1e14, g_n=1e-6, phi=0.0):
     reactions = [LinearAffinity(c_r=c_r)]
-    interface = Interface("T", [BondEnergy(K_0=1.0)], (), reactions, SITES)
-    initial = {"T": 300.0, "phi": phi}
-    return Scene(bodies("T", "T"), interface, loading={"g_n": Hold(level=g_n)}, T_0=300.0, initial=initial)
+    return together([BondEnergy(K_0=1.0)], (), {"g_n": Hold(level=g_n)}, {"phi": phi}, reactions)
 
 
 def test_bonds_that_form_across_an_open_gap_are_told():
