@@ -6,6 +6,7 @@ import random
 import numpy as np
 import pytest
 from law_values import USUAL
+from solved import solve
 
 from surfacechem.contracts.terms import BodyEnergy, Friction, HeatTransfer, Potential, RateLaw, Varying, reads
 from surfacechem.errors import InputError
@@ -22,9 +23,7 @@ from surfacechem.laws.longrange import LennardJonesFlatFlat
 from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.results.audit import audit
-from surfacechem.results.error_estimates import computed
 from surfacechem.scene import Body, Interface, Medium, Mounting, Scene, Sites
-from surfacechem.solve.run import Model, Run
 
 J = 2.0
 N_1, N_2 = 4e16, 6e16
@@ -66,7 +65,7 @@ def scene(on: float, potentials=(), loading=(), C=50.0, heat=(), **more) -> Scen
 
 def same(make, names, times=(0.0, 0.1, 0.4, 1.0), extensive=("U_c", "S_c", "U_1", "S_total")):
     """The run on the stretched surface, which is that on a reference surface of that size."""
-    stretched, plain = (computed(Model(assemble(make(on))).solve(Run(times=times))) for on in (1.0, J))
+    stretched, plain = (solve(make(on), times) for on in (1.0, J))
     for name in ("T_1", "T_2", "T_c", "q_1", *names):
         size = float(np.max(np.abs(plain[name])))
         assert stretched[name] == pytest.approx(plain[name], rel=1e-9, abs=1e-11 * size), name
@@ -74,12 +73,6 @@ def same(make, names, times=(0.0, 0.1, 0.4, 1.0), extensive=("U_c", "S_c", "U_1"
         size = float(np.max(np.abs(plain[name])))
         assert stretched[name] == pytest.approx(J * plain[name], rel=1e-9, abs=1e-9 * J * size), name
     return stretched
-
-
-def booked(trajectory, name):
-    """An account of a run."""
-    ledger = trajectory.model.system.ledger
-    return trajectory.result.ledger_outputs[:, [account.quantity.name for account in ledger].index(name)]
 
 
 # -- every law --------------------------------------------------------------------------------------------------------
@@ -163,8 +156,7 @@ def test_a_tensile_strength():
     def make(on):
         return mounted(on, [BondStiffness(E_b=1e14 / on, E_n=1e15 / on)], limits=[TensileStrength(t_max=3e5)])
 
-    runs = [Model(assemble(make(on))).solve(Run(times=(0.0, 0.9))) for on in (1.0, J)]
-    (t,), (again,) = ([jump.t for jump in run.jumps if jump.edge.name == "debond"] for run in runs)
+    (t,), (again,) = ([jump.t for jump in solve(make(on), 0.9).of("debond")] for on in (1.0, J))
     assert t == pytest.approx(again, rel=1e-12)
     assert t == pytest.approx(3e5 * J * 2 / 1e14 / 2e-8, rel=1e-9)
 
@@ -184,7 +176,7 @@ def test_bonds_stay_on_their_envelope_as_the_surface_stretches():
     law = CompliantDebonding(t_max=3e5, E_b=1e14, g_f=4e-8)
     plain = mounted(1.0, [BondStiffness(E_b=1e14, E_n=1e15)], reactions=[law])
     scene = dataclasses.replace(plain, loading=plain.loading | {"J_c": Ramp(start=1.0, rate=0.1)})
-    values = computed(Model(assemble(scene)).solve(Run(times=np.linspace(0.0, 1.4, 15))))
+    values = solve(scene, np.linspace(0.0, 1.4, 15))
     areas = 1.0 + 0.1 * np.linspace(0.0, 1.4, 15)
     left = [
         law.bind({"t_max": float(3e5 * area)}).envelope(g_n=float(g))
@@ -210,18 +202,18 @@ def stretching(potentials, rate=0.5, loading=(), **more) -> Scene:
 @pytest.mark.parametrize("name", STRETCHED)
 def test_stretching_a_surface_takes_the_change_of_its_energy(name):
     law, g = STRETCHED[name], 5e-10
-    trajectory = Model(assemble(stretching([law], loading={"g_n": Hold(level=g)}))).solve(Run(times=(0.0, 1.0, 2.0)))
-    values, areas = computed(trajectory), np.array([1.0, 1.5, 2.0])
+    trajectory = solve(stretching([law], loading={"g_n": Hold(level=g)}), (0.0, 1.0, 2.0))
+    values, areas = trajectory, np.array([1.0, 1.5, 2.0])
     per_area = law.energy(g_n=g) * (areas if "zone" in name else 1 / areas)
-    assert booked(trajectory, "W_J") == pytest.approx(per_area - per_area[0], rel=1e-9)
+    assert trajectory["W_J"] == pytest.approx(per_area - per_area[0], rel=1e-9)
     assert values["t_n_nominal"] == pytest.approx(areas * values["t_n"], rel=1e-12)
     assert audit(trajectory).energy_error < 1e-9
 
 
 def test_an_energy_may_depend_on_the_stretch_of_the_surface_but_not_jump_with_it():
     varying = BondEnergy(K_0=Varying(10.0, (Linear(of="J_c", slope=0.5),)))
-    trajectory = Model(assemble(stretching([varying], loading={"phi": Hold(level=0.5)}))).solve(Run(times=(0.0, 2.0)))
-    assert booked(trajectory, "W_J")[-1] == pytest.approx(0.5 * 10.0 * 0.5 * 1.0 * 0.5**2, rel=1e-9)
+    trajectory = solve(stretching([varying], loading={"phi": Hold(level=0.5)}), (0.0, 2.0))
+    assert trajectory["W_J"][-1] == pytest.approx(0.5 * 10.0 * 0.5 * 1.0 * 0.5**2, rel=1e-9)
     jumping = dataclasses.replace(
         stretching([varying], loading={"phi": Hold(level=0.5)}),
         loading={"phi": Hold(level=0.5), "J_c": Table(times=[0.0, 1.0, 1.0, 2.0], values=[1.0, 1.0, 2.0, 2.0])},
@@ -247,7 +239,7 @@ def partners(area, potential=PARTNERS) -> Scene:
 
 @pytest.mark.parametrize("area", [0.5, 1.0, 4.0])
 def test_bimolecular_bonds_come_to_the_equilibrium_of_their_mixture(area):
-    values = computed(Model(assemble(partners(Hold(level=area)))).solve(Run(times=(0.0, 60.0))))
+    values = solve(partners(Hold(level=area)), (0.0, 60.0))
     phi = values["phi"][-1]
     n_b, n_1, n_2 = phi * N_1 / area, (1 - phi) * N_1 / area, (N_2 - phi * N_1) / area
     assert n_b / (n_1 * n_2) == pytest.approx(K_F / K_R, rel=1e-9)
@@ -256,13 +248,13 @@ def test_bimolecular_bonds_come_to_the_equilibrium_of_their_mixture(area):
 
 def test_slow_stretching_is_reversible_and_does_the_work_of_a_gas_in_two_dimensions():
     """W_J = -int kT (n_b + n_1' + n_2') dA along the equilibrium, where the surface is stretched slowly."""
-    trajectory = Model(assemble(partners(Ramp(start=1.0, rate=1e-5)))).solve(Run(times=np.linspace(0.0, 1e5, 4001)))
-    values = computed(trajectory)
+    trajectory = solve(partners(Ramp(start=1.0, rate=1e-5)), np.linspace(0.0, 1e5, 4001))
+    values = trajectory
     area = 1.0 + 1e-5 * np.linspace(0.0, 1e5, 4001)
     particles = values["phi"] * N_1 + (1 - values["phi"]) * N_1 + N_2 - values["phi"] * N_1
     work = -np.concatenate([[0.0], np.cumsum(np.diff(area) * (KT * particles / area)[1:])])
-    assert booked(trajectory, "W_J")[-1] == pytest.approx(work[-1], rel=1e-3)
-    produced = booked(trajectory, "entropy_bimolecular")[[10, -1]]  # after the start has relaxed
+    assert trajectory["W_J"][-1] == pytest.approx(work[-1], rel=1e-3)
+    produced = trajectory["entropy_bimolecular"][[10, -1]]  # after the start has relaxed
     assert 0 < np.diff(produced)[0] < 1e-4 * abs(work[-1]) / 300.0
     books = audit(trajectory)
     assert books.energy_error < 1e-8
@@ -272,5 +264,5 @@ def test_slow_stretching_is_reversible_and_does_the_work_of_a_gas_in_two_dimensi
 def test_bimolecular_bonds_in_a_lattice_gas_would_run_uphill_as_the_surface_stretches():
     """A lattice gas knows no area, so that it is the equilibrium of the rates at one stretch only."""
     potential = LatticeGas(epsilon=KT * np.log(0.5))
-    trajectory = Model(assemble(partners(Ramp(start=1.0, rate=0.5), potential))).solve(Run(times=(0.0, 4.0)))
+    trajectory = solve(partners(Ramp(start=1.0, rate=0.5), potential), (0.0, 4.0))
     assert audit(trajectory).violations

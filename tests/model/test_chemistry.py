@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 import symengine
+from solved import solve
 from tables_bonds import SITES, isothermal
 
 import surfacechem
@@ -28,13 +29,8 @@ UNIT = THERMAL / X
 SLIP = Bell(k_off=1.0, x_off=X)
 
 
-def named(trajectory) -> dict[str, np.ndarray]:
-    names = [item.name for item in trajectory.model.system.outputs]
-    return dict(zip(names, trajectory.outputs.T, strict=True))
-
-
 def solved(scene, *times, **settings):
-    return Model(assemble(scene)).solve(Run(times=[0.0, *times], **settings))
+    return solve(scene, times, **settings)
 
 
 def role_of(scene, name):
@@ -47,7 +43,7 @@ def role_of(scene, name):
 def test_bonds_share_the_tension_and_feel_no_compression():
     loading = {"t_n": Harmonic(amplitude=UNIT * SITES, frequency=0.25)}
     trajectory = solved(isothermal(Bell(k_off=0.1, x_off=X, k_on=1.0), loading), *np.linspace(0.1, 4.0, 40))
-    values = named(trajectory)
+    values = trajectory
     phi = trajectory.result.outputs[:, 0]
     np.testing.assert_allclose(values["f"], np.maximum(values["t_n"], 0) / (SITES * phi), rtol=1e-12, atol=1e-26)
     assert audit(trajectory).site_error < 1e-10
@@ -58,7 +54,7 @@ def test_bonds_share_the_tension_and_feel_no_compression():
 def test_elastic_bonds_carry_what_stretches_them_and_the_contact_the_rest():
     potentials = [LatticeGas(epsilon=5e-20), BondSprings(k_b=1e-3, l_0=1e-9), NormalStiffness(E_n=1e13)]
     scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.5, potentials=potentials)
-    values = named(solved(scene, 1.0, 5.0))
+    values = solved(scene, 1.0, 5.0)
     np.testing.assert_allclose(values["f"], 1e-3 * (values["g_n"] - 1e-9), rtol=1e-12, atol=1e-24)
     assert role_of(scene, "f") == "bond elasticity"
 
@@ -134,7 +130,7 @@ def test_survival_of_any_smallness():
     times = np.log1p(hazard)  # the force grows by one unit, the rate at no force is one
     trajectory = solved(in_logarithms(isothermal(SLIP, {"f": Ramp(rate=UNIT)})), *times)
     np.testing.assert_allclose(trajectory.result.outputs[1:, 0], -hazard, rtol=1e-10)
-    np.testing.assert_allclose(named(trajectory)["phi"][1:5], np.exp(-hazard[:4]), rtol=1e-8)
+    np.testing.assert_allclose(trajectory["phi"][1:5], np.exp(-hazard[:4]), rtol=1e-8)
     assert np.isfinite(trajectory.outputs).all()
     assert audit(trajectory).site_error < 1e-10
 
@@ -144,11 +140,10 @@ def test_logarithms_change_nothing_else():
     scene = isothermal(ReversibleBell(k_off=1.0, x_off=X), {"g_n": Ramp(rate=1e-9)}, 0.7, potentials=potentials)
     plain, logarithmic = (solved(form, 1.0, 3.0, 9.0) for form in (scene, in_logarithms(scene, math.log(0.7))))
     assert logarithmic.model.system.states[0].name == "ln_phi"
-    ours, theirs = named(logarithmic), named(plain)
-    np.testing.assert_allclose(ours.pop("phi"), plain.result.outputs[:, 0], rtol=1e-9)
-    for name, values in ours.items():
-        np.testing.assert_allclose(values, theirs[name], rtol=1e-8, atol=1e-8 * abs(theirs[name]).max(), err_msg=name)
-    assert audit(logarithmic).energy_error < 1e-9
+    for item in logarithmic.system.outputs:
+        ours, theirs = logarithmic[item.name], plain[item.name]
+        np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8 * abs(theirs).max(), err_msg=item.name)
+    assert logarithmic.energy_error < 1e-9
     assert audit(logarithmic).violations == ()
 
 
