@@ -211,28 +211,26 @@ def with_cells(estimate: Accuracy, cells: CellErrors) -> Accuracy:
 
 def states(trajectory: Trajectory) -> dict[str, Array]:
     """States at the output times, by name; those inside bodies together."""
-    system = trajectory.model.system
-    lone = {s.name: j for j, s in enumerate(system.states) if s.name not in system.inside}
-    found = {name: trajectory.result.outputs[:, j] for name, j in lone.items()}
+    system, outputs = trajectory.model.system, trajectory.result.outputs
+    found = {name: outputs[:, j] for name, j in system.state_columns.items() if name not in system.inside}
     return found | {profile.name: profile_values(trajectory, profile) for profile in system.profiles}
 
 
 def computed(trajectory: Trajectory) -> dict[str, Array]:
     """States and named quantities at the output times, by name."""
-    names = [item.name for item in trajectory.model.system.outputs]
-    return states(trajectory) | dict(zip(names, trajectory.outputs.T, strict=True))
+    return states(trajectory) | dict(zip(trajectory.model.system.output_columns, trajectory.outputs.T, strict=True))
 
 
 def floors(trajectory: Trajectory) -> dict[str, float]:
     """Sizes below which errors are relative to these. Of a state that at which the absolute tolerance is as much as the
     relative one, and at most its scale; of a profile the largest of its states; of a named quantity its largest value.
     """
-    run, system = trajectory.run, trajectory.model.system
-    sizes = np.minimum(trajectory.result.problem.atol / run.rtol, [state.scale for state in system.states])
-    found = dict(zip((state.name for state in system.states), sizes.tolist(), strict=True))
+    system = trajectory.model.system
+    sizes = (trajectory.result.problem.atol / trajectory.run.rtol).tolist()
+    found = {state.name: min(size, state.scale) for state, size in zip(system.states, sizes, strict=True)}
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
-    largest = np.max(np.abs(trajectory.outputs), axis=0, initial=0.0).tolist()
-    return dict(zip((item.name for item in system.outputs), largest, strict=True)) | found
+    largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0).tolist()
+    return dict(zip(system.output_columns, largest, strict=True)) | found
 
 
 def difference(found: Mapping[str, Array], expected: Mapping[str, Array]) -> str:
@@ -309,7 +307,7 @@ def rounding_of_time(trajectory: Trajectory) -> float:
     """
     result = trajectory.result
     known = floors(trajectory)
-    size = np.maximum(np.abs(result.outputs), [known[state.name] for state in trajectory.model.system.states])
+    size = np.maximum(np.abs(result.outputs), [known[name] for name in trajectory.model.system.state_columns])
     change = EPS * np.abs(trajectory.rates) * result.times[:, None]
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 

@@ -119,12 +119,12 @@ def event_times(trajectory: Trajectory) -> dict[str, Any]:
     endless rebounds, how many there are is a matter of the tolerance. So is what falls on the very end of the run:
     rounding decides whether it still happens.
     """
-    names = [state.name for state in trajectory.model.system.states]
+    columns = trajectory.model.system.state_columns
     end, fastest, slow = trajectory.run.times[-1] * (1 - SIDE), 0.0, -np.inf
     times: dict[str, list[float]] = {}
     for event in events_of(trajectory):
         if event.jump and event.jump.edge.returns is not None:
-            speed = abs(float(event.before[names.index("v_n")]))
+            speed = abs(float(event.before[columns["v_n"]]))
             fastest = max(fastest, speed)
             slow = event.t if speed < NEGLIGIBLE * fastest else -np.inf
         elif event.t != slow or event.name == REST:  # coming to rest ends the rebounds, and counts

@@ -153,17 +153,15 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
     Two bodies have no temperature where they touch at the instant when they do: ours is taken.
     """
     system, times = run.model.system, run.result.times
-    states = [state.name for state in system.states]
-    known = [*states, *(item.name for item in system.outputs)]
-    result = {name: np.array(values) for name, values in exact.items() if name in known}
+    result = {name: x.copy() for name, x in exact.items() if name in system.state_columns | system.output_columns}
     shared = scene.bodies[0].temperature
     if "T" in exact and shared == scene.bodies[1].temperature and isinstance(shared, str):
-        result[shared] = np.array(exact["T"])
+        result[shared] = exact["T"].copy()
     for item in system.profiles:
         places = np.array(item.points) * run.values[item.thickness]
         result[item.name] = reference.profile(item.number, places, times)
-        if item.surface in states:
-            ours = run.result.outputs[0, states.index(item.surface)]
+        if item.surface in system.state_columns:
+            ours = run.result.outputs[0, system.state_columns[item.surface]]
             result[item.name][0, 0] = ours
             if item.surface in result:
                 result[item.surface][0] = ours
@@ -173,7 +171,7 @@ def _with_profiles(reference: Reference, exact: Mapping[str, Array], scene: Scen
 def renamed(exact: Mapping[str, Array], run: Trajectory) -> dict[str, Array]:
     """Exact values under the names of the scene; those it does not have are left out."""
     system = run.model.system
-    known = [state.name for state in system.states] + [item.name for item in system.outputs]
+    known = system.state_columns | system.output_columns
     stands_for = {
         "T": [s.name for s in system.states if s.is_temperature and s.name not in system.inside],
         "R_c": [name for name in known if name.startswith("R_")],
