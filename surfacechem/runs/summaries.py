@@ -122,7 +122,7 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
     axes = [f"{name} ({spans[name]}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
     lines.append(labelled("swept", " by ".join(axes)))
     lines.append(labelled("solved", _solved(solution.system, solution.run)))
-    lines.append(labelled("ended", f"{len(solution.runs)} runs: {solution.reason}"))
+    lines.append(labelled("ended", f"{len(solution.runs)} runs: {solution.ends}"))
     if accuracy := solution.accuracy:
         known = accuracy.known
         missing = len(accuracy.errors) - len(known)

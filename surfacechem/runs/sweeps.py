@@ -187,7 +187,7 @@ class SweepSolution(Results):
 
     def __repr__(self) -> str:
         """Title, size and ends in a line."""
-        return f"<SweepSolution {self.title!r}: {len(self.runs)} runs, {self.reason}>"
+        return f"<SweepSolution {self.title!r}: {len(self.runs)} runs, {self.ends}>"
 
     @property
     def system(self) -> System:
@@ -221,7 +221,7 @@ class SweepSolution(Results):
         return [spectrum.statistics(run, self.plan.until[0]) for run in self.runs]
 
     @property
-    def reason(self) -> str:
+    def ends(self) -> str:
         """How many runs ended in which way, in words."""
         every = [run.status for run in self.runs]
         return ", ".join(f"{every.count(status)} {status}" for status in dict.fromkeys(every))
@@ -330,7 +330,7 @@ class SweepSolution(Results):
             "sweep": self.plan.record,
             **departures,
             "status": self.status,
-            "reason": self.reason,
+            "reason": self.ends,
             "regime": self.system.regime,
             "solver": self.run.solver,
             "rtol": float(self.run.rtol),
