@@ -28,39 +28,30 @@ from surfacechem.tolerances import NOTHING
 
 def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
     """Fluxes between nodes and external heat."""
-    groups = _by_ends(build)
-    for ends, channels in groups:
-        yield from (HeatPath(ends, h) for h in channels.values())
-    for ends, channels in groups:
-        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
-    for law in (law for law in build.scene.heat if _made_across(law)):
-        yield from _through_film(build, law)
-    yield from _external_heat(build)
-    if build.interface.temperature is None and build.interface.loss:
-        rest = build.shares()[build.scene.bodies[1].name]
-        reason = "the fractions of the interface's heat add up to more than 1"
-        yield Margin("partition <= 1", rest + NOTHING, reason)
-
-
-def _by_ends(build: Build) -> list[tuple[tuple[str, str], dict[str, Expression]]]:
-    """Conductances between the same two ends together, by what carries the heat."""
+    films = [law for law in build.scene.heat if law.closure == "medium" and law.resistances is not None]
+    # Paths between the same two ends count together, by what carries the heat.
     groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
-    for law in (law for law in build.scene.heat if not _made_across(law)):
+    for law in (law for law in build.scene.heat if law not in films):
         for ends, channels in _paths(build, law):
             _, together = groups.setdefault(frozenset(ends), (ends, {}))
             for channel, h in channels.items():
                 together[channel] = together.get(channel, symengine.Integer(0)) + h
-    return list(groups.values())
-
-
-def _external_heat(build: Build) -> Iterator[Power]:
-    """Heat that a case prescribes; without a medium that of the interface goes on to the bodies."""
-    for member, Q in ((build.scene.bodies[0].name, "Q_1"), (build.scene.bodies[1].name, "Q_2"), ("interface", "Q_c")):
+    for ends, channels in groups.values():
+        yield from (HeatPath(ends, h) for h in channels.values())
+        yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
+    for law in films:
+        yield from _through_film(build, law)
+    first, second = (body.name for body in build.scene.bodies)
+    for member, Q in ((first, "Q_1"), (second, "Q_2"), (INTERFACE, "Q_c")):
         if build.variables.has(Q):
             heat, node = build.variables.get(Q, "the energy balance"), build.thermal.node_of.get(member)
+            # Without a medium that of the interface goes on to the bodies.
             T = build.variables.get("T_c", "the external heat") if node is None else node.T
             text = f"external heat into {member}"
             yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
+    if build.interface.temperature is None and build.interface.loss:
+        reason = "the fractions of the interface's heat add up to more than 1"
+        yield Margin("partition <= 1", build.shares()[second] + NOTHING, reason)
 
 
 def takers(build: Build) -> dict[str, Expression]:
@@ -89,17 +80,6 @@ def _area(build: Build, ends: Collection[str]) -> Expression:
     return symengine.Integer(1) if "surroundings" in ends else build.stretch
 
 
-def conductances(build: Build, law: HeatTransfer) -> dict[str, Expression]:
-    """Conductances of a law [W/(m^2 K)], by what carries the heat."""
-    from_node, to_node = (end_node(build, end, law) for end in law.between)
-    bound = build.variables.bind(law, f"heat.{law.name()}")
-    own = {"T_from": from_node.T, "T_to": to_node.T}
-    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
-    build.law_ranges(law)
-    build.law_margins(law, {})
-    return channels
-
-
 def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
     """The nodes of the ends of a path, which are two; closures other than the direct one are of the two bodies."""
     a, b = law.between
@@ -113,11 +93,6 @@ def _two_nodes(build: Build, law: HeatTransfer) -> tuple[Node, Node]:
     if first is second:
         raise InputError(f"the heat path between {a} and {b} has one temperature, {first.name}; remove it.", law.place)
     return first, second
-
-
-def _made_across(law: HeatTransfer) -> bool:
-    """Whether a law carries heat through a film in which it is also made, all across."""
-    return law.closure == "medium" and law.resistances is not None
 
 
 def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]:
@@ -155,7 +130,11 @@ def _through_film(build: Build, law: HeatTransfer) -> Iterator[Power | HeatPath]
 def _paths(build: Build, law: HeatTransfer) -> Iterator[tuple[tuple[str, str], dict[str, Expression]]]:
     """Ends and conductances of a law, by what carries the heat; through the medium two paths of twice as much each."""
     (a, b), nodes = law.between, _two_nodes(build, law)
-    channels = conductances(build, law)
+    bound = build.variables.bind(law, f"heat.{law.name()}")
+    own = {"T_from": nodes[0].T, "T_to": nodes[1].T}
+    channels = {name: build.variables.call(bound, formula, own) for name, formula in bound.channels().items()}
+    build.law_ranges(law)
+    build.law_margins(law, {})
     if law.closure == "medium":
         centre = end_node(build, "interface", law)
         for ends, node in zip(((a, "interface"), ("interface", b)), nodes, strict=True):
@@ -171,21 +150,23 @@ def _between(build: Build, ends: tuple[str, str], channels: Mapping[str, Express
     from_node, to_node = end_node(build, a), end_node(build, b)
     difference = from_node.T - to_node.T
     flux = Quantity(_path_name(build, a, b), "W/m^2", f"heat flux from {a} to {b}", tag="e:qc_k1")
-    total, parts = named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
+    total, parts = _named_flux(build, flux, {channel: area * h * difference for channel, h in channels.items()})
     produced = area * symengine.Add(*channels.values()) * difference**2 / (from_node.T * to_node.T)
     yield Power(HEAT, a, b, total, flux.name, f"heat flow from {a} to {b}", parts, produced)
 
 
-def named_flux(
+def _named_flux(
     build: Build, flux: Quantity, parts: Mapping[str, Expression]
 ) -> tuple[Expression, dict[str, Expression]]:
     """A flux by its name, and its channels by theirs where there are several."""
-    if len(parts) > 1:
-        texts = {channel: f"{flux.long_name} by {channel}" for channel in parts}
-        names = {channel: Quantity(f"{flux.name}_{channel}", "W/m^2", text) for channel, text in texts.items()}
-        parts = {channel: build.name(names[channel], part) for channel, part in parts.items()}
-    total = build.name(flux, symengine.Add(*parts.values()))
-    return total, dict(parts) if len(parts) > 1 else {next(iter(parts)): total}
+    if len(parts) == 1:
+        total = build.name(flux, *parts.values())
+        return total, dict.fromkeys(parts, total)
+    named = {}
+    for channel, part in parts.items():
+        quantity = Quantity(f"{flux.name}_{channel}", "W/m^2", f"{flux.long_name} by {channel}")
+        named[channel] = build.name(quantity, part)
+    return build.name(flux, symengine.Add(*named.values())), named
 
 
 def _path_name(build: Build, a: str, b: str) -> str:
@@ -219,7 +200,7 @@ def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Pow
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
     difference = centre.T - 2 * lower.T * upper.T / (lower.T + upper.T)
     flux = Quantity("q_c12", "W/m^2", "heat flux from interface to each body", tag="r:47")
-    total, parts = named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
+    total, parts = _named_flux(build, flux, {name: build.stretch * h * difference for name, h in channels.items()})
     sum_h = symengine.Add(*channels.values())
     (cold, _), (hot, name) = sorted((build.at_start(build.thermal.node_of[body].T), body) for body in bodies)
     if hot > cold:
