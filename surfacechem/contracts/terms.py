@@ -525,6 +525,10 @@ class Load(Law):
         """Values of the local fields on the piece that begins at time ``start`` [s]."""
         return {}
 
+    def at_start(self) -> float:
+        """Value at t = 0."""
+        return float(self.bind(self.piece(0.0)).value(0.0))
+
 
 class Property(Law):
     """Property of the medium between the bodies, as a function of temperature and pressure."""

@@ -293,7 +293,7 @@ class Prescribed(Content):
                     error = InputError(f"{error.message} {hint}", tree.place)
                 raise error from None
             load = laws.find(Load, "hold")(level=level, place=tree.place)  # type: ignore[call-arg, assignment]
-        start = float(load.bind(load.piece(0.0)).value(0.0)) if self.above_zero else 1.0
+        start = load.at_start() if self.above_zero else 1.0
         if not start > 0:
             raise tree.error(f"{start:g} K is not an absolute temperature above zero.")
         return load

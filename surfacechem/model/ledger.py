@@ -286,7 +286,7 @@ def _merged(build: Build, shares: Mapping[str, Expression]) -> tuple[Sink, ...]:
 def _is_one_constant(build: Build, names: Collection[str]) -> bool:
     """Whether prescribed temperatures are the same and stay as they are."""
     loads = [build.loads[name] for name in names]
-    starts = {float(load.bind(load.piece(0.0)).value(0.0)) for load in loads}
+    starts = {load.at_start() for load in loads}
     moves = any(build.slope_of(name) != 0 for name in names) or any(load.jumps() for load in loads)
     return len(starts) == 1 and not moves
 

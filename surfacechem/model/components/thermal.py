@@ -18,7 +18,6 @@ from surfacechem.model.constraints.fold import determinant
 from surfacechem.model.parts import Thermal
 from surfacechem.model.system import STABLE, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
-from surfacechem.scene import Scene
 from surfacechem.tolerances import NOTHING
 
 _NEWTON = 20
@@ -31,13 +30,7 @@ CAPACITY_REMEDY = (
 
 
 def variables(build: Build) -> Iterator[Thermal]:
-    """The nodes, then with the free energies of the bodies."""
-    yield _temperatures(build)
-    yield _body_energies(build)
-
-
-def _temperatures(build: Build) -> Thermal:
-    """Nodes: who carries which temperature, and which are prescribed."""
+    """Nodes: who carries which temperature, and which are prescribed; then with the free energies of the bodies."""
     scene = build.scene
     if scene.T_0 is not None:
         spec = Spec("K", "reference temperature", above=0)
@@ -45,45 +38,49 @@ def _temperatures(build: Build) -> Thermal:
     if build.interface.temperature is None:
         mean = partial(_mean_temperature, build)
         build.variables.define("T_c", mean, "derived", "harmonic mean of the bodies, no medium")
-    nodes: dict[str, Node] = {}
-    members: dict[str, str] = {}
-    for variable, name, own, member in _members_of(scene):
-        message = ""
-        if own is not None and name in nodes:
-            message = f"{name} has two roles: the temperature of {member}, and a node of another member."
-        elif name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
-            message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
-        if message:
-            path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
-            raise InputError(message, path=path)
-        if name not in nodes:
-            nodes[name] = _node(build, name, own or scene.loading.get(name))
-        node, members[member] = nodes[name], name
-        role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
-        build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
-    return Thermal(nodes, members)
-
-
-def _members_of(scene: Scene) -> Iterator[tuple[str, str, Load | None, str]]:
-    """Variable, node and own history of the temperature of each member that has one, and the member."""
+    thermal = Thermal({}, {})
     given: list[tuple[str, str | Load | None, str]] = [
         *((f"T_{k}", body.temperature, body.name) for k, body in enumerate(scene.bodies, start=1)),
         ("T_c", scene.interface.temperature, INTERFACE),
         ("T_a", scene.surroundings, SURROUNDINGS),
     ]
     for variable, temperature, member in given:
-        if isinstance(temperature, Load):
-            yield variable, variable, temperature, member
-        elif temperature is not None:
-            yield variable, temperature, None, member
+        if temperature is not None:
+            thermal = _with_member(build, thermal, variable, temperature, member)
+    yield thermal
+    for k, body in enumerate(scene.bodies, start=1):
+        if body.energy is not None:
+            T = thermal.node_of[body.name].T
+            law = build.variables.bind(body.energy, f"bodies.{body.name}", f"_{k}")
+            F = law.energy(T=T, T_0=build.variables.get("T_0", f"the body {body.name}", f"bodies.{body.name}"))
+            build.refuse_foreign(F, {T}, body.energy)
+            thermal = thermal.with_energy(body.name, F)
+    yield thermal
 
 
-def _node(build: Build, name: str, load: Load | None) -> Node:
-    symbol = symengine.Symbol(name)
-    if load is None:
-        return Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
-    build.prescribe(VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name)), load)
-    return Node(name, symbol, build.slope_of(name), prescribed=True)
+def _with_member(build: Build, thermal: Thermal, variable: str, temperature: str | Load, member: str) -> Thermal:
+    """The nodes with that of a member, which may be one of another member, too."""
+    own = temperature if isinstance(temperature, Load) else None
+    name = variable if isinstance(temperature, Load) else temperature
+    message = ""
+    if own is not None and name in thermal.nodes:
+        message = f"{name} has two roles: the temperature of {member}, and a node of another member."
+    elif name == "T_0" or not re.fullmatch(r"T\w*", name, re.ASCII):
+        message = f"'{name}' cannot name a temperature: use T, followed by letters, digits or _, but not T_0."
+    if message:
+        path = f"{member}.temperature" if member == INTERFACE else f"bodies.{member}.temperature"
+        raise InputError(message, path=path)
+    node = thermal.nodes.get(name)
+    if node is None:
+        symbol, load = symengine.Symbol(name), own or build.scene.loading.get(name)
+        if load is None:
+            node = Node(name, symbol, symengine.Symbol(f"d{name}_dt"))
+        else:
+            build.prescribe(VARIABLES.get(name, Quantity(name, "K", f"temperature of node {name}", name)), load)
+            node = Node(name, symbol, build.slope_of(name), prescribed=True)
+    role = "prescribed" if node.prescribed else ("temperature node" if name == variable else "merged")
+    build.variables.define(variable, partial(symengine.Symbol, name), role, f"{member}: {name}")
+    return Thermal({**thermal.nodes, name: node}, {**thermal.members, member: name})
 
 
 def _mean_temperature(build: Build) -> Expression:
@@ -92,19 +89,6 @@ def _mean_temperature(build: Build) -> Expression:
         raise InputError("heat is lost to surroundings that have no temperature. Add `surroundings`.", path="interface")
     inverse = symengine.Add(*(share / build.thermal.node_of[end].T for end, share in shares.items()))
     return build.name(VARIABLES["T_c"], 1 / inverse)
-
-
-def _body_energies(build: Build) -> Thermal:
-    thermal = build.thermal
-    for k, body in enumerate(build.scene.bodies, start=1):
-        if body.energy is None:
-            continue
-        T = thermal.node_of[body.name].T
-        law = build.variables.bind(body.energy, f"bodies.{body.name}", f"_{k}")
-        F = law.energy(T=T, T_0=build.variables.get("T_0", f"the body {body.name}", f"bodies.{body.name}"))
-        build.refuse_foreign(F, {T}, body.energy)
-        thermal = thermal.with_energy(body.name, F)
-    return thermal
 
 
 def rows(build: Build) -> Iterator[Power | State | Margin]:
@@ -142,7 +126,7 @@ def _temperature_state(build: Build, node: Node) -> State:
             "temperature a value.",
             path=f"bodies.{members[0].name}",
         )
-    initial = build.scene.initial.get(node.name, _guess(build)) if algebraic else _initial(build, node)
+    initial = _guess(build, node) if algebraic else _initial(build, node)
     if not initial > 0:
         raise InputError(
             f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.",
@@ -177,12 +161,13 @@ def _members(build: Build, node: Node) -> str:
     return " and ".join(member for member, name in build.thermal.members.items() if name == node.name)
 
 
-def _guess(build: Build) -> float:
-    """Start value for an algebraic interface temperature: the mean of the bodies."""
-    values = [build.scene.initial.get(build.thermal.members[body.name]) for body in build.scene.bodies]
-    known = [value for value in values if value is not None]
-    loads = [body.temperature for body in build.scene.bodies if isinstance(body.temperature, Load)]
-    known += [float(load.bind(load.piece(0.0)).value(0.0)) for load in loads]
+def _guess(build: Build, node: Node) -> float:
+    """Start value for an algebraic interface temperature: what is given, or the mean of the bodies."""
+    initial, bodies = build.scene.initial, build.scene.bodies
+    if node.name in initial:
+        return initial[node.name]
+    known = [initial[name] for body in bodies if (name := build.thermal.members[body.name]) in initial]
+    known += [body.temperature.at_start() for body in bodies if isinstance(body.temperature, Load)]
     return sum(known) / len(known) if known else float(build.scene.T_0 or 300.0)
 
 
