@@ -79,6 +79,10 @@ class Thermal:
         """The other members that have the same temperature."""
         return [other for other, name in self.members.items() if name == self.members[member] and other != member]
 
+    def owners(self, node: Node) -> str:
+        """The members that have a node, in words."""
+        return " and ".join(member for member, name in self.members.items() if name == node.name)
+
     def volume(self, body: str) -> dict[str, Expression]:
         """Places in a body with their parts of its volume; the one at the contact is the first."""
         if body not in self.slabs:

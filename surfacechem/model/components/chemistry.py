@@ -8,7 +8,7 @@ A reaction that takes :math:`-\nu_j` molecules of the species j of an adjacent p
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import symengine
 
@@ -22,7 +22,6 @@ from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, 
 from surfacechem.model.constraints.bound import bound
 from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCHING
-from surfacechem.model.parts import Bond
 from surfacechem.model.system import Account, Capped, Caution
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import MOMENT
@@ -46,36 +45,45 @@ class Reaction:
     """Label of the dissipation: of two one-way reactions one always runs uphill, and only their sum counts."""
     load: Expression
     """What a prescribed force adds to the affinity [J]."""
+    rate: Expression = 0
+    """Net rate per current area [1/(m^2 s)]."""
 
 
-def laws(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power | Account | Caution]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
-    mu = {name: _chemical_potential(build, name, bond) for name, bond in build.bonding.items()}
-    laws = {}
+    mu = {}
+    for name, bond in build.bonding.items():
+        M, single = _potential_per_area(build, name, bond.symbol) / bond.density, name == "phi"
+        text = f"chemical potential {'per bond' if single else f'of {name} per site'}"
+        quantity = Quantity("mu" if single else f"mu_{name}", "J", text, tag="e:muc")
+        mu[name] = build.name(quantity, M, output=single)
+    kinetics = {}
     for law in build.interface.reactions:
-        laws[build.label(law)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
+        kinetics[build.label(law)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
         build.law_ranges(law)
-    pairs = opposed(laws)
-    load = dead_load(build, laws, pairs)
-    found = [_reaction(build, label, law, mu, load, pairs) for label, law in laws.items()]
-    rates = _rates(build, found)
+    pairs = opposed(kinetics)
+    load = dead_load(build, kinetics, pairs)
+    found = _with_rates(build, [_reaction(build, label, law, mu, load, pairs) for label, law in kinetics.items()])
     dissipated: dict[str, Expression] = {}
-    for reaction in found:
-        rate, law = rates[reaction.label], reaction.law
-        power = build.stretch * rate * reaction.affinity
-        dissipated[reaction.account] = dissipated.get(reaction.account, 0) - power
-        _across_an_open_gap(build, law, rate)
-        own_departure(build, reaction.label, law, reaction.affinity)
+    for item in found:
+        power = build.stretch * item.rate * item.affinity
+        dissipated[item.account] = dissipated.get(item.account, 0) - power
+        yield from _across_an_open_gap(build, item.law, item.rate)
+        own_departure(build, item.label, item.law, item.affinity)
     for account, power in dissipated.items():
         yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
-    yield from _from_neighbours(build, found, rates)
-    work = [-build.stretch * rates[item.label] * item.load for item in found if item.load != 0]
+    yield from _from_neighbours(build, found)
+    work = [-build.stretch * item.rate * item.load for item in found if item.load != 0]
     if work:
         text = "work of the prescribed force on bonds"
         yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*work), "W_f", text)
     for pair in pairs:
         departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
-    _bond_rows(build, found, rates)
+    for name, bond in build.bonding.items():
+        change = sum((item.law.stoichiometry().get(name, 0) * item.rate for item in found), symengine.Integer(0))
+        build.rows.sites(name, change, bond.density, build.stretch)
+        formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
+        yield Account(formed, bond.dot - build.rows[name], "bonds", name)
     phi = symengine.Symbol("phi")
     if "phi" not in build.bonding and depends(build.psi, phi):
         M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
@@ -83,16 +91,9 @@ def laws(build: Build) -> Iterator[Power]:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
 
 
-def _bond_rows(build: Build, found: Sequence[Reaction], rates: Mapping[str, Expression]) -> None:
-    """Balances of the bonds."""
-    change = {name: symengine.Integer(0) for name in build.bonding}
-    for reaction in found:
-        for x, n in reaction.law.stoichiometry().items():
-            change[x] += n * rates[reaction.label]
-    for name, bond in build.bonding.items():
-        build.rows.sites(name, change[name], bond.density, build.stretch)
-        formed = Quantity(f"formed_{name}", "1", f"change of {name} by all reactions")
-        build.ledger.append(Account(formed, bond.dot - build.rows[name], "bonds", name))
+def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
+    label, text = "M" if name == "phi" else f"M_{name}", f"chemical potential of {name} per area"
+    return build.name(Quantity(label, "J/m^2", text, tag="e:SMuc"), derivative(build.psi, symbol))
 
 
 def _reaction(
@@ -114,8 +115,8 @@ def _reaction(
     return Reaction(label, law, affinity, account, added)
 
 
-def _rates(build: Build, found: Sequence[Reaction]) -> dict[str, Expression]:
-    """Net rates by label, as named quantities."""
+def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
+    """The reactions with their net rates, as named quantities."""
     laws = {item.label: item.law for item in found if item.law.envelope is None}
     stated = {item.label: _rate(build, item.law, item.affinity) for item in found if item.label in laws}
     rates = {label: _resolved(build, laws, stated, label) for label in laws}
@@ -132,13 +133,12 @@ def _rates(build: Build, found: Sequence[Reaction]) -> dict[str, Expression]:
                 build.add(record)
         elif "phi" in item.law.stoichiometry():
             rates[item.label] *= free
-    for item in found:
-        quantity = Quantity(f"R_{item.label}", "1/(m^2 s)", f"net rate of {item.law.title}", tag="e:R")
-        rates[item.label] = build.name(quantity, rates[item.label])
-    return rates
+    texts = {item.label: f"net rate of {item.law.title}" for item in found}
+    quantities = {label: Quantity(f"R_{label}", "1/(m^2 s)", text, tag="e:R") for label, text in texts.items()}
+    return [replace(item, rate=build.name(quantities[item.label], rates[item.label])) for item in found]
 
 
-def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
+def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterator[Caution]:
     """Tell where bonds form across an open gap at a rate that does not feel it."""
     bonds = {"phi", *build.interface.bonds}
     formed = sum(n for x, n in law.stoichiometry().items() if x in bonds)
@@ -151,22 +151,7 @@ def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> None:
         f"{law.title} forms bonds across an open gap, which it does not read. Where they form in contact only let its "
         "rate fall with the gap, by `gap-attachment` or a factor of g_n"
     )
-    build.notes.append(Caution(where(g_n > TOUCHING, -formed * rate, 0), text))
-
-
-def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
-    quantity = Quantity(
-        "M" if name == "phi" else f"M_{name}", "J/m^2", f"chemical potential of {name} per area", tag="e:SMuc"
-    )
-    return build.name(quantity, derivative(build.psi, symbol))
-
-
-def _chemical_potential(build: Build, name: str, bond: Bond) -> Expression:
-    M = _potential_per_area(build, name, bond.symbol)
-    if name == "phi":
-        return build.name(Quantity("mu", "J", "chemical potential per bond", tag="e:muc"), M / bond.density)
-    quantity = Quantity(f"mu_{name}", "J", f"chemical potential of {name} per site", tag="e:muc")
-    return build.name(quantity, M / bond.density, output=False)
+    yield Caution(where(g_n > TOUCHING, -formed * rate, 0), text)
 
 
 def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
@@ -210,14 +195,14 @@ def _relaxation(build: Build, names: Iterable[str], law: RateLaw, rate: Expressi
     return sum((-nu * derivative(rate, bond.symbol) / bond.density for bond, nu in changes), symengine.Integer(0))
 
 
-def _from_neighbours(build: Build, found: Sequence[Reaction], rates: Mapping[str, Expression]) -> Iterator[Power]:
+def _from_neighbours(build: Build, found: Sequence[Reaction]) -> Iterator[Power]:
     """The enthalpy and the entropy that reactions take from neighbours."""
     heat, entropy = [], []
     for item in found:
         if item.law.taken:
             h, g = (build.variables.call(item.law, formula) for formula in item.law.taken)
-            heat.append(build.stretch * rates[item.label] * h)
-            entropy.append(build.stretch * rates[item.label] * (h - g))
+            heat.append(build.stretch * item.rate * h)
+            entropy.append(build.stretch * item.rate * (h - g))
     if heat:
         text = "enthalpy of what reactions take from neighbours"
         power = build.name(Quantity("q_n", "W/m^2", text), symengine.Add(*heat))

@@ -96,22 +96,27 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
     thermal = build.thermal
     yield from (_temperature_state(build, node) for node in thermal.free)
     own_rows = {node.name: build.energy_row(node) for node in thermal.free}
-    for node in thermal.free:
-        yield from _temperature_margins(build, node, own_rows[node.name])
     # The row of the interface's node is the sum of all; where it has none that is free, that of the first.
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
-    for node in thermal.nodes.values():
-        if not node.prescribed:
-            continue
-        yield _warm(node)
-        if node.energies:
-            build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
-        supply = build.energy_row(node)
-        if supply != 0:
-            text = f"heat supplied to keep {node.name}"
-            symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", text), supply)
-            yield Power(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)
+    for node in (*thermal.free, *(node for node in thermal.nodes.values() if node.prescribed)):
+        yield Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
+        if node.prescribed:
+            if node.energies:
+                build.rate_of(node.name)  # refuses a jump, whose heat would be unknown
+            supply = build.energy_row(node)
+            if supply != 0:
+                text = f"heat supplied to keep {node.name}"
+                symbol = build.name(Quantity(f"Q_{node.name}", "W/m^2", text), supply)
+                yield Power(HEAT, OUTSIDE, node.name, symbol, f"H_{node.name}", text, entropy=symbol / node.T)
+        elif balances.second(node.free_energy, node.T) == 0:
+            yield _fold_margin(build, node, own_rows[node.name])
+        elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
+            capacity = balances.conditioned(node.capacity(), build.about)
+            quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {thermal.owners(node)}")
+            symbol = build.name(quantity, capacity)
+            reason = f"the heat capacity at {node.name} was lost"
+            yield Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface")
     if not (build.states or thermal.slabs):
         message = "there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve."
         raise InputError(message, Place(path="bodies"))
@@ -132,7 +137,9 @@ def _temperature_state(build: Build, node: Node) -> State:
             f"initial {node.name} = {initial:g} K is not an absolute temperature above zero.",
             path=f"initial.{node.name}",
         )
-    quantity = VARIABLES.get(node.name, Quantity(node.name, "K", f"temperature of {_members(build, node)}", node.name))
+    quantity = VARIABLES.get(
+        node.name, Quantity(node.name, "K", f"temperature of {build.thermal.owners(node)}", node.name)
+    )
     return State(quantity, node.T, node.T_dot, initial, initial, algebraic, is_temperature=True)
 
 
@@ -157,10 +164,6 @@ def _initial(build: Build, node: Node) -> float:
     return T
 
 
-def _members(build: Build, node: Node) -> str:
-    return " and ".join(member for member, name in build.thermal.members.items() if name == node.name)
-
-
 def _guess(build: Build, node: Node) -> float:
     """Start value for an algebraic interface temperature: what is given, or the mean of the bodies."""
     initial, bodies = build.scene.initial, build.scene.bodies
@@ -169,22 +172,6 @@ def _guess(build: Build, node: Node) -> float:
     known = [initial[name] for body in bodies if (name := build.thermal.members[body.name]) in initial]
     known += [body.temperature.at_start() for body in bodies if isinstance(body.temperature, Load)]
     return sum(known) / len(known) if known else float(build.scene.T_0 or 300.0)
-
-
-def _warm(node: Node) -> Margin:
-    return Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
-
-
-def _temperature_margins(build: Build, node: Node, row: Expression) -> Iterator[Margin]:
-    yield _warm(node)
-    if balances.second(node.free_energy, node.T) == 0:
-        yield _fold_margin(build, node, row)
-    elif INTERFACE in node.energies and balances.second(build.psi, node.T) != 0:
-        capacity = balances.conditioned(node.capacity(), build.about)
-        quantity = Quantity(f"C_{node.name}", "J/(m^2 K)", f"heat capacity of {_members(build, node)}")
-        symbol = build.name(quantity, capacity)
-        reason = f"the heat capacity at {node.name} was lost"
-        yield Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface")
 
 
 def _fold_margin(build: Build, node: Node, row: Expression) -> Margin:
