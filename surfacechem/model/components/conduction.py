@@ -17,7 +17,7 @@ from surfacechem.contracts.terms import Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression
 from surfacechem.model import balances
-from surfacechem.model.balances import HEAT, Node, Power
+from surfacechem.model.balances import HEAT, SURROUNDINGS, Node, Power
 from surfacechem.model.build import BOTH, Build
 from surfacechem.model.parts import Slab, Thermal
 from surfacechem.model.system import Conductor, Profile, State
@@ -29,50 +29,32 @@ def variables(build: Build) -> Iterator[Power | Thermal]:
     """Divide the bodies that conduct, and let heat flow along them."""
     thermal = build.thermal
     for number, body in enumerate(build.scene.bodies, start=1):
-        if body.conduction is None:
+        law = body.conduction
+        if law is None:
             continue
-        bound = _bound(build, number, body, body.conduction)
-        resistance = bound.thickness / bound.conductivity
-        thermal = replace(thermal, resistances={**thermal.resistances, body.name: resistance})
-        if body.conduction.cells:
-            slab, thermal = _divided(build, thermal, number, body, body.conduction)
+        _check(build, body, law)
+        # At the reference state; along the body each place has the factors of its own temperature.
+        reference = law.conductivity.value if isinstance(law.conductivity, Varying) else law.conductivity
+        path = f"bodies.{body.name}.conduction"
+        bound = build.variables.bind(replace(law, conductivity=reference), path, f"_{number}")
+        resistances = {**thermal.resistances, body.name: bound.thickness / bound.conductivity}
+        thermal = replace(thermal, resistances=resistances)
+        if law.cells:
+            slab, thermal = _divided(build, thermal, number, body, law)
             yield from _conduct(build, slab, thermal.node_of[body.name], bound)
     yield thermal
 
 
-def _bound(build: Build, number: int, body: Body, law: Conduction) -> Conduction:
-    """The law with symbols for its parameters, its conductivity at the reference state."""
+def _check(build: Build, body: Body, law: Conduction) -> None:
+    """A body that conducts stores heat, and one with a far side has cells."""
     if body.energy is None:
         raise InputError(f"{body.name} conducts heat but stores none: give it a heat capacity C.", law.place)
     for path in build.scene.heat:
-        if set(path.between) == {body.name, "surroundings"} and law.cells:
+        if set(path.between) == {body.name, SURROUNDINGS} and law.cells:
             text = f"a path from {body.name} to the surroundings would end at its contact. Say `far` in `conduction`."
             raise InputError(text, path.place)
     if law.far is not None and not law.cells:
         raise InputError(f"{body.name} is one lump, so it has no far side. Give it cells, or a heat path.", law.place)
-    return build.variables.bind(
-        replace(law, conductivity=_reference(law)), f"bodies.{body.name}.conduction", f"_{number}"
-    )
-
-
-def _conductors(build: Build) -> Iterator[Conductor]:
-    """What it takes to judge whether a body may be one lump."""
-    for number, body in enumerate(build.scene.bodies, start=1):
-        law = body.conduction
-        if law is None:
-            continue
-        node, ends = build.thermal.node_of[body.name], build.conductances
-        F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
-        paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
-        alone = sum(other is node for other in build.thermal.node_of.values()) == 1
-        yield Conductor(
-            number,
-            body.name,
-            not law.cells,
-            build.thermal.resistances[body.name],
-            -node.T * balances.second(F, node.T),
-            symengine.Add(*paths) if alone else None,
-        )
 
 
 def _divided(build: Build, thermal: Thermal, number: int, body: Body, law: Conduction) -> tuple[Slab, Thermal]:
@@ -129,10 +111,6 @@ def _conduct(build: Build, slab: Slab, surface: Node, bound: Conduction) -> Iter
     yield from flows[1:]
 
 
-def _reference(law: Conduction) -> float:
-    return law.conductivity.value if isinstance(law.conductivity, Varying) else law.conductivity
-
-
 def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression) -> Callable[[Expression], Expression]:
     """Conductivity as a function of the temperature where it is asked for."""
     given = slab.law.conductivity
@@ -159,31 +137,45 @@ def _conductivity(build: Build, slab: Slab, surface: str, reference: Expression)
 
 def outputs(build: Build) -> Iterator[State | Profile | Conductor]:
     """The balances and states of the nodes inside the bodies, behind all others."""
-    yield from _conductors(build)
+    for number, body in enumerate(build.scene.bodies, start=1):
+        if body.conduction is not None:
+            yield _conductor(build, number, body, body.conduction)
     for slab in build.thermal.slabs.values():
-        surface, initial = build.thermal.node_of[slab.body.name], build.scene.initial.get(slab.profile)
-        start = slab.profile if initial is not None else surface.name
-        if initial is None and surface.prescribed:
-            text = f"nothing gives the temperature inside {slab.body.name}. Add `{slab.profile}:` under `initial`."
-            raise InputError(text, slab.law.place)
-        value = initial if initial is not None else build.initial(surface.name)
-        if not value > 0:
-            message = f"initial {start} = {value:g} K is not an absolute temperature above zero."
-            raise InputError(message, path=f"initial.{start}")
-        for i, node in enumerate(slab.inner, start=1):
-            build.rows.balance(node.name, build.energy_row(node))
-            text = f"temperature of {slab.body.name}, point {i} from the contact"
-            quantity = Quantity(node.name, "K", text)
-            yield State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
-        law, last = slab.law, slab.behind[-1]
-        thickness = f"{law.path if law.place else f'bodies.{slab.body.name}.conduction'}.thickness"
-        yield Profile(
-            number=slab.number,
-            body=slab.body.name,
-            points=slab.points,
-            thickness=thickness,
-            surface=surface.name,
-            anchored=not surface.prescribed,
-            states=tuple(node.name for node in slab.inner),
-            far=last.name if last.prescribed else "",
-        )
+        yield from _profile(build, slab)
+
+
+def _conductor(build: Build, number: int, body: Body, law: Conduction) -> Conductor:
+    """What it takes to judge whether a body may be one lump."""
+    node, ends = build.thermal.node_of[body.name], build.conductances
+    F = node.energies[body.name] / build.thermal.volume(body.name)[body.name]
+    paths = [h for pair, several in ends.items() if body.name in pair or pair == BOTH for h in several]
+    alone = sum(other is node for other in build.thermal.node_of.values()) == 1
+    resistance, capacity = build.thermal.resistances[body.name], -node.T * balances.second(F, node.T)
+    return Conductor(number, body.name, not law.cells, resistance, capacity, symengine.Add(*paths) if alone else None)
+
+
+def _profile(build: Build, slab: Slab) -> Iterator[State | Profile]:
+    surface, initial = build.thermal.node_of[slab.body.name], build.scene.initial.get(slab.profile)
+    start = slab.profile if initial is not None else surface.name
+    if initial is None and surface.prescribed:
+        text = f"nothing gives the temperature inside {slab.body.name}. Add `{slab.profile}:` under `initial`."
+        raise InputError(text, slab.law.place)
+    value = initial if initial is not None else build.initial(surface.name)
+    if not value > 0:
+        message = f"initial {start} = {value:g} K is not an absolute temperature above zero."
+        raise InputError(message, path=f"initial.{start}")
+    for i, node in enumerate(slab.inner, start=1):
+        build.rows.balance(node.name, build.energy_row(node))
+        quantity = Quantity(node.name, "K", f"temperature of {slab.body.name}, point {i} from the contact")
+        yield State(quantity, node.T, node.T_dot, value, value, algebraic=False, start=start, is_temperature=True)
+    last = slab.behind[-1]
+    yield Profile(
+        number=slab.number,
+        body=slab.body.name,
+        points=slab.points,
+        thickness=f"{slab.law.path if slab.law.place else f'bodies.{slab.body.name}.conduction'}.thickness",
+        surface=surface.name,
+        anchored=not surface.prescribed,
+        states=tuple(node.name for node in slab.inner),
+        far=last.name if last.prescribed else "",
+    )
