@@ -22,7 +22,7 @@ from surfacechem.model.components.pairs import Opposed, by_affinity, dead_load, 
 from surfacechem.model.constraints.bound import bound
 from surfacechem.model.constraints.envelope import softening
 from surfacechem.model.constraints.unilateral import TOUCHING
-from surfacechem.model.system import Account, Capped, Caution
+from surfacechem.model.system import Account, Capped, Caution, Pair
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import MOMENT
 
@@ -49,7 +49,7 @@ class Reaction:
     """Net rate per current area [1/(m^2 s)]."""
 
 
-def laws(build: Build) -> Iterator[Power | Account | Caution]:
+def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
     mu = {}
     for name, bond in build.bonding.items():
@@ -69,7 +69,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution]:
         power = build.stretch * item.rate * item.affinity
         dissipated[item.account] = dissipated.get(item.account, 0) - power
         yield from _across_an_open_gap(build, item.law, item.rate)
-        own_departure(build, item.label, item.law, item.affinity)
+        yield from own_departure(build, item.label, item.law, item.affinity)
     for account, power in dissipated.items():
         yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
     yield from _from_neighbours(build, found)
@@ -78,7 +78,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution]:
         text = "work of the prescribed force on bonds"
         yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*work), "W_f", text)
     for pair in pairs:
-        departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
+        yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
     for name, bond in build.bonding.items():
         change = sum((item.law.stoichiometry().get(name, 0) * item.rate for item in found), symengine.Integer(0))
         build.rows.sites(name, change, bond.density, build.stretch)

@@ -22,7 +22,7 @@ Rev. 37, 405, under a load.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,27 +91,26 @@ def opposed(laws: Mapping[str, RateLaw]) -> list[Opposed]:
     return groups
 
 
-def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> None:
-    """Name what the rates of one-way laws lack to balance where the affinity vanishes; rates from outside are not."""
+def departure(build: Build, group: Opposed, mu: Mapping[str, Expression]) -> Iterator[Pair]:
+    """What the rates of one-way laws lack to balance where the affinity vanishes; rates from outside are not known."""
     if any(law.log_rate is None for law in (*group.forward.values(), *group.backward.values())):
         return
-
-    def log_rate(laws: Iterable[RateLaw]) -> Expression:
-        return log_sum([build.variables.call(law, law.log_rate) for law in laws if law.log_rate is not None])
-
+    forward, backward = (
+        log_sum([build.variables.call(law, law.log_rate) for law in laws.values()])
+        for laws in (group.forward, group.backward)
+    )
     affinity = sum(n * mu[name] for name, n in group.change.items())
-    log_ratio = log_rate(group.forward.values()) - log_rate(group.backward.values())
-    _name_departure(build, group.label, f"{group.title} (pair)", log_ratio, affinity)
+    yield _departure(build, group.label, f"{group.title} (pair)", forward - backward, affinity)
 
 
-def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> None:
+def own_departure(build: Build, label: str, law: RateLaw, affinity: Expression) -> Iterator[Pair]:
     """The same for a law that states its rates both ways, where the potential knows of the reaction at all."""
     known = any(depends(build.psi, build.bonding[name].symbol) for name in law.stoichiometry())
     if law.log_ratio is not None and known:
-        _name_departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
+        yield _departure(build, label, law.title, build.variables.call(law, law.log_ratio), affinity)
 
 
-def _name_departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> None:
+def _departure(build: Build, label: str, title: str, log_ratio: Expression, affinity: Expression) -> Pair:
     T = build.variables.get("T_c", "the equilibrium of a reaction")
     value = build.expanded(log_ratio + affinity / (BOLTZMANN * T))
     inside = {}  # coverages within bounds where their logarithms and those of their complements exist
@@ -120,37 +119,36 @@ def _name_departure(build: Build, label: str, title: str, log_ratio: Expression,
         inside[bond.symbol] = where(bond.symbol > LEAST_COVERAGE, below, LEAST_COVERAGE)
     quantity = Quantity(f"departure_{label}", "1", f"ln(k_f/k_r) - ln K(g, T) of {title}")
     build.name(quantity, value.subs(inside))
-    build.notes.append(Pair(quantity.name, title, label))
+    return Pair(quantity.name, title, label)
 
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
     shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
     if not (driven(build, "f") or (shares and driven(build, "t_n"))):
-        _refuse_idle_length(laws.values())
+        idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
+        if idle is not None:
+            message = (
+                f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to "
+                "the equilibrium; leave it out."
+            )
+            raise InputError(message, idle.place)
         return {}
     # A rate that feels the force while its reverse follows from the affinity, without the work.
     unknown = next((law for law in laws.values() if law.lacks_length), None)
     if unknown is not None:
-        if _is_held_at_zero(build):
-            return {}
-        raise _unknown_length(unknown)
+        load = build.scene.loading.get("f")
+        if not isinstance(load, Load) or getattr(load, "level", None) != 0.0:
+            raise _unknown_length(unknown)
+        # Held at zero it does no work, and is a number: any other force is assembled anew.
+        build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
+        return {}
     found = lengths(laws, pairs)
     if not found:
         return {}
     f, bonds = build.variables.get("f", "the work of the force"), {name: build.bonding[name] for name in found}
-    load = -f * sum(bond.density * bond.symbol * found[name] for name, bond in bonds.items())
-    return {name: derivative(load, bond.symbol) / bond.density for name, bond in bonds.items()}
-
-
-def _refuse_idle_length(laws: Iterable[RateLaw]) -> None:
-    idle = next((law for law in laws if law.length is not None and law.log_ratio is None), None)
-    if idle is not None:
-        message = (
-            f"x_on of {idle.name()} belongs to a prescribed force. Here the potential says what the force does to the "
-            "equilibrium; leave it out."
-        )
-        raise InputError(message, idle.place)
+    potential = -f * sum(bond.density * bond.symbol * found[name] for name, bond in bonds.items())
+    return {name: derivative(potential, bond.symbol) / bond.density for name, bond in bonds.items()}
 
 
 def _unknown_length(law: RateLaw) -> InputError:
@@ -162,15 +160,6 @@ def _unknown_length(law: RateLaw) -> InputError:
         f"how far a bond lets the load down as it forms is not known. {remedy}.",
         law.place,
     )
-
-
-def _is_held_at_zero(build: Build) -> bool:
-    """Whether the case holds the force at zero, where it does no work. Any other force is assembled anew."""
-    load = build.scene.loading.get("f")
-    if not isinstance(load, Load) or getattr(load, "level", None) != 0.0:
-        return False
-    build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
-    return True
 
 
 def by_affinity(law: RateLaw) -> bool:
