@@ -111,6 +111,7 @@ def option(text: str, *, default: Any = dataclasses.MISSING) -> Any:
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option))
+# Two laws with the same numbers are two terms of a scene: they compare by identity.
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law(ABC):
     """A named law with parameters as fields. Subclasses become frozen, keyword-only dataclasses."""
@@ -134,6 +135,7 @@ class Law(ABC):
         """Check every numeric parameter against its range."""
         for name, spec in self.specs():
             value = getattr(self, name)
+            # Symbols, which `bind` puts in, have no value to check.
             if isinstance(value, Varying):
                 spec.check(name, value.value)
             elif isinstance(value, int | float):
@@ -228,6 +230,7 @@ class Law(ABC):
 
     def bind(self, values: Mapping[str, Expression]) -> Self:
         """The same law with some of its parameters replaced, by symbols for instance; nothing is checked."""
+        # Not `replace`, which would check symbols against ranges.
         bound = copy.copy(self)
         for name, value in values.items():
             object.__setattr__(bound, name, value)
@@ -244,6 +247,7 @@ class Varying:
 
 def reads(formula: Callable[..., Expression]) -> tuple[str, ...]:
     """The quantities a law's formula reads: the names of its arguments."""
+    # A law says what it reads by the arguments of its formula alone, so that nothing is declared twice.
     return tuple(inspect.signature(formula).parameters)
 
 
@@ -410,6 +414,7 @@ class RateLaw(Law):
     @property
     def one_way(self) -> bool:
         """Whether the law runs one way only."""
+        # A rate that vanishes with the affinity has no logarithm.
         return self.log_rate is not None
 
     def turnover(self) -> Mapping[str, int | float]:

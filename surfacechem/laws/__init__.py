@@ -49,6 +49,7 @@ def laws(contract: type[Law]) -> dict[str, type[Law]]:
 
 def find(contract: type[Law], name: str) -> type[Law]:
     """The law of that name; imports no family beyond the one that holds it."""
+    # One family after the other, so that a case imports no more than those before its own.
     for family in FAMILIES[contract]:
         for law in _in_module(contract, family):
             if law.name() == name:

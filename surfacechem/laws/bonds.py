@@ -60,6 +60,7 @@ class StatedBothWays(RateLaw):
     @property
     def log_ratio(self) -> Callable[..., Expression] | None:
         """Logarithm of the rate of formation over that of rupture; None where no bonds form."""
+        # A symbol stands for a number that may be changed, so that bonds may form.
         k_on = vars(self)["k_on"]
         return self._log_ratio if is_symbolic(k_on) or k_on else None
 
@@ -90,6 +91,7 @@ class Bell(StatedBothWays):
     @property
     def length(self) -> Expression | None:
         """What the two distances to the transition state differ by, where bonds form too."""
+        # Bonds that never form do no work on forming.
         return None if self.log_ratio is None else self.x_on - self.x_off
 
     def log_on(self, f: Expression, T_c: Expression) -> Expression:
@@ -145,6 +147,7 @@ class ReversibleBell(RateLaw):
     def rate(self, phi: Expression, n_c: Expression, f: Expression, T_c: Expression, mu: Expression) -> Expression:
         """Net rate [1/(m^2 s)]."""
         breaking = Bell(k_off=self.k_off, x_off=self.x_off).log_off(f, T_c) + log_fraction(phi)
+        # Rupture and formation in one function: near equilibrium they are equal but for their last digits.
         return n_c * scaled_expm1(self.k_off, -mu / (BOLTZMANN * T_c), breaking)
 
 
@@ -295,6 +298,7 @@ class DudkoHummerSzabo(StatedBothWays):
         """
         height = self.barrier / (BOLTZMANN * T_c)
         tilt = 1 - self.nu * f * self.x_off / self.barrier
+        # Beyond its largest value the formula would fall again, though nothing is left to hold the bond.
         lowest = power((1 - self.nu) / height, self.nu) + FRACTION_FLOOR
         s = where(tilt > lowest, tilt, lowest)
         return (1 / self.nu - 1) * log(s) + height * (1 - s ** (1 / self.nu))

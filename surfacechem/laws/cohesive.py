@@ -51,6 +51,7 @@ class ExponentialCohesiveZone(TangentialPotential):
     def energy(self, g_n: Expression, g_t: Expression | None = None) -> Expression:
         """Free energy [J/m^2]."""
         touching, contact = math.e * self.t_max * self.g_0, self.E_n * g_n**2 / 2
+        # Without shear no root is needed, whose slope at a closed zone is rounding.
         if g_t is None or g_t == 0:
             return where(g_n > 0, -touching * _separated(g_n / self.g_0), contact - touching)
         square = where(g_n > 0, g_n**2, 0) + g_t**2
@@ -211,6 +212,7 @@ class CompliantDebonding(RateLaw):
     def envelope(self, g_n: Expression) -> Expression:
         """Bonding state that the gap leaves; it falls through zero where the last bonds break."""
         start = self.peak()
+        # Closed bonds are whole: below half the gap at the strength the envelope is not looked at.
         gap = where(g_n > start / 2, g_n, start / 2)
         return start / gap * (self.g_f - gap) / (self.g_f - start)
 

@@ -102,6 +102,7 @@ class CooperMikicYovanovich(UnderPressure, HeatTransfer):
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """Where the correlation was fitted."""
+        # A hardness that varies is taken at its reference value: a range is a hint, no law.
         return {"p": (1e-6 * _value(self.H), 2.3e-2 * _value(self.H))}
 
     def conductance(self, p: Expression) -> Expression:

@@ -99,6 +99,7 @@ class RarefiedFilm(HeatTransfer):
         """Thermal resistances of the jump at each wall, and of the gas between [m^2 K/W]."""
         mean_free_path = eta_m * sqrt(math.pi / (2 * p_m * rho_m))
         prandtl = eta_m * cp_m / k_m
+        # Temperature jumps are like more gas: each wall has a resistance of so much thickness.
         jump = 2 * gamma_m / (gamma_m + 1) * mean_free_path / prandtl
         first, second = ((2 - alpha) / alpha * jump / k_m for alpha in (self.alpha_1, self.alpha_2))
         return first, (positive(d_m) + self.Y) / k_m, second

@@ -104,6 +104,7 @@ class Stribeck(UnderPressure, Friction):
 
     def traction(self, p: Expression, v: Expression, direction: Expression) -> Expression:
         """Tangential traction [Pa]."""
+        # Without the guard of exp, since the exponent is never positive: slopes combine with their like.
         fall = decay(power(absolute(v) / self.v_s, self.delta))
         return (self.mu_k + (self.mu_s - self.mu_k) * fall) * p * direction + self.c_v * v
 
@@ -189,6 +190,7 @@ class RateAndState(UnderPressure, Friction):
 
     def drive(self, v: Expression, ln_theta: Expression) -> Expression:
         """Traction at a velocity in units of the direct effect, a p."""
+        # The exponential may be beyond the doubles where the product is not: a contact of a year at rest.
         return asinh_exp(v / (2 * self.v_0), self._strength(ln_theta))
 
     def velocity(self, drive: Expression, ln_theta: Expression) -> Expression:
@@ -242,6 +244,7 @@ class RateAndStateSlip(RateAndState):
     def evolution(self, v: Expression, ln_theta: Expression) -> Mapping[str, Expression]:
         """Rate of the logarithm of the age [1/s]."""
         speed = absolute(v)
+        # Of a velocity of zero the logarithm would be infinite, and the product with it zero.
         moving = where(speed > SLOWEST, speed, SLOWEST + 0 * speed)
         return {"ln_theta": -speed / self.L * (log(moving / self.L) + ln_theta)}
 

@@ -95,6 +95,7 @@ class GapConductance(HeatTransfer):
 
     def spots(self, g_n: Expression) -> Expression:
         """Conductance of the contact spots [W/(m^2 K)]."""
+        # The three add up to the formula of the whole, so that each is a flux of its own.
         return self.h_0 * self._held(g_n)
 
     def gas(self, g_n: Expression) -> Expression:

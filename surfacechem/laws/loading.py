@@ -114,6 +114,7 @@ class Table(Load):
 
     def piece(self, start: float) -> Mapping[str, float]:
         """Origin, level and slope of the line that holds from ``start`` on."""
+        # Of a time given twice the later value holds from there on.
         j = bisect_right(self.times, start) - 1
         if j < 0 or j + 1 >= len(self.times):
             edge = max(j, 0)

@@ -181,6 +181,7 @@ class VanDerWaalsFlatFlat(Attraction):
     def energy(self, g_n: Expression) -> Expression:
         """Free energy [J/m^2]."""
         distance = _outside(g_n) + self.D_0
+        # A constant traction below contact: the energy goes on along its tangent.
         contact = (2 * g_n / self.D_0 - 1) / self.D_0**2
         return self.A_H / (12 * math.pi) * where(g_n > 0, -1 / distance**2, contact)
 
@@ -274,6 +275,7 @@ def _repelling(x: Expression, *terms: tuple[int, int]) -> Expression:
     level, slope, curvature = (
         sum(math.prod(-n - i for i in range(order)) * WALL ** (-n - order) / d for d, n in terms) for order in range(3)
     )
+    # Of floats both branches are evaluated, and the powers of a small gap overflow.
     inside, beyond = x if is_symbolic(x) else max(x, WALL), x - WALL
     powers = sum(inside**-n / d for d, n in terms)
     return where(x > WALL, powers, level + beyond * (slope + beyond * curvature / 2))

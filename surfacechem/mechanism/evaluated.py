@@ -55,6 +55,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> N
             raise InputError(problem, state.place)
         if state.composition:
             phase.X = dict(state.composition)
+        # At the temperature that it has: the engine brings it to that of the interface.
         if state.pressure is not None:
             phase.TP = phase.T, state.pressure
         phase.electric_potential = state.electric_potential

@@ -66,6 +66,7 @@ class EnergyCurve:
         if not self.pieces:
             return 0.0
         slopes = [coefficients[1] for _, coefficients in self.pieces]
+        # Straight but for rounding of the numbers, which a file may give with nine digits.
         size = SAME * max(map(abs, slopes))
         straight = all(abs(c) <= size for _, coefficients in self.pieces for c in (coefficients[0], *coefficients[2:]))
         return slopes[0] if straight and max(slopes) - min(slopes) <= size else None
@@ -180,6 +181,7 @@ def _numbers(source: Source, entry: Any, node: Any, key: str) -> list[float]:
     """One value or several, in J, mol and K."""
     import cantera
 
+    # The keys tell energies from entropies: "enthalpies" and all that begin so.
     value, unit = node[key], "J/kmol" if key.startswith("enthalp") else "J/kmol/K"
     declared: Any = {**source.defaults(entry), **(node.get("units") or {})}
     units = cantera.UnitSystem(declared)

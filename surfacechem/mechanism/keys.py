@@ -145,6 +145,7 @@ class Check:
         source, phase = self.source, self.phase
         parts = ((part, key) for part in source.phases for key in ("species", "reactions"))
         declared = {name for part, key in parts for name in sections(part.get(key, "all"), key)}
+        # Sections that another phase of the file uses are known, though not looked into.
         self._keys(source.data, {*FILE, *declared}, "the file")
         self._units(source.data)
         self._phase()
@@ -272,6 +273,7 @@ class Check:
         self._units(entry)
         if "equation" not in entry:
             raise error("a reaction has no `equation`.", entry)
+        # First whether any type has the keys, then whether this one has: the guess is among all.
         law = self._rate_type(entry, title)
         for key in entry:
             if key not in {*REACTION, *_own(law)}:
@@ -320,6 +322,7 @@ class Check:
             kind = entry["type"]
             message = f"{title}: a rate of type '{kind}' belongs to surface species; this one has a neighbour's."
             raise self.source.error(message, entry, "type")
+        # Another extension has keys of its own.
         if not _is_foreign(entry):
             inner = {**InterfaceArrhenius.keys, **STICKING, **CHARGED}
             self._keys(entry, {*REACTION, *inner}, title)

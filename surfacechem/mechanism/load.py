@@ -96,8 +96,10 @@ def load_mechanism(
     path = _find(Path(path), place)
     source = Source(name or str(path), document.read(path, name, LIMITS))
     entry = source.phase(phase, place)
+    # Before Cantera, which ignores what it does not know.
     Check(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
+    # Before the reactions are looked at, whose remarks depend on what neighbours hold.
     hold(surface, neighbours, place)
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))

@@ -115,6 +115,7 @@ class AffinityReaction(LawReaction):
         return Formula(names, lambda values: self.net(self._forward(values), values["mu"], values["T_c"]))
 
     def _forward(self, values: Mapping[str, Expression], shift: Expression = 0) -> Expression:
+        # Amounts at full coverage: how much is there is in the affinity already.
         product = self.coefficient(values, shift)
         for item in self.species:
             product *= values[item.concentration] ** plain(self.orders.get(item.variable, 0))
@@ -171,6 +172,7 @@ def _made(law: type[RateLaw], rate_type: RateType) -> type[LawReaction]:
     for name, source in parameters.items():
         spec = given[source].metadata["spec"]
         if name in rate_type.ratios:
+            # The law has a constant of one here, so that the others are ratios to Arrhenius.
             spec = replace(spec, unit="1", text=f"{spec.text}, over the rate constant")
         own[name] = field(default=MISSING if name in renamed else given[source].default, metadata={"spec": spec})
     text = inspect.getdoc(getattr(law, rate_type.method)) or ""

@@ -45,6 +45,7 @@ class CoverageTerm:
         energy: Expression = 0
         for coefficient in reversed(self.E):  # Horner, from the first power on: without coverage there is no energy
             energy = theta * (energy + coefficient)
+        # Cantera's three dependences in one exponent, which cannot overflow in parts.
         value = self.a * math.log(10) * theta - energy / (GAS_CONSTANT * T)
         if self.m:
             value += self.m * log(floored(theta))
@@ -201,6 +202,7 @@ class InterfaceArrhenius(MechanismReaction):
     def _formula(self, evaluate: Callable[[Mapping[str, Expression]], Expression]) -> Formula:
         # The affinity reads the gap that stretches what changes, and the coverages around it.
         changing = self._changing() if self.reversible else []
+        # A formula reads no more than it needs: what nobody reads is not in the equations.
         gap = ("g_n",) if any(item.spring for item in changing) else ()
         own = (name for item in self.species for name in (item.variable, item.concentration))
         around = (x.variable for item in changing for x in item.interactions)

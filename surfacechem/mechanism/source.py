@@ -146,6 +146,7 @@ class Source:
             found = converted(units, value if isinstance(value, str) else float(value), spec.unit)
             spec.check(key, found)
         except InputError as error:
+            # Errors of the range name the key already.
             named = error.message if error.message.startswith(key) else f"{key}: {error.message}"
             raise self.error(f"{title}{named}", node, key) from None
         except (cantera.CanteraError, ValueError):
@@ -242,6 +243,7 @@ def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
     >>> sides("2 a(s) + b(s) => c(s)")
     ({'a(s)': 2.0, 'b(s)': 1.0}, {'c(s)': 1.0}, False)
     """
+    # As Cantera reads it: names may hold any sign, so that only spaces part them.
     words = equation.split()
     arrow = next((word for word in words if word in ARROWS), "")
     middle = words.index(arrow) if arrow else len(words)

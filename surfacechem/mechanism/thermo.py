@@ -152,6 +152,7 @@ class StandardGibbs:
 
     def __call__(self, T: Expression) -> Expression:
         """Value [K] at T [K]."""
+        # From the top down, as conditions nest; beyond its ends the outer forms go on.
         value = self.pieces[-1].form.over_R(T)
         for piece in reversed(self.pieces[:-1]):
             below = piece.top >= T if piece.closed else piece.top > T
@@ -185,5 +186,6 @@ def lower(thermo: Any) -> StandardGibbs:
         return StandardGibbs(tuple(ThermoRange(r[1], Nasa9.of(r[2:]), closed=False) for r in regions))
     form, *starts = TWO_RANGES[model]
     low, high = (c[start : start + 7] for start in starts)
+    # Cantera gives a single range twice.
     below = () if low == high else (ThermoRange(c[0], form.of(low)),)
     return StandardGibbs((*below, ThermoRange(top, form.of(high))))

@@ -65,6 +65,7 @@ class CoolPropFluid(Fluid):
             raise InputError(f"{self.title} has no properties at {T:g} K: {span}.")
         end = f"{self.title} has no known properties"
         boils, condenses = self._saturation(0), self._saturation(1)
+        # Saturation ends the range on the side on which it lies.
         if boils is not None and boils > T:
             return FluidRange(low, boils * (1 - BESIDE), end, f"{self.title} boils")
         if condenses is not None and condenses < T:
