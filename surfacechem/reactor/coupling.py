@@ -18,8 +18,13 @@ import symengine
 from surfacechem.contracts.terms import Load, Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.laws.loading import Hold
+from surfacechem.model.components.interface import LOADABLE
 from surfacechem.model.system import Parameter, System
+from surfacechem.quantities import VARIABLES
 from surfacechem.scene import Body, Scene
+
+FORCES = ("Pa", "N", "W/m^2")
+"""Units of loads that do work or heat at their present value, whatever their rate."""
 
 STAND_IN = """
 phases:
@@ -60,6 +65,16 @@ def with_heat(scene: Scene, names: Iterable[str]) -> Scene:
             raise InputError(f"{heat} has two roles: the case prescribes it, and a wall gives it. Remove one of them.")
         loading[heat] = Hold(level=0.0)
     return replace(scene, loading=loading)
+
+
+def with_loads(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """The scene with loads whose values are given while it runs, in place of those that the case prescribes."""
+    forces = [name for name in LOADABLE if VARIABLES[name].unit in FORCES]
+    for name in values:
+        if name not in forces:
+            reason = "" if name not in LOADABLE else " Its rate takes part; prescribe its history under `loading`."
+            raise InputError(f"'{name}' is no load that a network can give.{suggestion(name, forces)}{reason}")
+    return replace(scene, loading={**scene.loading, **{name: Hold(level=value) for name, value in values.items()}})
 
 
 def with_reactors(scene: Scene, reactors: Mapping[str, Any]) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +24,9 @@ from surfacechem.tolerances import SQRT_EPS, TINY
 
 FOREVER = 1e300
 """End of the last piece of time [s]."""
+
+
+NONE: Mapping[str, Callable[[float], float]] = {}
 
 
 DIFFERENCE = 8 * SQRT_EPS
@@ -50,10 +53,18 @@ class EmbeddedScene:
     the present piece of time.
     """
 
-    def __init__(self, case: Case, reactors: Mapping[str, Any], heated: Iterable[str]) -> None:
+    def __init__(
+        self,
+        case: Case,
+        reactors: Mapping[str, Any],
+        heated: Iterable[str] = (),
+        loads: Mapping[str, Callable[[float], float]] = NONE,
+    ) -> None:
         self.case = case
+        self.loads = {f"loading.{name}.level": function for name, function in loads.items()}
         try:
             scene = coupling.with_heat(coupling.with_reactors(case.scene, reactors), heated)
+            scene = coupling.with_loads(scene, {name: float(function(0.0)) for name, function in loads.items()})
             system, self.reactions = coupling.with_multipliers(assemble(scene))
             _refuse_folds(system)
             self.model = Model(system)
@@ -103,10 +114,22 @@ class EmbeddedScene:
         """Set a parameter of the present piece of time."""
         self.evaluation.parameters[self._position[path]] = value
 
+    def edges_that_read(self, name: str) -> list[str]:
+        """Names of the edges whose guards depend on a load."""
+        system = self.model.system
+        symbol = next(item.symbol for item in system.parameters if item.path == f"loading.{name}.level")
+        return [edge.name for edge in system.edges if depends(system.expand(edge.guard), symbol)]
+
+    def put(self, t: float, x: Array) -> bool:
+        """Go to a time and variables, under the loads of that time; whether a state was found."""
+        for path, function in self.loads.items():
+            self.give(path, float(function(t)))
+        return self.evaluation.put(t, x[: len(self.states)])
+
     def rates(self, t: float, x: Array) -> Array:
         """Time derivatives of the variables; EndError where there are none, or a limit of the scene is passed."""
         evaluation = self.evaluation
-        if not evaluation.put(t, x[: len(self.states)]):
+        if not self.put(t, x):
             raise EndError("no state satisfies the equations")
         closed = self._terminal & ~(evaluation.margins()[: len(self._terminal)] >= 0)
         if closed.any():
@@ -118,11 +141,10 @@ class EmbeddedScene:
     def closest(self, t: float, x: Array) -> str:
         """Why the scene ends where the integrator goes on no more: the limit that has come closest."""
         evaluation, start = self.evaluation, self.start()
-        n = len(self.states)
-        evaluation.put(0.0, start[:n])
+        self.put(0.0, start)
         terminal = np.flatnonzero(self._terminal)
         before = evaluation.margins()[terminal]
-        evaluation.put(t, x[:n])
+        self.put(t, x)
         left = np.abs(evaluation.margins()[terminal]) / np.maximum(np.abs(before), TINY)
         if not len(left) or left.min() > STALLED:
             return "the step size fell to rounding level; the scene may end"
@@ -132,7 +154,7 @@ class EmbeddedScene:
     def quantity(self, name: str, t: float, x: Array) -> float:
         """A state or a named quantity in SI units."""
         evaluation, system = self.evaluation, self.model.system
-        evaluation.put(t, x[: len(self.states)])
+        self.put(t, x)
         found = dict(zip((state.name for state in system.states), evaluation.y, strict=True))
         if name in found:
             return float(found[name])
@@ -159,12 +181,12 @@ class EmbeddedScene:
     def transitions(self, t: float, x: Array) -> Array:
         """Margins of the transitions; that which reaches zero is due."""
         assert self.moments is not None
-        self.evaluation.put(t, x[: len(self.states)])
+        self.put(t, x)
         return self.moments.margins()
 
     def ledger_rates(self, t: float, x: Array) -> Array:
         """Rates of the ledger."""
-        self.evaluation.put(t, x[: len(self.states)])
+        self.put(t, x)
         return self.evaluation.rates()[len(self.states) :]
 
     def moved(self, t: float, x: Array, index: int | None) -> tuple[Array, Array]:
@@ -173,7 +195,7 @@ class EmbeddedScene:
         EndError where the scene ends with it.
         """
         assert self.moments is not None
-        self.evaluation.put(t, x[: len(self.states)])
+        self.put(t, x)
         booked = self.moments.settle() if index is None else self.moments.fire(index)
         if booked is None:
             raise EndError(self.moments.instant.reason)

@@ -27,7 +27,7 @@ class History:
         if self.times and t <= self.times[-1]:
             return
         evaluation, n = self.scene.evaluation, len(self.scene.states)
-        evaluation.put(t, x[:n])
+        self.scene.put(t, x)
         self.times.append(t)
         self.rows.append((evaluation.y.copy(), evaluation.ydot.copy(), x[n:].copy(), evaluation.parameters.copy()))
 

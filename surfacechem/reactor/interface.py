@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -58,7 +58,7 @@ class InterfaceReactor(HeldReactor):
         **_: Any,
     ) -> Self:
         """Read the scene, whose reactions Cantera has to know from the start."""
-        scene = EmbeddedScene(_case(case, overrides), bodies or {}, ())
+        scene = EmbeddedScene(_case(case, overrides), bodies or {})
         made = super().__new__(cls, contents(scene.reactions or ("bond",)), name=name)
         made.scene = scene
         return made
@@ -76,6 +76,7 @@ class InterfaceReactor(HeldReactor):
         self.area, self.bodies = parse(area, "m^2", name="area"), dict(bodies or {})
         AREA.check("area", self.area)
         self.ports: dict[str, Port] = {}
+        self.loads: dict[str, Callable[[float], float]] = {}
         self.passes_breakpoints = False
         """Whether the network looks after breakpoints."""
         self.t = 0.0
@@ -150,16 +151,49 @@ class InterfaceReactor(HeldReactor):
         """A reservoir that has the temperature of a body, or of 'interface'; walls on it give and take its heat."""
         case = self.scene.case
         if name not in self.ports:
-            if self.evaluations:
-                raise InputError(f"a wall on {name} comes too late: put it there before the network runs.")
+            self._refuse_late(f"a wall on {name}")
             node = node_of(case.scene, name)
             if node not in self.scene.states:
                 raise InputError(f"{node} stores no heat, so a wall cannot give it any. Put the wall on a body.")
             port = Port(name, node, f"Q_{suffix_of(case.scene, name)}")
-            self._take_up(EmbeddedScene(case, self.bodies, [*self.ports, name]))
+            self._take_up(EmbeddedScene(case, self.bodies, [*self.ports, name], self.loads))
             self.ports[name] = port
             self.put(self.start())
         return self.ports[name].reservoir
+
+    def load(self, name: str, function: Callable[[float], float]) -> None:
+        """Let a function of time [s] be a load, in SI units, in place of one that the case prescribes.
+
+        Any load that acts by its present value: ``p``, ``F_n``, ``F_t``, ``f``, ``Q_1`` and the like. Where it jumps,
+        end an ``advance`` there and call ``reinitialize`` on the network. InputError for what is no such load.
+        """
+        self._refuse_late(f"the load {name}")
+        loads = {**self.loads, name: function}
+        self._take_up(EmbeddedScene(self.scene.case, self.bodies, self.ports, loads))
+        self.loads = loads
+
+    def press(self, gas: Any, outside: Any) -> None:
+        """Let a reactor press the gap open against another one, ``outside``, and grow as the gap opens.
+
+        The load ``F_n`` is the difference of their pressures, and a wall between them moves as the gap does, so that
+        what the gas loses is work on the interface and on what is outside. InputError where the gap has no rate of its
+        own, or where edges of the scene depend on F_n: they would be located at pressures of the past.
+        """
+        if "g_n" not in self.scene.states:
+            raise InputError("a reactor presses on a gap that has a rate of its own: give it a damper or a mass.")
+        self.load("F_n", lambda _: gas.phase.P - outside.phase.P)
+        read = self.scene.edges_that_read("F_n")
+        if read:
+            raise InputError(
+                f"{read[0]} depends on the load of the gap, which a reactor gives at the ends of steps. Prescribe F_n."
+            )
+        gap = self.scene.states.index("g_n")
+        rate = lambda t: float(self.attempt(lambda: self._rates(t))[gap])  # noqa: E731
+        cantera.Wall(gas, outside, A=self.area, velocity=rate)
+
+    def _refuse_late(self, what: str) -> None:
+        if self.evaluations:
+            raise InputError(f"{what} comes too late: put it there before the network runs.")
 
     # -- the network's view -------------------------------------------------------------------------------------------
 
@@ -307,20 +341,24 @@ class InterfaceReactor(HeldReactor):
         """Mean time of one evaluation of the rates [s], what surrounds the interface included."""
         return self.seconds / max(self.evaluations, 1)
 
+    @property
+    def coupled(self) -> bool:
+        """Whether anything comes from the network or the script."""
+        return bool(self.bodies or self.ports or self.loads)
+
     def record(self, t: float) -> None:
         """Keep the present state, at time t [s], for the dataset."""
         self.t, self._dated = t, True
         self._listen()
         x = self.x
-        if self.scene.moments:
+        if self.scene.moments and not self.coupled:
             x = np.concatenate((x[: len(self.scene.states)], self.ledger))
         self.history.append(t, x)
 
     @property
     def dataset(self) -> xarray.Dataset:
         """What was recorded, with the variables and attributes of a run."""
-        alone = not self.bodies and not self.ports
-        return self.history.solution(self.reason, self.seconds, alone=alone).dataset
+        return self.history.solution(self.reason, self.seconds, alone=not self.coupled).dataset
 
 
 def _case(case: str | Path | Case | Simulation, overrides: Sequence[str] | Mapping[str, object]) -> Case:

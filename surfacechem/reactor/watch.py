@@ -86,8 +86,13 @@ class Watch:
                 self.event = Event(t, item, fired[0])
 
     def book(self, start: float, end: float) -> None:
-        """Integrate the ledgers over a part of the step, which the integrator does not see where nothing else moves."""
+        """Integrate the ledgers over a part of the step, which the integrator does not see where nothing else moves.
+
+        What the network gives is known at the ends of steps only, so the integrator's own ledger counts under it.
+        """
         for item, step in zip(self.interfaces, self._steps, strict=True):
+            if item.coupled:
+                continue
             frequency = max((item.scene.values[path] for path in item.scene.model.system.cycles), default=0.0)
             panels = 1 + int(PANELS_OF_A_PERIOD * frequency * (end - start))
             edges = np.linspace(start, end, panels + 1)

@@ -431,3 +431,82 @@ def test_steady_states(case):
     assert interface["phi"] == pytest.approx(float(end["phi"]), rel=LOOSE)
     with pytest.raises(InputError, match="Use advance_to_steady_state"):
         net.solve_steady()
+
+
+# -- loads from the network --------------------------------------------------------------------------------------------
+
+
+PISTON = """
+title: A plate held by bonds over a chamber
+T_0: 300 K
+bodies:
+  floor: {temperature: 300 K}
+  plate: {temperature: 300 K, stiffness: 1e6 Pa/m}
+interface:
+  temperature: 300 K
+  potential:
+    - exponential-cohesive-zone: {t_max: 50 kPa, g_0: 1 mm, E_n: 1e9 Pa/m}
+mechanics:
+  normal: {c_g: 1e4 Pa s/m}
+loading: {F_n: 0 Pa, w_n: 0 m}
+initial: {g_n: 0 m}
+run: {until: 1 s}
+"""
+
+
+@pytest.mark.parametrize(("case", "name", "form"), [("slow-passage", "F_n", "ramp"), ("stick-slip", "p", "ramp")])
+def test_a_load_given_as_a_function_acts_like_a_history(case, name, form):
+    start, rate = {"F_n": (0.0, 1e12), "p": (1e5, 1e4)}[name]
+    until = 1e-7 if name == "F_n" else 1.2
+    history = f"loading.{name}={{{form}: {{start: {start} Pa, rate: {rate} Pa/s}}}}"
+    expected, net = network(case, overrides=[history])
+    net.advance(until)
+    found, net = network(case)
+    found.load(name, lambda t: start + rate * t)
+    net.advance(until)
+    np.testing.assert_allclose(found.x, expected.x, rtol=LOOSE, atol=LOOSE * np.abs(expected.x).max())
+
+
+def test_what_a_gas_loses_on_a_piston_is_work_on_the_interface_and_outside(tmp_path):
+    (tmp_path / "piston.yaml").write_text(PISTON)
+    air = ct.Solution("air.yaml")
+    air.TP = 300.0, 1.2e5
+    gas = ct.IdealGasReactor(air, clone=True, volume=2e-4)
+    air.TP = 300.0, 1.0e5
+    outside = ct.Reservoir(air, clone=True)
+    interface = InterfaceReactor(tmp_path / "piston.yaml", area=0.01)
+    interface.press(gas, outside)
+    net = ReactorNet([gas, interface])
+    net.rtol = RTOL
+
+    def books():
+        """Energy of the gas [J], and gap [m]."""
+        return gas.mass * gas.phase.int_energy_mass, interface["g_n"]
+
+    net.advance(1e-9)
+    before, closed = books()
+    net.advance(1.0)
+    after, opened = books()
+    assert opened > 1e-4
+    data = interface.dataset
+    work = interface.area * (float(data["work_n"][-1]) + outside.phase.P * (opened - closed))
+    assert before - after == pytest.approx(work, rel=1e-5)
+    assert pytest.approx(interface["F_n"], rel=1e-9) == gas.phase.P - outside.phase.P
+    assert data.attrs["energy_error"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "message"),
+    [
+        ("slow-passage", "w_n", "Its rate takes part; prescribe its history under `loading`"),
+        ("slow-passage", "F_m", "'F_m' is no load that a network can give. Did you mean 'F_n'"),
+    ],
+)
+def test_what_is_no_load_of_a_network_is_refused(case, name, message):
+    with pytest.raises(InputError, match=message):
+        InterfaceReactor(case).load(name, lambda t: t)
+
+
+def test_a_gap_without_a_rate_is_not_pressed():
+    with pytest.raises(InputError, match="a gap that has a rate of its own"):
+        InterfaceReactor("exothermic").press(oven(), oven())
