@@ -102,12 +102,12 @@ class Variables:
         self.roles: list[Role] = []
         self.varying: list[tuple[Law, str, Spec, Expression]] = []
         """Parameters whose factors may carry them out of their range: law, name, range and expression."""
-        self._makers: dict[str, Callable[[], Expression]] = {}
+        self._makers: dict[str, Callable[[], Expression] | Expression] = {}
         self._symbols: dict[str, Expression] = {}
         self._bound: dict[Law, Law] = {}
 
-    def define(self, name: str, make: Callable[[], Expression], role: str, by: str) -> None:
-        """Give a name its role and the way to make its expression; a second role is an error."""
+    def define(self, name: str, make: Callable[[], Expression] | Expression, role: str, by: str) -> None:
+        """Give a name its role and its expression, or the way to make it; a second role is an error."""
         taken = next((r for r in self.roles if r.variable == name), None)
         if taken is not None:
             raise InputError(
@@ -132,7 +132,8 @@ class Variables:
         if name not in self._symbols:
             if name not in self._makers:
                 raise self._missing(name, reader, path)
-            self._symbols[name] = self._makers[name]()
+            made = self._makers[name]
+            self._symbols[name] = made() if callable(made) else made
         return self._symbols[name]
 
     def _missing(self, name: str, reader: str | Law, path: str) -> InputError:

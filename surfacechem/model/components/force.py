@@ -33,36 +33,27 @@ OVERLOAD = "The load breaks all bonds at once: lower `t_n`, or let it grow from 
 def energies(build: Build) -> None:
     """Give the normal traction and the force per bond their roles."""
     g_n = symengine.Symbol("g_n")
-    loaded = depends(build.psi, g_n)
-    if loaded:
-        build.variables.define("t_n", lambda: symengine.Symbol("t_n"), "derived", "the interface's potential")
+    if depends(build.psi, g_n):
+        build.variables.define("t_n", symengine.Symbol("t_n"), "derived", "the interface's potential")
     for name, bond in build.bonding.items():
         if depends(derivative(build.psi, bond.symbol), g_n):
-            variable = "f" if name == "phi" else f"f_{name}"
-            build.variables.define(variable, partial(_elastic, build, variable, name), "derived", ELASTIC)
+            quantity = VARIABLES["f"] if name == "phi" else Quantity(f"f_{name}", "N", f"force per bond of {name}")
+            stretching = derivative(derivative(build.psi, bond.symbol), g_n) / bond.density
+            build.variables.define(quantity.name, partial(build.name, quantity, stretching), "derived", ELASTIC)
     elastic = {role.variable for role in build.variables.roles if role.by == ELASTIC}
     if build.variables.has("t_n") and "f" not in elastic:
         build.variables.define("f", partial(_shared, build), "derived", SHARED)
 
 
-def _elastic(build: Build, variable: str, name: str) -> Expression:
-    bond = build.bonding[name]
-    quantity = VARIABLES["f"] if variable == "f" else Quantity(variable, "N", f"force per bond of {name}")
-    stretching = derivative(derivative(build.psi, bond.symbol), symengine.Symbol("g_n"))
-    return build.name(quantity, stretching / bond.density)
-
-
 def _shared(build: Build) -> Expression:
     """Tension over the bonds that carry it, whose number ends a run where they cannot."""
-    t_n = build.variables.get("t_n", "the force per bond", "interface")
-    n_c = build.variables.get("n_c", "the force per bond", "interface")
-    phi = build.variables.get("phi", "the force per bond", "interface")
-    build.margins.append(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
+    t_n, n_c, phi = (build.variables.get(x, "the force per bond", "interface") for x in ("t_n", "n_c", "phi"))
+    build.add(Margin("t_n", t_n, "the load on the bonds changes its sign", terminal=False))
     carrying = where(phi > FEWEST, phi, FEWEST)
     return build.name(VARIABLES["f"], positive(t_n) / (n_c * carrying))
 
 
-def laws(build: Build) -> None:
+def laws(build: Build) -> Iterator[Margin]:
     """End a run where loaded bonds break faster and faster, and time cannot resolve the rest of it."""
     carriers = list(_carriers(build))
     for name, bonds in carriers:
@@ -76,7 +67,7 @@ def laws(build: Build) -> None:
             # What is left of hardly any bonds cannot be told from rounding.
             left = where(bonds > FEWEST, left, NOTHING)
             which = f"the bonds {name}" if len(carriers) > 1 else "the bonds"
-            build.margins.append(Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface"))
+            yield Margin(f"{name} left", left, f"{which} ruptured", remedy=OVERLOAD, path="interface")
 
 
 def _carriers(build: Build) -> Iterator[tuple[str, Expression]]:

@@ -9,7 +9,7 @@ import symengine
 
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
-from surfacechem.expressions import Expression, absolute, derivative
+from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import Constraint, Equilibrium
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
@@ -19,12 +19,15 @@ from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact,
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
+NONE = symengine.Integer(0)
+G, V = symengine.symbols("g_n v_n")
+
 SOFT = "Give a potential that lets them, such as `penalty`, or a gap that is not negative."
 OVERLAP = "the bodies overlap, and their contact is rigid"
 
 
-def variables(build: Build) -> None:
-    """Give the normal gap its role; where it moves by a balance, it and its velocity become states."""
+def variables(build: Build) -> Iterator[Constraint | Margin | State]:
+    """The normal gap, a state where it moves by a balance, and the rigid contact of bodies that no potential bears."""
     mount = held(build, "n")
     if mount is None:
         return
@@ -37,71 +40,54 @@ def variables(build: Build) -> None:
                 Place(path=mount.by),
             )
         far = far_field(build, mount)
-        pull = far.force(symengine.Integer(0), symengine.Integer(0))
-        closed = build.constrain(contact(pull, _bonded(build)))
-        build.variables.define("g_n", partial(_rigid_gap, build, mount, closed.active), "algebraic", mount.by)
+        closed = contact(far.force(NONE, NONE), _bonded(build))
+        opening = closed.active * (far.w + far.F / far.k)
+        build.variables.define("g_n", partial(build.name, VARIABLES["g_n"], opening), "algebraic", mount.by)
+        yield closed
         _carry(build, closed.reaction)
     else:
-        build.variables.define("g_n", partial(_moving, build, mount), "evolved", mount.by)
-        build.variables.get("g_n", "the mechanics", "mechanics")
+        yield from _moving(build, mount)
         # A law that holds for an open gap only ends the run as the gap closes.
         if meets and not any("g_n" in law.positive for law in (*build.interface.frictions, *build.scene.heat)):
-            _unilateral(build, mount)
-    _refuse_idle_restitution(build, mount)
+            closed = contact(
+                far_field(build, mount).force(NONE, NONE), _bonded(build), G, V if mount.inertial else None
+            )
+            yield closed
+            if mount.inertial:
+                build.motion.gap_rates["g_n"] = closed.active * V
+            initial, spec = build.scene.initial.get("g_n", 0.0), Spec("m", "initial gap")
+            first = build.constant("g_n_i", "initial.g_n", spec, initial, internal=False)
+            yield Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n")
+            _carry(build, closed.reaction)
+    # Only a mass that meets a rigid contact rebounds by a coefficient.
+    if mount.law.e and not (mount.inertial and build.mode("closed") is not None):
+        why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
+        if mount.inertial and not meets:
+            why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
+        message = f"the coefficient of restitution e would change nothing: {why}. Leave it out."
+        raise InputError(message, mount.law.place)
 
 
-def _refuse_idle_restitution(build: Build, mount: Held) -> None:
-    """Only a mass that meets a rigid contact rebounds by a coefficient."""
-    if not mount.law.e or (mount.inertial and build.mode("closed") is not None):
-        return
-    why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
-    if mount.inertial and read_by_potentials(build, "g_n"):
-        why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
-    raise InputError(f"the coefficient of restitution e would change nothing: {why}. Leave it out.", mount.law.place)
-
-
-def _moving(build: Build, mount: Held) -> Expression:
-    symbol, dot = symengine.symbols("g_n dg_n_dt")
+def _moving(build: Build, mount: Held) -> Iterator[State]:
+    """States of a gap that moves by a balance, or the velocity at which dampers let it."""
+    dot, rates = symengine.Symbol("dg_n_dt"), build.motion.gap_rates
     initial = build.scene.initial.get("g_n", 0.0) if mount.quasi_static else build.initial("g_n")
-    build.states.append(State(VARIABLES["g_n"], symbol, dot, initial, LENGTH, algebraic=False))
-    build.motion.gap_rates["g_n"] = dot
+    build.variables.define("g_n", G, "evolved", mount.by)
+    build.variables.get("g_n", "the mechanics")
+    yield State(VARIABLES["g_n"], G, dot, initial, LENGTH, algebraic=False)
+    rates["g_n"] = dot if mount.quasi_static else V
     if mount.inertial:
-        velocity, change = symengine.symbols("v_n dv_n_dt")
-        start = build.scene.initial.get("v_n", 0.0)
-        build.states.append(State(VARIABLES["v_n"], velocity, change, start, LENGTH, algebraic=False))
-        build.variables.define("v_n", lambda: velocity, "evolved", mount.by)
-        build.motion.gap_rates["g_n"] = velocity
+        start, change = build.scene.initial.get("v_n", 0.0), symengine.Symbol("dv_n_dt")
+        build.variables.define("v_n", V, "evolved", mount.by)
+        yield State(VARIABLES["v_n"], V, change, start, LENGTH, algebraic=False)
     elif mount.damped:
-        build.motion.gap_rates["g_n"] = symengine.Symbol("v_n")
-        build.variables.define("v_n", partial(_yielding, build, mount), "derived", mount.by)
-    return symbol
 
+        def yielding() -> Expression:
+            """Given by the state, so that power is linear in rates."""
+            rate = far_field(build, mount).yielding(G, derivative(build.psi, G))
+            return build.name(VARIABLES["v_n"], build.constraint("closed").active * rate)
 
-def _yielding(build: Build, mount: Held) -> Expression:
-    """Velocity at which dampers bear what is out of balance; given by the state, so that power is linear in rates."""
-    g = symengine.Symbol("g_n")
-    yielding = far_field(build, mount).yielding(g, derivative(build.psi, g))
-    return build.name(VARIABLES["v_n"], build.constraint("closed").active * yielding)
-
-
-def _unilateral(build: Build, mount: Held) -> None:
-    """A gap that moves and that no potential bears: closed it stands still and carries any pressure."""
-    far = far_field(build, mount)
-    pull = far.force(symengine.Integer(0), symengine.Integer(0))
-    g, v = symengine.symbols("g_n v_n")
-    closed = build.constrain(contact(pull, _bonded(build), g, v if mount.inertial else None))
-    if mount.inertial:
-        build.motion.gap_rates["g_n"] = closed.active * v
-    initial = build.scene.initial.get("g_n", 0.0)
-    first = build.constant("g_n_i", "initial.g_n", Spec("m", "initial gap"), initial, internal=False)
-    build.margins.append(Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n"))
-    _carry(build, closed.reaction)
-
-
-def _carry(build: Build, traction: Expression) -> None:
-    """What a rigid contact carries, for the laws that read it."""
-    build.variables.define("t_n", partial(_reaction, build, traction), "derived", "equilibrium with the far field")
-    build.variables.define("p", partial(_pressure, build), "derived", "equilibrium with the far field")
+        build.variables.define("v_n", yielding, "derived", mount.by)
 
 
 def _bonded(build: Build) -> Expression:
@@ -110,49 +96,35 @@ def _bonded(build: Build) -> Expression:
     return symengine.Integer(bool(build.interface.limits)) if bonds is None else bonds
 
 
-def _rigid_gap(build: Build, mount: Held, opens: Expression) -> Expression:
-    far = far_field(build, mount)
-    return build.name(VARIABLES["g_n"], opens * (far.w + far.F / far.k))
+def _carry(build: Build, traction: Expression) -> None:
+    """What a rigid contact carries, for the laws that read it."""
+
+    def t_n() -> Expression:
+        build.areal(Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc"), traction)
+        return symengine.Symbol("t_n")
+
+    def p() -> Expression:
+        return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
+
+    build.variables.define("t_n", t_n, "derived", "equilibrium with the far field")
+    build.variables.define("p", p, "derived", "equilibrium with the far field")
 
 
-def _reaction(build: Build, traction: Expression) -> Expression:
-    build.areal(Quantity("t_n", "Pa", "normal traction on body 1", tag="e:cons_tc"), traction)
-    return symengine.Symbol("t_n")
-
-
-def _pressure(build: Build) -> Expression:
-    return build.name(VARIABLES["p"], -build.variables.get("t_n", "the pressure"))
-
-
-def laws(build: Build) -> Iterator[Power | Constraint]:
+def laws(build: Build) -> Iterator[Power | Constraint | Equilibrium | Margin | str]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
     mount = held(build, "n")
     if mount is None:
         return
-    g = build.variables.get("g_n", "the mechanics", "mechanics")
-    far = far_field(build, mount)
+    g, far = build.variables.get("g_n", "the mechanics", "mechanics"), far_field(build, mount)
     if "g_n" not in build.motion.gap_rates:
-        rate = build.total_derivative(g)
-        yield from far.book(build, g, rate)
+        yield from far.book(build, g, build.total_derivative(g))
         return
-    rate = build.motion.gap_rates["g_n"]
-    t_n = derivative(build.psi, g)
+    rate, t_n, closed = build.motion.gap_rates["g_n"], derivative(build.psi, g), build.constraint("closed")
     if not mount.quasi_static:
         build.variables.get("v_n", "the mechanics", "mechanics")
-    if build.mode("closed") is None:
-        closing(build, g)
-    dot = symengine.Symbol("dg_n_dt")
-    yield from far.book(build, g, rate, dot if mount.damped and not mount.inertial else None)
-    if mount.inertial:
-        build.rows.kinematics("g_n", rate)
-        force = far.force(g, rate) - t_n - far.c_g * rate
-        build.rows.momentum("v_n", force, far.m, build.constraint("closed").active)
-    elif mount.damped:
-        build.rows.kinematics("g_n", rate)
-    else:
-        # Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find.
-        residual = far.force(g, symengine.Integer(0)) - t_n
-        size = far.size(g) + absolute(t_n)
-        build.rows.equilibrium("g_n", build.total_derivative(residual))
-        build.equilibria.append(Equilibrium("g_n", residual, size))
+    if not closed.modes:
+        yield from closing(build, g)
+    moves = symengine.Symbol("dg_n_dt") if mount.damped and not mount.inertial else None
+    yield from far.book(build, g, rate, moves)
+    yield from far.balance(build, rate, [t_n], velocity="v_n", active=closed.active if mount.inertial else 1)
     yield from impacts(build)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,28 +21,12 @@ from surfacechem.model.parts import Bond, Energy, Thermal
 from surfacechem.model.sliding.formulation import arrangement, displacement, in_parallel, in_series
 from surfacechem.model.system import Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
+from surfacechem.scene import Sites
 from surfacechem.tolerances import NOTHING, SLACK
 
 LOADABLE = (
-    "phi",
-    "g_n",
-    "g_t",
-    "v",
-    "v_2",
-    "p",
-    "t_n",
-    "f",
-    "J_c",
-    "Q_1",
-    "Q_2",
-    "Q_c",
-    "w_n",
-    "w_t",
-    "w_t2",
-    "F_n",
-    "F_t",
-    "F_t2",
-    "u_t",
+    *("phi", "g_n", "g_t", "v", "v_2", "p", "t_n", "f", "J_c", "Q_1", "Q_2", "Q_c"),
+    *("w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "u_t"),
 )
 """Variables that a case may prescribe, beside the temperatures."""
 
@@ -54,6 +38,10 @@ TRACTIONS = (
 )
 """Gap, traction that is its derivative of the free energy, and its long name."""
 
+GAP, SIDE = symengine.symbols("g_n side")
+BY_SIDE = {GAP < 0: SIDE < 0, GAP > 0: SIDE > 0, -GAP < 0: -SIDE < 0, -GAP > 0: -SIDE > 0}
+"""Conditions on the side of touch as conditions on its mode."""
+
 
 def variables(build: Build) -> Iterator[Bond]:
     """Histories under ``loading``, each of which comes to life when something reads it, and the bonding states."""
@@ -64,71 +52,65 @@ def variables(build: Build) -> Iterator[Bond]:
             known = [*LOADABLE, *build.thermal.nodes]
             raise InputError(f"nothing is called '{name}'.{suggestion(name, known)}", path="loading")
         build.variables.define(name, partial(_prescribed, build, name, load), "prescribed", "loading")
-    yield from _bonding_variables(build)
-
-
-def _prescribed(build: Build, name: str, load: Load) -> Expression:
-    symbol = build.prescribe(VARIABLES[name], load)
-    if name == "J_c":
-        build.margins.append(Margin("J_c > 0", symbol - NOTHING, "the area stretch J_c reached zero"))
-    if name == "phi":
-        _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
-    return symbol
-
-
-def _bonding_variables(build: Build) -> Iterator[Bond]:
-    """Bonding states, site densities and their bounds."""
     sites = build.interface.sites
     if sites is not None:
-        spec = Spec("1/m^2", "nominal density of reference bonding sites", above=0)
-        nominal = partial(build.constant, "N_c", "interface.sites", spec, sites.density)
-        build.variables.define("N_c", nominal, "constant", "interface.sites")
-        build.variables.define("n_c", partial(_current_density, build), "derived", "interface.sites")
-        for k, side in enumerate((sites.density_1, sites.density_2), start=1):
-            build.variables.define(f"n_{k}", partial(_side_density, build, k, side), "derived", "interface.sites")
+        _site_densities(build, sites)
     breaks = build.interface.limits and "phi" not in build.scene.loading and not build.interface.variables
     if breaks or any("phi" in law.stoichiometry() for law in build.interface.reactions):
         limit = sites.phi_max if sites else 1.0
         density = build.variables.get("N_c", "the bonding state", "interface")
         yield _bonding_state(build, VARIABLES["phi"], density, limit)
     for variable in build.interface.variables:
+        name, by = variable.name, f"interface.{variable.name}"
         spec = Spec("1/m^2", "site density", above=0)
-        amount = build.constant(f"N_{variable.name}", f"interface.{variable.name}.density", spec, variable.density)
-        quantity = Quantity(variable.name, "1", variable.long_name)
-        yield _bonding_state(build, quantity, amount, 1.0)
+        amount = build.constant(f"N_{name}", f"{by}.density", spec, variable.density)
+        yield _bonding_state(build, Quantity(name, "1", variable.long_name), amount, 1.0)
         # What it amounts to where it is one: N_x per reference area, n_x per current area.
-        by, current = f"interface.{variable.name}", partial(_per_current_area, build, amount)
-        build.variables.define(f"N_{variable.name}", partial(symengine.sympify, amount), "constant", by)
-        build.variables.define(f"n_{variable.name}", current, "derived", by)
+        build.variables.define(f"N_{name}", symengine.sympify(amount), "constant", by)
+        build.variables.define(f"n_{name}", partial(_per_current_area, build, amount), "derived", by)
+
+    def phi() -> Expression:
+        N_c = build.variables.get("N_c", "the bonding state", "interface")
+        bonds = (build.bonding[name] for name in build.interface.bonds)
+        return sum(bond.symbol * bond.density for bond in bonds) / N_c
+
     if build.interface.bonds:
-        build.variables.define("phi", partial(_derived_phi, build), "derived", "coverages of bonds")
+        build.variables.define("phi", phi, "derived", "coverages of bonds")
 
 
-def _current_density(build: Build) -> Expression:
-    nominal = build.variables.get("N_c", "the interface", "interface")
-    if not build.variables.has("J_c"):
-        return nominal
-    return build.name(VARIABLES["n_c"], nominal / build.stretch)
+def _prescribed(build: Build, name: str, load: Load) -> Expression:
+    symbol = build.prescribe(VARIABLES[name], load)
+    if name == "J_c":
+        build.add(Margin("J_c > 0", symbol - NOTHING, "the area stretch J_c reached zero"))
+    if name == "phi":
+        _bounds(build, "phi", symbol, build.interface.sites.phi_max if build.interface.sites else 1.0)
+    return symbol
+
+
+def _site_densities(build: Build, sites: Sites) -> None:
+    """Densities of bonding sites: nominal, current, and of each body."""
+    by, spec = "interface.sites", Spec("1/m^2", "nominal density of reference bonding sites", above=0)
+
+    def n_c() -> Expression:
+        nominal = build.variables.get("N_c", "the interface", "interface")
+        return build.name(VARIABLES["n_c"], nominal / build.stretch) if build.variables.has("J_c") else nominal
+
+    def of_body(k: int, density: float) -> Expression:
+        """Sites of one body; those of the reference are the reference density itself."""
+        if density == sites.density:
+            return build.variables.get("n_c", "the interface", "interface")
+        spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
+        amount = build.constant(f"N_{k}", f"{by}.{build.scene.bodies[k - 1].name}", spec, density)
+        return _per_current_area(build, amount)
+
+    build.variables.define("N_c", partial(build.constant, "N_c", by, spec, sites.density), "constant", by)
+    build.variables.define("n_c", n_c, "derived", by)
+    for k, density in enumerate((sites.density_1, sites.density_2), start=1):
+        build.variables.define(f"n_{k}", partial(of_body, k, density), "derived", by)
 
 
 def _per_current_area(build: Build, amount: Expression) -> Expression:
     return amount / build.stretch
-
-
-def _side_density(build: Build, k: int, density: float) -> Expression:
-    """Sites of one body; those of the reference are the reference density itself."""
-    sites = build.interface.sites
-    if sites is not None and density == sites.density:
-        return build.variables.get("n_c", "the interface", "interface")
-    spec = Spec("1/m^2", f"nominal density of bonding sites of body {k}", above=0)
-    path = f"interface.sites.{build.scene.bodies[k - 1].name}"
-    return build.constant(f"N_{k}", path, spec, density) / build.stretch
-
-
-def _derived_phi(build: Build) -> Expression:
-    N_c = build.variables.get("N_c", "the bonding state", "interface")
-    bonds = sum(build.bonding[name].symbol * build.bonding[name].density for name in build.interface.bonds)
-    return bonds / N_c
 
 
 def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit: float) -> Bond:
@@ -137,10 +119,10 @@ def _bonding_state(build: Build, quantity: Quantity, density: Expression, limit:
     initial = initial_bonding(build, name)
     if not 0 <= initial <= limit:
         raise InputError(f"initial {name} = {initial:g} is outside its range: 0 to {limit:g}.", path=f"initial.{name}")
-    build.variables.define(name, lambda: symbol, "evolved", "bonding")
+    build.variables.define(name, symbol, "evolved", "bonding")
     start, fixed = Spec("1", f"initial {name}"), name not in build.scene.initial
     first = build.constant(f"{name}_i", f"initial.{name}", start, initial, internal=fixed)
-    build.states.append(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
+    build.add(State(quantity, symbol, dot, initial, 1.0, algebraic=False))
     _bounds(build, name, symbol, limit)
     return Bond(symbol, dot, density, first)
 
@@ -154,14 +136,18 @@ def _bounds(build: Build, name: str, symbol: Any, limit: float) -> None:
     spec = Spec("1", f"upper bound of {name}")
     top = build.constant(f"{name}_max", f"{name}_max", spec, limit, internal=True)
     below, above = f"{name} fell below its bound 0", f"{name} rose above its bound {limit:g}"
-    build.margins.append(Margin(f"{name} >= 0", symbol + slack, below, bound=(name, 0.0)))
-    build.margins.append(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
+    build.add(Margin(f"{name} >= 0", symbol + slack, below, bound=(name, 0.0)))
+    build.add(Margin(f"{name} <= {limit:g}", top + slack - symbol, above, bound=(name, limit)))
 
 
 def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     """The sum of the interface's potentials, and the tractions that follow."""
     bounds = {law: build.variables.bind(law, f"interface.potential.{law.name()}") for law in build.interface.potentials}
-    gaps = _gaps(build)
+    # The tangential gap of a potential, where it is not the elastic one: the displacement, or none.
+    gaps: dict[Potential, Mapping[str, Expression]] = {
+        law: {"g_t": symengine.Integer(0)} if arrangement(law) == "none" else {} for law in bounds
+    }
+    gaps |= {law: {"g_t": displacement(build)} for law in in_parallel(build)}
     stored, energy = _energies(build, bounds, gaps)
     psi = symengine.Integer(0)
     # The balance of the interface accounts for its own temperature, bonds, gaps and the stretch of its area.
@@ -182,14 +168,19 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
             path="interface",
         )
     _tractions(build, psi)
-    if depends(psi, symengine.Symbol("g_n")):
+    if depends(psi, GAP):
         # A potential that may pull bodies that touch says what part of it the contact bears.
         borne = [
             stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
             for law, b in bounds.items()
         ]
-        sides = {} if build.mode("side") is None else _by_side(symengine.Symbol("g_n"))
-        contact = partial(_contact_pressure, build, [symengine.sympify(F).xreplace(sides) for F in borne])
+        sides = {} if build.mode("side") is None else BY_SIDE
+
+        def contact() -> Expression:
+            """Sum of what each potential presses, per current area."""
+            pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
+            return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
+
         build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
         _warn_of_net_pressure(build)
     elif build.variables.has("p"):
@@ -197,13 +188,6 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
     yield replace(energy, psi=psi)
     if build.interface.temperature is not None:
         yield build.thermal.with_energy(INTERFACE, psi)
-
-
-def _gaps(build: Build) -> dict[Potential, Mapping[str, Expression]]:
-    """The tangential gap of each potential where that is not the elastic one: the displacement, or none."""
-    gaps: dict[Potential, Mapping[str, Expression]] = {law: {} for law in build.interface.potentials}
-    gaps |= {law: {"g_t": symengine.Integer(0)} for law in gaps if arrangement(law) == "none"}
-    return gaps | {law: {"g_t": displacement(build)} for law in in_parallel(build)}
 
 
 def _energies(
@@ -233,12 +217,6 @@ def _energies(
             rubbed += sheared
             found[law] += (rubs - 1) * sheared
     return found, Energy(symengine.Integer(0), rubs, rubbed)
-
-
-def _contact_pressure(build: Build, borne: Sequence[Expression]) -> Expression:
-    """Sum of what each potential presses [Pa], per current area."""
-    pressed = (positive(-derivative(F, symengine.Symbol("g_n"))) for F in borne)
-    return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
 
 
 def _warn_of_net_pressure(build: Build) -> None:
@@ -275,36 +253,21 @@ def _per_reference_area(
 
 def _in_sides(build: Build, given: Expression) -> tuple[Expression, list[Constraint | Margin]]:
     """Laws that change at touch do so in a mode, so that every step is smooth and touch and release are located."""
-    g, side = symengine.Symbol("g_n"), symengine.Symbol("side")
-    psi = symengine.sympify(given).xreplace(_by_side(g))
-    if not depends(psi, side):
+    psi = symengine.sympify(given).xreplace(BY_SIDE)
+    if not depends(psi, SIDE):
         return given, []
     if "g_n" not in build.motion.gap_rates:
-        return given, [Margin("g_n", g, "the given gap closes or opens", terminal=False)]
+        return given, [Margin("g_n", GAP, "the given gap closes or opens", terminal=False)]
     # Bodies at no gap are in contact, loaded or not, under a dead load: nothing else holds them there.
     mount = held(build, "n")
     rests = mount is not None and mount.quasi_static and not mount.law.k
-    start = where(g > 0, 1.0, -1.0) if rests else where(g < 0, -1.0, 1.0)
-    edges = (
-        Edge(
-            name,
-            value * g,
-            reason,
-            {side: symengine.Integer(-value)},
-            equilibrates=True,
-            strict=rests and name == "release",
-            measure="g_n",
-            when={side: (value,)},
-        )
-        for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart"))
-    )
+    start = where(GAP > 0, 1.0, -1.0) if rests else where(GAP < 0, -1.0, 1.0)
+    edges = []
+    for value, name, reason in ((1, "touch", "the bodies touch"), (-1, "release", "the bodies come apart")):
+        other, strict, when = {SIDE: symengine.Integer(-value)}, rests and value < 0, {SIDE: (value,)}
+        edges.append(Edge(name, value * GAP, reason, other, equilibrates=True, strict=strict, measure="g_n", when=when))
     mode = Mode("side", 1.0, {-1.0: "in contact", 1.0: "apart"}, start)
     return psi, [Constraint((mode,), edges=tuple(edges))]
-
-
-def _by_side(g: Any) -> dict[Any, Any]:
-    side = symengine.Symbol("side")
-    return {g < 0: side < 0, g > 0: side > 0, -g < 0: -side < 0, -g > 0: -side > 0}
 
 
 def _tractions(build: Build, psi: Expression) -> None:
@@ -317,7 +280,7 @@ def _tractions(build: Build, psi: Expression) -> None:
         traction = "t_a" if depends(psi, symengine.Symbol("u_t")) else "t_e"
         names = " and ".join(law.name() for law in parallel)
         text = f"{names} in parallel with friction" if build.interface.frictions else names
-        build.variables.define(traction, lambda: symengine.Symbol(traction), "derived", text)
-    if depends(psi, symengine.Symbol("g_n")):
+        build.variables.define(traction, symengine.Symbol(traction), "derived", text)
+    if depends(psi, GAP):
         pressure = partial(build.name, VARIABLES["p"], -symengine.Symbol("t_n"))
         build.variables.define("p", pressure, "derived", "the potential gives the normal traction")

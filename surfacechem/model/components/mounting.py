@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import symengine
@@ -11,6 +11,7 @@ import symengine
 from surfacechem.contracts.terms import Law, Varying, reads
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative, sqrt
+from surfacechem.model.automaton import Equilibrium
 from surfacechem.model.balances import DISSIPATION, INTERFACE, MECHANICS, OUTSIDE, WORK, Power, elastic_energy
 from surfacechem.model.build import Build
 from surfacechem.model.system import Pace
@@ -75,17 +76,16 @@ class Held:
 
 def held(build: Build, axis: str) -> Held | None:
     """The mounting of a direction; a far-field traction alone is a dead load."""
-    scene = build.scene
-    law: Mounting | None = getattr(scene, KEYS[axis])
-    pulls = driven(build, f"F_{axis}")
+    law: Mounting | None = getattr(build.scene, KEYS[axis])
+    force = f"F_{axis}"
+    pulls = driven(build, force)
     if law is not None:
         if not (law.k or law.m or law.c_b or law.c_g or pulls):
             raise InputError("the mounting holds nothing: give it a stiffness k, a mass m or a damper.", law.place)
         _refuse_restitution(law, axis)
         return Held(law, axis, law.path)
-    if pulls:
-        return Held(Mounting(), axis, f"loading.F_{axis}" if f"F_{axis}" in scene.loading else "programme")
-    return None
+    by = f"loading.{force}" if force in build.scene.loading else "programme"
+    return Held(Mounting(), axis, by) if pulls else None
 
 
 def _refuse_restitution(law: Mounting, axis: str) -> None:
@@ -129,7 +129,7 @@ def law_reads(law: Law, name: str) -> bool:
 class FarField:
     """A mounting with its parameters as symbols, and the histories that drive it."""
 
-    axis: str
+    mount: Held
     k: Expression
     m: Expression
     c_b: Expression
@@ -143,7 +143,7 @@ class FarField:
     @property
     def gap(self) -> symengine.Symbol:
         """What the far field pulls at."""
-        return symengine.Symbol(GAPS[self.axis])
+        return symengine.Symbol(GAPS[self.mount.axis])
 
     @property
     def works(self) -> bool:
@@ -195,31 +195,63 @@ class FarField:
         ``moves``: then energy is conserved in each step, however stiff the damper.
         """
         moves = rate if moves is None else moves
-        text = AXES[self.axis]
+        axis = self.mount.axis
+        text = AXES[axis]
         build.notes += self.paces(text)
-        spring, kinetic = self.stored(g), self.m * rate**2 / 2
         for name, energy, what in (
-            ("spring", spring, "elastic energy of the bodies"),
-            ("kinetic", kinetic, "kinetic energy"),
+            ("spring", self.stored(g), "elastic energy of the bodies"),
+            ("kinetic", self.m * rate**2 / 2, "kinetic energy"),
         ):
             if energy != 0:
-                quantity = Quantity(f"E_{name}_{self.axis}", "J/m^2", f"{what}, {text}")
-                build.name(quantity, energy)
+                build.name(Quantity(f"E_{name}_{axis}", "J/m^2", f"{what}, {text}"), energy)
         bulk = self.w_dot - rate
         power = (self.carried(g) + self.c_b * bulk) * self.w_dot + self.F * moves
         if power != 0:
-            what = f"work of the far field on the {text}"
-            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{self.axis}", what)
+            yield Power(WORK, OUTSIDE, MECHANICS, power, f"W_{axis}", f"work of the far field on the {text}")
         if self.c_b != 0:
             damped = self.c_b * bulk * (self.w_dot - moves)
-            label, what = f"bulk_damper_{self.axis}", f"the damper of the bodies, {text}"
+            label, what = f"bulk_damper_{axis}", f"the damper of the bodies, {text}"
             symbol, takers = symengine.Symbol(f"D_{label}"), self.takers(build)
             produced = symengine.Add(*(share * symbol / build.thermal.places[at].T for at, share in takers.items()))
             yield Power(DISSIPATION, MECHANICS, takers, damped, label, what, entropy=produced)
         if self.c_g != 0:
-            label = build.unique(f"contact_damper_{self.axis}")
-            rubbed = self.c_g * rate * moves
-            yield Power(DISSIPATION, MECHANICS, INTERFACE, rubbed, label)
+            label = build.unique(f"contact_damper_{axis}")
+            yield Power(DISSIPATION, MECHANICS, INTERFACE, self.c_g * rate * moves, label)
+
+    def balance(
+        self,
+        build: Build,
+        rate: Expression,
+        tractions: Sequence[Expression],
+        *,
+        velocity: str = "",
+        inertia: Expression | None = None,
+        active: Expression = 1,
+        held: Expression | None = None,
+        along: Mapping[str, Expression] | None = None,
+        slides: int = 0,
+    ) -> Iterator[Equilibrium]:
+        """Rows of the gap, which moves against ``tractions`` [Pa] by Newton's law, by its dampers, or in equilibrium.
+
+        ``inertia`` [Pa] is that of a ``velocity`` that something else stands for, ``held`` the row while not active.
+        """
+        name, rows = str(self.gap), build.rows
+        resisted = [-part for part in tractions]  # no sum within the sum, whose parts cancel others of it
+        if self.mount.inertial:
+            rows.kinematics(name, rate)
+            force = symengine.Add(self.force(self.gap, rate), *resisted, -self.c_g * rate)
+            if inertia is None:
+                rows.momentum(velocity, force, self.m, active)
+            else:
+                rows.momentum_of(velocity, inertia, force, active)
+        elif self.mount.damped:
+            rows.kinematics(name, rate)  # which is that of the dampers under what is out of balance
+        else:
+            # Equilibrium at all times: its rate is the equation, itself the start and what a jump has to find.
+            residual = symengine.Add(self.force(self.gap, symengine.Integer(0)), *resisted)
+            rows.equilibrium(name, build.total_derivative(residual), active, held)
+            size = self.size(self.gap) + symengine.Add(*(absolute(part) for part in tractions))
+            yield Equilibrium(name, active * residual, size, along or {}, active, slides)
 
 
 def far_field(build: Build, mount: Held) -> FarField:
@@ -227,21 +259,20 @@ def far_field(build: Build, mount: Held) -> FarField:
     if mount.axis not in build.motion.far_fields:
         law = _bound(build, mount)
         w, F = f"w_{mount.axis}", f"F_{mount.axis}"
-        given = build.variables.has(w)
+        given, none = build.variables.has(w), symengine.Integer(0)
         needed = law.k != 0 or law.c_b != 0
-        drive = build.variables.get(w, mount.law) if needed else symengine.Integer(0)
-        force = build.variables.get(F, "the far field") if build.variables.has(F) else symengine.Integer(0)
-        if law.c_b != 0 and given:
-            load = build.loads.get(w)
-            if load is not None and load.jumps():
-                raise InputError(
-                    f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
-                    "traction. Give the jump a duration, or leave out the damper.",
-                    load.place,
-                )
-        w_dot = build.slope_of(w) if needed and given else symengine.Integer(0)
+        drive = build.variables.get(w, mount.law) if needed else none
+        force = build.variables.get(F, "the far field") if build.variables.has(F) else none
+        load = build.loads.get(w)
+        if law.c_b != 0 and given and load is not None and load.jumps():
+            raise InputError(
+                f"{w} cannot jump (at t = {load.jumps()[0]:g} s): the damper c_b of the bodies would bear infinite "
+                "traction. Give the jump a duration, or leave out the damper.",
+                load.place,
+            )
+        w_dot = build.slope_of(w) if needed and given else none
         build.motion.far_fields[mount.axis] = FarField(
-            mount.axis, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
+            mount, law.k, law.m, law.c_b, law.c_g, law.beta_1, law.e, drive, w_dot, force
         )
     far: FarField = build.motion.far_fields[mount.axis]
     return far

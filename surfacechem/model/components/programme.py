@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import symengine
@@ -20,6 +20,7 @@ from surfacechem.model.variables import unit_of
 from surfacechem.quantities import INTERNAL, VARIABLES
 from surfacechem.scene import Stage
 
+STAGE = symengine.Symbol("stage")
 BEGUN = Register("stage_begun", "time at which the stage began")
 SCALES = {"m": LENGTH, "m/s": LENGTH}
 
@@ -32,13 +33,12 @@ def variables(build: Build) -> Iterator[Constraint]:
         if item.name in [other.name for other in stages[:i]]:
             raise InputError(f"two stages are called '{item.name}'. Give each a name of its own.", item.place)
     waits = {float(i): _awaited(stage) for i, stage in enumerate(stages) if _awaited(stage)}
-    stage = Mode("stage", 0.0, words, waits=waits)
-    yield Constraint((stage,))
+    yield Constraint((Mode("stage", 0.0, words, waits=waits),))
     for name in dict.fromkeys(name for item in stages for name in item.rates):
         if name not in LOADABLE:
             message = f"a programme cannot move '{name}'.{suggestion(name, LOADABLE)}"
             raise InputError(message, stages[0].place)
-        build.variables.define(name, partial(_driven, build, name, stage.symbol), "driven", "programme")
+        build.variables.define(name, partial(_driven, build, name), "driven", "programme")
 
 
 def _awaited(stage: Stage) -> str:
@@ -50,81 +50,69 @@ def _awaited(stage: Stage) -> str:
     return f"the event '{stage.event}'" if stage.event else ""
 
 
-def _driven(build: Build, name: str, stage: Expression) -> Expression:
+def _driven(build: Build, name: str) -> Expression:
+    """A state that moves at the rate of the present stage."""
     symbol, dot = symengine.Symbol(name), symengine.Symbol(f"d{name}_dt")
     quantity = VARIABLES[name]
     rate: Expression = symengine.Integer(0)
     for i, item in enumerate(build.scene.programme):
         if name in item.rates:
             spec = Spec(quotient(quantity.unit, "s"), f"rate of {name} in the stage {item.name}")
-            value = build.parameters.add(f"{name}_rate", f"{_path(item)}.{name}", spec, item.rates[name])
-            rate = rate + where(_during(stage, i), value, 0)
+            value = build.parameters.add(f"{name}_rate", f"programme.{item.name}.{name}", spec, item.rates[name])
+            rate = rate + where(_during(i), value, 0)
     start = build.scene.initial.get(name, 0.0)
-    build.states.append(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
+    build.add(State(quantity, symbol, dot, start, SCALES.get(quantity.unit, 1.0), algebraic=False))
     build.rows.kinematics(name, rate)
     build.motion.drives[name] = rate
     return symbol
 
 
-def _during(stage: Expression, i: int) -> Expression:
+def _during(i: int) -> Expression:
     """Whether the programme is in its stage i; modes are whole numbers."""
-    return symengine.Lt((stage - i) ** 2, symengine.RealDouble(0.25))
+    return symengine.Lt((STAGE - i) ** 2, symengine.RealDouble(0.25))
 
 
 def stages(build: Build) -> Iterator[Constraint]:
     """The edge at the end of each stage: after a time, at a value of a variable, or along an edge of the interface."""
-    stage, begun, edges = symengine.Symbol("stage"), BEGUN.symbol, []
+    begun, edges = BEGUN.symbol, []
+    waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event]
+    for _, item in waiting:
+        known = [edge.name for edge in build.edges]
+        if not any(name.startswith(item.event) for name in known):
+            message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
+            raise InputError(message, item.place)
     for i, item in enumerate(build.scene.programme):
-        if item.event:
-            if not _waiting(build.edges, item):
-                known = [other.name for other in build.edges]
-                message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
-                raise InputError(message, item.place)
-            continue
+        path = f"programme.{item.name}"
         if item.duration is not None:
             spec = Spec("s", f"length of the stage {item.name}", above=0)
-            margin = begun + build.parameters.add("length", f"{_path(item)}.for", spec, item.duration) - build.t
-        elif item.variable:
-            margin = _until(build, item)
+            guard = begun + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
+        elif item.variable and not item.event:
+            x, name, unit = _variable(build, item), item.variable, "Pa"
+            if name not in TRACTIONS:
+                unit = unit_of(name)
+            spec = Spec(unit, f"end of the stage {item.name}")
+            path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"
+            end = build.parameters.add(f"{name}_end" if name in TRACTIONS else name, path, spec, item.value)
+            guard = end - x if item.rising else x - end
         else:
             continue
-        modes, reason = {stage: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
-        edges.append(Edge(f"end of {item.name}", margin, reason, modes, passes=True, when={stage: (i,)}))
+        modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
+        edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """What a stage waits for moves the programme on by itself."""
         modes: dict[Expression, Expression] = {}
-        for i, item in enumerate(build.scene.programme):
-            if item.event and _waiting([edge], item):
-                during = _during(stage, i)
-                modes[stage] = where(during, i + 1, modes.get(stage, stage))
-                modes[begun] = where(during, build.t, modes.get(begun, begun))
+        for i, item in waiting:
+            if edge.name.startswith(item.event) and not edge.passes:
+                modes[STAGE] = where(_during(i), i + 1, modes.get(STAGE, STAGE))
+                modes[begun] = where(_during(i), build.t, modes.get(begun, begun))
         return modes
 
     yield Constraint(registers=(BEGUN,), edges=tuple(edges), beside=advancing)
 
 
-def _waiting(edges: Sequence[Edge], item: Stage) -> bool:
-    """Whether a stage ends along any of the edges."""
-    return any(edge.name.startswith(item.event) and not edge.passes for edge in edges)
-
-
-def _path(item: Stage) -> str:
-    return f"programme.{item.name}"
-
-
-def _until(build: Build, item: Stage) -> Expression:
-    """Positive until a variable reaches the value at which a stage ends."""
-    x = _variable(build, item)
-    traction = item.variable in TRACTIONS
-    spec = Spec("Pa" if traction else unit_of(item.variable), f"end of the stage {item.name}")
-    path = f"{_path(item)}.until.{item.variable}{'' if item.rising else '.falls-to'}"
-    name = f"{item.variable}_end" if traction else item.variable
-    value = build.parameters.add(name, path, spec, item.value)
-    return value - x if item.rising else x - value
-
-
 def _variable(build: Build, item: Stage) -> Expression:
+    """What a stage waits for: a temperature, a variable or a named quantity."""
     if item.variable in build.thermal.nodes:
         return build.thermal.nodes[item.variable].T
     if build.variables.has(item.variable):

@@ -38,15 +38,19 @@ BOUNDS = (
 
 def bound(build: Build, rate: Expression) -> Constraint:
     """The bounds of the bonding state, which ``rate`` would change."""
-    if not _may_leave_the_range(build):
+    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+    # What an envelope bounds ends there by itself, and some laws keep the bonding state in its range by their form.
+    laws = [law for law in build.interface.reactions if law.envelope is None]
+    kept = all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
+    if top is None or kept or LOGARITHM in build.scene.initial:
         return Constraint()
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
     bounds = [bound for bound in BOUNDS if outward[bound[0]] != 0]
     if not bounds:
         return Constraint()
-    sides, edges = {0, *(side for side, *_ in bounds)}, []
+    sides = {0, *(side for side, *_ in bounds)}
     mode = Mode("held", 0.0, {side: text for side, text in HELD_AT.items() if side in sides})
-    held = mode.symbol
+    held, edges = mode.symbol, []
     for side, at, _, name, reason, back, why in bounds:
         # Where the law points inwards no bound is needed: what rounding has carried beyond comes back by itself.
         left = where(outward[side] > 0, side * (at - PHI), 1)
@@ -64,15 +68,6 @@ def bound(build: Build, rate: Expression) -> Constraint:
     return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)
 
 
-def _may_leave_the_range(build: Build) -> bool:
-    """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
-    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
-    if top is None or LOGARITHM in build.scene.initial:
-        return False
-    laws = [law for law in build.interface.reactions if law.envelope is None]
-    return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
-
-
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:
     """The rate at a bound; next to it where it has a pole or a logarithm of nothing there; as it is if that fails."""
     whole = build.expanded(rate)
@@ -85,20 +80,16 @@ def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression,
         return rate
     if there == 0:
         return symengine.Integer(0)
+    # The quantities that the rate reads, also through others, are named at the bound as well: what is written once is
+    # computed once there, too.
+    needed = {str(symbol) for symbol in rate.free_symbols}
+    for item in reversed(build.named):
+        if item.name in needed:
+            needed |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
     put: dict[Any, Expression] = {PHI: phi}
-    needed = _read(build, rate)
     for item in [item for item in build.named if item.name in needed]:
         value = symengine.sympify(item.expression).subs(put)
         if value != item.expression:
             quantity = replace(item.quantity, name=f"{item.name}_{name}")
             put[symengine.Symbol(item.name)] = build.name(quantity, value, output=False)
     return build.name(Quantity(f"R_{name}", "1/(m^2 s)", "net rate at the bound"), rate.subs(put), output=False)
-
-
-def _read(build: Build, expression: Expression) -> set[str]:
-    """Names of the quantities that an expression reads, also through others."""
-    found = {str(symbol) for symbol in expression.free_symbols}
-    for item in reversed(build.named):
-        if item.name in found:
-            found |= {str(symbol) for symbol in symengine.sympify(item.expression).free_symbols}
-    return found

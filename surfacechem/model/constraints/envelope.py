@@ -41,7 +41,7 @@ SAME = "Give `bond-stiffness` and this law the same E_b."
 def variables(build: Build) -> Iterator[Constraint]:
     """The mode, for the laws that read it; bonds can form where the gap is not open beyond their reach."""
     if any(law.envelope is not None for law in build.interface.reactions):
-        build.variables.define("softening", lambda: (MODE + MODE**2) / 2, "mode", "interface.bonding")
+        build.variables.define("softening", (MODE + MODE**2) / 2, "mode", "interface.bonding")
         yield Constraint((DEBONDING,), active=1 - MODE * (MODE - 1) / 2)
 
 
@@ -117,13 +117,13 @@ def softening(
     reason, remedy = "there are more bonds than the gap leaves", "Give fewer bonds under `initial`, or a smaller gap."
     within = Margin("bonds within their envelope", given, reason, remedy=remedy, path="initial.phi")
     modes = (replace(DEBONDING, start=where(left < 0, -1.0, 0.0)),)
-    stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=_apart)]
+
+    def apart(edge: Edge) -> dict[Expression, Expression]:
+        """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
+        return {mode: where(mode > 0, 0, mode)} if edge.equilibrates and mode not in edge.modes else {}
+
+    stated: list[Constraint | Margin] = [*agrees, within, Constraint(modes, edges=tuple(edges), beside=apart)]
     return stated, build.variables.call(law, law.statement, {"overshoot": overshoot})
-
-
-def _apart(edge: Edge) -> dict[Expression, Expression]:
-    """What lets the normal gap jump takes bonds off their envelope, or leaves them where they reach it anew."""
-    return {MODE: where(MODE > 0, 0, MODE)} if edge.equilibrates and MODE not in edge.modes else {}
 
 
 def _tear(build: Build, mode: Expression, phi: Expression, left: Expression) -> list[Edge]:

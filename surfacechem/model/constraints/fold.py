@@ -20,7 +20,6 @@ import symengine
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
 from surfacechem.model.automaton import FOLD, Constraint, Edge, Equilibrium, Fold
-from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
 
 Rise = Mapping[Any, Expression]
@@ -31,20 +30,25 @@ Matrix = Sequence[Sequence[Expression]]
 
 def jumps(build: Build) -> Iterator[Constraint]:
     """The edge where the gaps in equilibrium lose it, and what tells which way they run."""
-    if not build.equilibria:
+    gaps = build.equilibria
+    if not gaps:
         return
-    residuals = [build.expanded(e.residual) for e in build.equilibria]
-    rises = [_rises(build, e, residuals) for e in build.equilibria]
-    pairs = list(zip(build.equilibria, rises, strict=True))
-    A = _tangent(build.equilibria, residuals, rises)
-    relative = _relative(build, A)
-    tangent = determinant(relative)
-    names = {name for e in build.equilibria for name in (e.state, *e.along)}
-    moved = set(map(symengine.Symbol, names)).union(*rises)
-    if all(e.state != "g_n" for e in build.equilibria) and not tangent.free_symbols & moved:
+    residuals = [build.expanded(gap.residual) for gap in gaps]
+    rises = [_rises(build, gap, residuals) for gap in gaps]
+    A, relative = [], []
+    for i, (gap, residual) in enumerate(zip(gaps, residuals, strict=True)):
+        # Fall of the traction that drives this gap as each one opens; one where the gap is held.
+        row = [-_along(residual, other, rise) for other, rise in zip(gaps, rises, strict=True)]
+        if gap.active != 1:
+            row = [gap.active * x + (1 - gap.active) * int(i == j) for j, x in enumerate(row)]
+        size = gap.active * _size(build, gap, row[i]) + 1 - gap.active
+        A.append(row)
+        relative.append(tuple(x / size for x in row))
+    tangent, whole = determinant(relative), determinant(A)
+    moved = {symengine.Symbol(x) for gap in gaps for x in (gap.state, *gap.along)}.union(*rises)
+    if all(gap.state != "g_n" for gap in gaps) and not tangent.free_symbols & moved:
         return  # a stiffness that does not change stays what it is
-    whole = determinant(A)
-    falling = tuple(-_along(whole, e, rise) for e, rise in pairs)
+    falling = tuple(-_along(whole, gap, rise) for gap, rise in zip(gaps, rises, strict=True))
     warming = tuple({str(T): slope for T, slope in rise.items()} for rise in rises)
     # The same zero with sizes up to 1: what is far stiffer at first must not drown what is left later.
     left = tangent - FOLD
@@ -54,61 +58,25 @@ def jumps(build: Build) -> Iterator[Constraint]:
         "the quasi-static equilibrium of the gap was lost (mechanical fold)",
         equilibrates=True,
         heat="snap",
-        fold=Fold(tangent, falling, relative, warming),
+        fold=Fold(tangent, falling, tuple(relative), warming),
     )
     yield Constraint(edges=(snap,))
 
 
-def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises: Sequence[Rise]) -> Matrix:
-    """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
-    A = []
-    for i, residual in zip(gaps, residuals, strict=True):
-        falls = [-_along(residual, j, rise) for j, rise in zip(gaps, rises, strict=True)]
-        held = [symengine.Integer(int(i is j)) for j in gaps]
-        A.append([x if i.active == 1 else i.active * x + (1 - i.active) * y for x, y in zip(falls, held, strict=True)])
-    return A
-
-
-def _along(expression: Expression, e: Equilibrium, rise: Rise) -> Expression:
+def _along(expression: Expression, gap: Equilibrium, rise: Rise) -> Expression:
     """Derivative along a gap, what moves with it, and the temperatures that follow."""
-    slope = derivative(expression, symengine.Symbol(e.state))
-    slope += sum((w * derivative(expression, symengine.Symbol(x)) for x, w in e.along.items()), 0)
+    moving = {gap.state: symengine.Integer(1), **gap.along}
+    slope = sum((w * derivative(expression, symengine.Symbol(x)) for x, w in moving.items()), symengine.Integer(0))
     return slope + sum((warmer * derivative(expression, T) for T, warmer in rise.items()), 0)
 
 
-def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
-    """The stiffness of each gap in parts of what it is compared with, where it is not held."""
-    sizes = [e.active * _size(build, e, A[i][i]) + 1 - e.active for i, e in enumerate(build.equilibria)]
-    return tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
-
-
-def _rises(build: Build, e: Equilibrium, residuals: Sequence[Expression]) -> Rise:
+def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> Rise:
     """Rise of the temperatures that the balances of tractions feel along a gap, by the heat of its own motion [K/m].
 
     It is what the energy balances say of motion that is faster than any flow of heat.
     """
     free = build.thermal.free
     felt = [node for node in free if any(depends(residual, node.T) for residual in residuals)]
-    _refuse_no_capacity(felt)
-    motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((e.state, symengine.Integer(1)), *e.along.items())}
-    rest = {state.dot: symengine.Integer(0) for state in build.states}
-    rows = {node.name: build.expanded(build.energy_row(node)) for node in free}
-
-    def made(row: Expression) -> Expression:
-        return -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))
-
-    # A node that stores nothing passes on what it gets.
-    passing = {x.T: made(rows[x.name]) / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
-    rises = {}
-    for node in felt:
-        passed = sum((derivative(rows[node.name], T).subs(rest) * warmer for T, warmer in passing.items()), 0)
-        heat = made(rows[node.name]) - passed
-        if heat != 0:
-            rises[node.T] = heat / node.capacity()
-    return rises
-
-
-def _refuse_no_capacity(felt: Sequence[Node]) -> None:
     for node in felt:
         if node.capacity() == 0:
             raise InputError(
@@ -116,21 +84,36 @@ def _refuse_no_capacity(felt: Sequence[Node]) -> None:
                 "interface one, or mount the bodies with a damper or a mass.",
                 Place(path="interface.temperature"),
             )
+    motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((gap.state, symengine.Integer(1)), *gap.along.items())}
+    rest = {state.dot: symengine.Integer(0) for state in build.states}
+    rows = {node.name: build.expanded(build.energy_row(node)) for node in free}
+    made = {
+        name: -sum((w * derivative(row, dot) for dot, w in motion.items()), symengine.Integer(0))
+        for name, row in rows.items()
+    }
+    # A node that stores nothing passes on what it gets.
+    passing = {x.T: made[x.name] / derivative(rows[x.name], x.T).subs(rest) for x in free if x.capacity() == 0}
+    rises = {}
+    for node in felt:
+        passed = sum((derivative(rows[node.name], T).subs(rest) * warmer for T, warmer in passing.items()), 0)
+        heat = made[node.name] - passed
+        if heat != 0:
+            rises[node.T] = heat / node.capacity()
+    return rises
 
 
-def _size(build: Build, e: Equilibrium, own: Expression) -> Expression:
+def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:
     """What the stiffness of a gap is compared with [Pa/m]."""
-    far = build.motion.far_fields.get(e.state.partition("_")[2])
+    far, g = build.motion.far_fields.get(gap.axis), symengine.Symbol(gap.state)
     if far is not None and far.k != 0:
         return far.k + absolute(far.k - own)
-    g = absolute(symengine.Symbol(e.state))
     if far is None:
-        return where(g > 0, build.expanded(e.size) / g, 1)
+        return where(absolute(g) > 0, build.expanded(gap.size) / absolute(g), 1)
     # Of what holds the gap itself: friction beside it has no stiffness.
-    t = build.expanded(derivative(build.psi, symengine.Symbol(e.state)))
-    t = t if t != 0 else far.F - build.expanded(e.residual)
-    secant = t * symengine.Symbol(e.state)
-    return where(secant > 0, secant / g**2, where(absolute(own) > 0, absolute(own), 1))
+    t = build.expanded(derivative(build.psi, g))
+    t = t if t != 0 else far.F - build.expanded(gap.residual)
+    secant = t * g
+    return where(secant > 0, secant / absolute(g) ** 2, where(absolute(own) > 0, absolute(own), 1))
 
 
 def determinant(A: Matrix) -> Expression:

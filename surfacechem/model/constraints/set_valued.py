@@ -36,7 +36,7 @@ SLIP = symengine.Symbol("slip")
 P = symengine.Symbol("p of an impact")
 EXERTED = Register("impulse", "impulse of the pressure that friction has not answered yet [Pa s]")
 
-HIGH, VERY_HIGH = 1e50, 1e100
+PRESSURES = 1e50, 1e100
 """Pressures [Pa] between which friction has to grow in proportion, as it does at one that is infinite."""
 
 SOFTEN = "Let a potential bear the bodies, such as `penalty`."
@@ -138,7 +138,7 @@ def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:
     bound = build.bound(law)
     traction = build.variables.call(bound, bound.statement, {"p": P, "v": v, "direction": ONE})
     expression = symengine.sympify(traction).subs({symengine.Symbol("p"): P, symengine.Symbol("t_n"): -P})
-    slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in (HIGH, VERY_HIGH)]
+    slopes = [derivative(expression, P).subs({P: symengine.RealDouble(p)}) for p in PRESSURES]
     finite, infinite = (build.at_start(slope) for slope in slopes)
     if finite != infinite:
         raise InputError(

@@ -60,9 +60,16 @@ def laws(build: Build) -> Iterator[Constraint]:
     """Bonds break where the traction passes a limit; where the strength is theirs they hold again as the gap closes."""
     closed, heals = build.mode("closed"), []
     for law in build.interface.limits:
-        stated, with_bonds = _limit(build, law, closed)
-        heals.append(with_bonds)
-        yield from stated
+        if not build.variables.has("t_n"):
+            message = (
+                "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
+            )
+            raise InputError(message, law.place)
+        bound = build.variables.bind(law, f"interface.limits.{law.name()}")
+        strength = build.variables.call(bound, bound.statement)
+        yield from _limit(build, law, strength, closed)
+        felt = build.expanded(strength).free_symbols
+        heals.append(any(symengine.Symbol(name) in felt for name in ("phi", *build.interface.bonds)))
     again = {build.variables.get("bonded", "the limit"): ONE} if heals and all(heals) else {}
     if closed is not None:
         build.heals = {closed: ONE, **again}
@@ -73,31 +80,32 @@ def laws(build: Build) -> Iterator[Constraint]:
         yield Constraint(edges=(Edge("rejoin", gap, reason, again, when=dict.fromkeys(again, (0,))),))
 
 
-def _limit(build: Build, law: Limit, closed: Expression | None) -> tuple[list[Constraint], bool]:
-    """A limit, and whether its strength is that of the bonds, so that it can come back with them."""
-    if not build.variables.has("t_n"):
-        message = "nothing gives the normal traction: mount the bodies (`mechanics`) or give a potential of the gap."
-        raise InputError(message, law.place)
-    bound = build.variables.bind(law, f"interface.limits.{law.name()}")
-    strength = build.variables.call(bound, bound.statement)
+def _limit(build: Build, law: Limit, strength: Expression, closed: Expression | None) -> Iterator[Constraint]:
+    """The edge along which the bonds break, and the jump of the gaps where that is one of its own."""
     t_n, bonded = build.variables.get("t_n", law), build.variables.get("bonded", law)
     local = law.release == "local"
     lost, when = [bonded], {bonded: (1,)}
     if closed is not None:
         # Closed again, a rigid interface that has debonded bears pressure only.
-        strength = bonded * strength
-        when = {closed: (1,)}
+        strength, when = bonded * strength, {closed: (1,)}
         lost, when = ([bonded], {bonded: (1,), **when}) if local else ([bonded, closed], when)
-    modes, breaks = dict.fromkeys(lost, NONE), broken(build, law, law.breaks)
-    _refuse_idle(build, law, {*modes, *breaks})
-    stated = []
+    modes, breaks, g = dict.fromkeys(lost, NONE), broken(build, law, law.breaks), symengine.Symbol("g_n")
+    if depends(build.psi, g) and not build.expanded(derivative(build.psi, g)).free_symbols & {*modes, *breaks}:
+        names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
+        raise InputError(
+            f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds. Let it: use "
+            "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
+            law.place,
+        )
     # Where only the interface pays for a broken bond the gaps move in a jump of their own, in which the bodies do.
-    follow = local and _gaps_follow(build)
+    mount = held(build, "n")
+    normal = mount is not None and mount.quasi_static and "g_n" in build.motion.gap_rates
+    follow = local and (normal or any(slip.in_equilibrium for slip in build.motion.slips))
     if follow:
         modes[LOOSE.symbol] = ONE
         reason, due = "the gap follows what gave way", {LOOSE.symbol: (1,)}
         relax = Edge("relax", -ONE, reason, {LOOSE.symbol: NONE}, equilibrates=True, when=due)
-        stated.append(Constraint(registers=(LOOSE,), edges=(relax,), at_once=True))
+        yield Constraint(registers=(LOOSE,), edges=(relax,), at_once=True)
     debond = Edge(
         "debond",
         strength - t_n,
@@ -109,29 +117,7 @@ def _limit(build: Build, law: Limit, closed: Expression | None) -> tuple[list[Co
         violation=law.violation,
         when=when,
     )
-    stated.append(Constraint(edges=(debond,)))
-    expanded = build.expanded(strength)
-    return stated, any(depends(expanded, symengine.Symbol(name)) for name in ("phi", *build.interface.bonds))
-
-
-def _gaps_follow(build: Build) -> bool:
-    """Whether any gap is in equilibrium, so that it moves at once where the tractions change."""
-    mount = held(build, "n")
-    normal = mount is not None and mount.quasi_static and "g_n" in build.motion.gap_rates
-    return normal or any(slip.in_equilibrium for slip in build.motion.slips)
-
-
-def _refuse_idle(build: Build, law: Limit, changed: set[Expression]) -> None:
-    """A limit of a tension that bonds do not carry would change nothing."""
-    g = symengine.Symbol("g_n")
-    if not depends(build.psi, g) or build.expanded(derivative(build.psi, g)).free_symbols & changed:
-        return
-    names = " and ".join(item.name() for item in build.interface.potentials if law_reads(item, "g_n"))
-    raise InputError(
-        f"{law.name()} would change nothing: the tension of {names} does not depend on the bonds. Let it: use "
-        "`bonded-contact` or `bond-stiffness`, or the factor `proportional: {of: phi}`.",
-        law.place,
-    )
+    yield Constraint(edges=(debond,))
 
 
 def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expression]:
@@ -142,7 +128,14 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
             message = f"{law.name()} breaks '{named}', but the bonds are not species of a mechanism."
             raise InputError(message, law.place)
         return {bonding["phi"].symbol: NONE} if "phi" in bonding else {}
-    lost = [_bond(build, law, named)] if named else list(bonds)
+    lost = list(bonds)
+    if named:  # by its species, or by the variable itself
+        texts = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
+        species = {texts[bond]: bond for bond in bonds} | {bond: bond for bond in bonds}
+        if named not in species:
+            known = [name for name in species if name not in bonds]
+            raise InputError(f"{law.name()}: no bond is called '{named}'.{suggestion(named, known)}", law.place)
+        lost = [species[named]]
     changes: dict[str, Expression] = {}
     for name in lost:
         nu = _rupture(build, law, name)
@@ -150,17 +143,6 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
         for other, n in nu.items():
             changes[other] = changes.get(other, 0) + n * extent / bonding[other].density
     return {bonding[x].symbol: NONE if x in lost else bonding[x].symbol + change for x, change in changes.items()}
-
-
-def _bond(build: Build, law: Law, name: str) -> str:
-    """The variable of a bond that is called by its species, or by the variable itself."""
-    variables = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
-    species = {variables[bond]: bond for bond in build.interface.bonds}
-    if name in species.values():
-        return name
-    if name not in species:
-        raise InputError(f"{law.name()}: no bond is called '{name}'.{suggestion(name, list(species))}", law.place)
-    return species[name]
 
 
 def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:

@@ -26,7 +26,7 @@ from surfacechem.expressions import Expression, absolute, derivative, where
 from surfacechem.model.automaton import RESTS, Constraint, Edge, Mode, Register
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import FarField, far_field, held, law_reads
-from surfacechem.model.constraints.set_valued import friction_impulse
+from surfacechem.model.constraints.set_valued import PRESSURES, friction_impulse
 from surfacechem.model.system import TOLERANCE, Margin
 from surfacechem.tolerances import PICOMETRE, SOLVED
 
@@ -43,9 +43,9 @@ BRIEF = 8 * SOLVED
 """Part of the time so far that one rebound must take to be told from none: a few hundred ticks of the clock, so that
 its event is found to a per cent of it."""
 
-HIGH, VERY_HIGH, HALF = 1e50, 1e100, 0.5
-"""Two pressures [Pa], and the part to which what is conducted per pressure falls, at least, from the one to the other,
-where it is less than in proportion."""
+HALF = 0.5
+"""Part to which what is conducted per pressure falls, at least, between the ``PRESSURES`` where it is less than in
+proportion."""
 
 OVERLAP, OPENING, LEAST = -1.0, PICOMETRE / 1e3, 1e-3
 """Gaps [m] deep in contact and as good as at touch, and a pressure [Pa] that bears nothing at the former. The softest
@@ -144,7 +144,7 @@ def _rests(
     return where(build.t > at_once, slow, 1), {FASTEST.symbol: swift}
 
 
-def jumps(build: Build) -> None:
+def jumps(build: Build) -> Iterator[str]:
     """Warn of what reads the pressure and would do something in an impact, where that is infinite for no time."""
     if LANDED not in build.registers:
         return
@@ -152,39 +152,29 @@ def jumps(build: Build) -> None:
     if not build.motion.slips:  # the velocity of sliding is prescribed, and its drive does the work of friction
         found += [law.name() for law in build.interface.frictions if law_reads(law, "p")]
     for (a, b), channels in build.conductances.items():
-        if any(_keeps_up(build, h) for h in channels):
-            found.append(f"the conductance between {a} and {b}")
+        for h in channels:
+            # What grows less than in proportion to the pressure does nothing in no time.
+            at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in PRESSURES]
+            if at[1] > HALF * at[0]:
+                found.append(f"the conductance between {a} and {b}")
     if found:
         names = " and ".join(dict.fromkeys(found))
-        build.warnings.append(f"impacts take no time: what {names} would do at their pressure is left out.")
+        yield f"impacts take no time: what {names} would do at their pressure is left out."
 
 
-def _keeps_up(build: Build, h: Expression) -> bool:
-    """Whether a conductance grows at least in proportion to the pressure; what grows less does nothing in no time."""
-    at = [build.at_start(h.subs({symengine.Symbol("p"): symengine.RealDouble(p)})) / p for p in (HIGH, VERY_HIGH)]
-    return at[1] > HALF * at[0]
-
-
-def closing(build: Build, g: Any) -> None:
+def closing(build: Build, g: Any) -> Iterator[Margin | str]:
     """End a run as the gap closes, unless a potential bears the bodies there, or a law ends there by itself."""
     if any(margin.name == "g_n > 0" for margin in build.margins):
         return
-    borne = _borne(build, g)
-    without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
-    # A law may have no number there.
-    if not build.at_start(without_bonds) <= LEAST:
-        return
-    if build.at_start(borne) <= LEAST:
-        build.warnings.append(f"no potential bears the bodies in contact: the run ends if the gap closes. {REMEDY}")
-    gap = g + TOUCHING
-    margin, reason = gap, "the gap closed, and no potential bears the bodies in contact"
-    if borne.free_symbols:
-        margin = where(borne > LEAST, 1, gap)
-    build.margins.append(Margin("g_n >= 0", margin, reason, remedy=REMEDY, domain=True))
-
-
-def _borne(build: Build, g: Any) -> Expression:
-    """Pressure that the potentials bear deep in contact [Pa]; none where it is the same as at touch."""
+    # What the potentials bear deep in contact, unless it is the same as at touch.
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
     deep = t_n.subs({g: OVERLAP, side: -1})
-    return symengine.Integer(0) if deep == t_n.subs({g: OPENING, side: 1}) else -deep
+    borne = symengine.Integer(0) if deep == t_n.subs({g: OPENING, side: 1}) else -deep
+    without_bonds = borne.subs({bond.symbol: 0 for bond in build.bonding.values()})
+    if not build.at_start(without_bonds) <= LEAST:  # nor where a law has no number there
+        return
+    if build.at_start(borne) <= LEAST:
+        yield f"no potential bears the bodies in contact: the run ends if the gap closes. {REMEDY}"
+    margin = where(borne > LEAST, 1, g + TOUCHING) if borne.free_symbols else g + TOUCHING
+    reason = "the gap closed, and no potential bears the bodies in contact"
+    yield Margin("g_n >= 0", margin, reason, remedy=REMEDY, domain=True)

@@ -8,7 +8,7 @@ speed of sliding. What sticking bears is half an axis for each direction: of a l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import symengine
 
@@ -21,14 +21,13 @@ from surfacechem.model.components.mounting import (
     ALONG,
     LENGTH,
     Direction,
-    FarField,
     Held,
     driven,
     held,
     held_across,
     law_reads,
 )
-from surfacechem.model.system import Caution, State
+from surfacechem.model.system import Caution, Given, State
 from surfacechem.quantities import VARIABLES, Quantity
 from surfacechem.tolerances import CREEP
 
@@ -81,7 +80,7 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     mount = held(build, "t")
     elastic = bool(in_series(build)) and not driven(build, "g_t")
     across = held_across(build, mount) if mount is not None else None
-    if across is not None:
+    if mount is not None and across is not None:
         _refuse_half(build, elastic)
         return _formulation(build, ALONG, mount, elastic), _formulation(build, ACROSS, across, elastic)
     if build.scene.transverse is not None:
@@ -90,46 +89,6 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     if mount is None and not (elastic and "u_t" in build.scene.loading):
         return ()
     return (_formulation(build, ALONG, mount, elastic),)
-
-
-def in_parallel(build: Build) -> tuple[Potential, ...]:
-    """The potentials whose tangential gap is the whole displacement, which friction acts along too.
-
-    What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
-    gap and a velocity that are prescribed each by itself are no one displacement.
-    """
-    mount, frictions = held(build, "t"), bool(build.interface.frictions)
-    if mount is not None:
-        beside = not driven(build, "g_t") and (frictions or held_across(build, mount) is not None)
-    else:
-        beside = frictions and not driven(build, "v") and (driven(build, "g_t") or driven(build, "u_t"))
-    return tuple(law for law in _sheared(build) if beside and arrangement(law) == "parallel")
-
-
-def arrangement(law: Potential) -> str:
-    """How a potential acts with friction."""
-    return law.shear if isinstance(law, TangentialPotential) else "series"
-
-
-def in_series(build: Build) -> tuple[Potential, ...]:
-    """The potentials of an elastic gap, which gives way where friction does."""
-    parallel = in_parallel(build)
-    return tuple(law for law in _sheared(build) if law not in parallel)
-
-
-def _sheared(build: Build) -> list[Potential]:
-    return [law for law in build.interface.potentials if law_reads(law, "g_t") and arrangement(law) != "none"]
-
-
-def displacement(build: Build) -> Expression:
-    """The tangential gap of what stands beside friction: the displacement, in two directions its length.
-
-    Laws read its square, so that it needs no guard where it is zero.
-    """
-    if len(build.motion.slips) == 2:
-        return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
-    name = "g_t" if driven(build, "g_t") else "u_t"
-    return build.variables.get(name, "the adhesion beside friction")
 
 
 def _refuse_half(build: Build, elastic: bool) -> None:
@@ -153,27 +112,76 @@ def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) 
     laws = build.interface.frictions
     formulas = [law.transverse if d is ACROSS and law.transverse is not None else law.statement for law in laws]
     rate_dependent = any({"v", "v_2"} & {*reads(formula)} for formula in formulas)
-    if not elastic and mount is not None:
-        rate_dependent = rate_dependent or mount.damped
+    rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    stiff = elastic or mount is None or mount.law.k > 0 or bool(in_parallel(build))  # else under a dead load alone
-    at_once = not rate_dependent and (elastic or mount is None or mount.quasi_static)
-    at_once = at_once or (elastic and mount is not None and mount.quasi_static)
-    return Formulation(d, mount, elastic, sticks, rate_dependent, stiff and at_once, bool(laws) or not elastic)
+    at_once = mount is None or mount.quasi_static
+    if elastic:
+        in_equilibrium = not rate_dependent or (mount is not None and at_once)
+    else:
+        # A dead load alone is no balance: what sticks does not move under it, and nothing holds what slides.
+        held_back = mount is None or mount.law.k > 0 or bool(in_parallel(build))
+        in_equilibrium = at_once and held_back and not rate_dependent
+    return Formulation(d, mount, elastic, sticks, rate_dependent, in_equilibrium, bool(laws) or not elastic)
 
 
-def evolve(build: Build, name: str, *, algebraic: bool = False, scale: float = LENGTH) -> Expression:
-    """A new state of the motion."""
+def _sheared(build: Build) -> list[Potential]:
+    return [law for law in build.interface.potentials if law_reads(law, "g_t") and arrangement(law) != "none"]
+
+
+def arrangement(law: Potential) -> str:
+    """How a potential acts with friction."""
+    return law.shear if isinstance(law, TangentialPotential) else "series"
+
+
+def in_parallel(build: Build) -> tuple[Potential, ...]:
+    """The potentials whose tangential gap is the whole displacement, which friction acts along too.
+
+    What moves in two directions has no elastic gap, so that it is the displacement there without friction as well. A
+    gap and a velocity that are prescribed each by itself are no one displacement.
+    """
+    mount, frictions = held(build, "t"), bool(build.interface.frictions)
+    if mount is not None:
+        beside = not driven(build, "g_t") and (frictions or held_across(build, mount) is not None)
+    else:
+        beside = frictions and not driven(build, "v") and (driven(build, "g_t") or driven(build, "u_t"))
+    return tuple(law for law in _sheared(build) if beside and arrangement(law) == "parallel")
+
+
+def in_series(build: Build) -> tuple[Potential, ...]:
+    """The potentials of an elastic gap, which gives way where friction does."""
+    parallel = in_parallel(build)
+    return tuple(law for law in _sheared(build) if law not in parallel)
+
+
+def displacement(build: Build) -> Expression:
+    """The tangential gap of what stands beside friction: the displacement, in two directions its length.
+
+    Laws read its square, so that it needs no guard where it is zero.
+    """
+    if len(build.motion.slips) == 2:
+        return sqrt(sum(symengine.Symbol(slip.d.displacement) ** 2 for slip in build.motion.slips))
+    name = "g_t" if driven(build, "g_t") else "u_t"
+    return build.variables.get(name, "the adhesion beside friction")
+
+
+def evolve(
+    build: Build,
+    name: str,
+    by: str = "",
+    *,
+    start: float | None = None,
+    given: Given | None = None,
+    algebraic: bool = False,
+    scale: float = LENGTH,
+) -> Expression:
+    """A new state of the motion, and the variable of its name where something says what it is determined by."""
     symbol, dot = symengine.symbols(f"{name} d{name}_dt")
-    start = build.scene.initial.get(name, 0.0)
+    initial = build.scene.initial.get(name, 0.0) if start is None else start
     finest = CREEP if name == "v" and any(law.internal for law in build.interface.frictions) else None
-    build.states.append(State(VARIABLES[name], symbol, dot, start, scale, algebraic, finest=finest))
+    build.add(State(VARIABLES[name], symbol, dot, initial, scale, algebraic, finest=finest, given=given))
+    if by:
+        build.variables.define(name, symbol, "algebraic" if algebraic else "evolved", by)
     return symbol
-
-
-def beside(far: FarField, t_a: Expression) -> FarField:
-    """The far field less the traction of what stands beside friction, as friction feels it."""
-    return replace(far, F=far.F - t_a)
 
 
 def name_traction(build: Build, d: Direction, slides: Expression, carried: Expression, needed: Expression) -> None:
@@ -194,34 +202,25 @@ def resistance(
     build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]
 ) -> dict[Direction, Expression]:
     """Tractions of a law [Pa] along the directions of sliding."""
-    if len(directions(build)) == 1:
+    both = directions(build)
+    if len(both) == 1:
         formula = bound.driven if law is build.motion.creeping else bound.statement
         return {ALONG: build.variables.call(bound, formula, own)}
-    _refuse_one_component(law)
+    if law.internal:
+        raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
+    for name, _ in law.specs():
+        value = getattr(law, name)
+        # One component of the velocity would know the axes.
+        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
+            raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
     if law.transverse is not None:
         formulas = {ALONG: bound.traction, ACROSS: bound.transverse}
         return {d: build.variables.call(bound, formula, own) for d, formula in formulas.items()}
     if build.variables.has("speed"):
         swift = {"v": build.variables.get("speed", law), "direction": ONE}
         size = build.variables.call(bound, bound.statement, {**own, **swift})
-        return {d: size * build.variables.get(d.cosine, law) for d in (ALONG, ACROSS)}
-    return _in_proportion(build, law, bound, own)
-
-
-def _refuse_one_component(law: Friction) -> None:
-    """A law of one component of the velocity would know the axes."""
-    if law.internal:
-        raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
-    for name, _ in law.specs():
-        value = getattr(law, name)
-        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
-            raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
-
-
-def _in_proportion(
-    build: Build, law: Friction, bound: Friction, own: Mapping[str, Expression]
-) -> dict[Direction, Expression]:
-    """Tractions of a law that is linear in the velocity, which needs no direction at rest."""
+        return {d: size * build.variables.get(d.cosine, law) for d in both}
+    # What is linear in the velocity needs no direction at rest.
     speed = symengine.Symbol("speed")
     size = build.variables.call(bound, bound.statement, {**own, "v": speed})
     slope = derivative(size, speed)
@@ -231,7 +230,7 @@ def _in_proportion(
             "nor does anything stick. Prescribe `v` and `v_2`, mount the bodies in one direction, or add `coulomb`.",
             law.place,
         )
-    return {d: slope * build.variables.get(d.velocity, law) for d in (ALONG, ACROSS)}
+    return {d: slope * build.variables.get(d.velocity, law) for d in both}
 
 
 def resist(build: Build, d: Direction, traction: Expression) -> None:
@@ -245,7 +244,19 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
     """Add what a friction law can carry at rest: its limit, at least what it resists sliding with from rest on."""
     sticking = [slip.d for slip in build.motion.slips if slip.sticks]
     if sticking and bound.has_limit:
-        _caution(build, law, bound)
+        # It bears no less at rest than it resists sliding with, which happens to no contact.
+        given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
+        kinetic = build.variables.call(bound, bound.statement, given)
+        if {"mu_s", "mu_k"} <= vars(bound).keys():  # that of fast sliding, to which that at rest falls
+            static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
+        else:
+            static = build.variables.call(bound, bound.limit, given)
+        if static != kinetic:
+            text = (
+                f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on "
+                "is what sticking bears"
+            )
+            build.add(Caution(static - kinetic, text))
     for d in sticking:
         limits, at_rest, two = build.motion.stick_limits, {**own, **REST}, d is ACROSS and bound.transverse is not None
         borne = build.variables.call(bound, bound.transverse if two else bound.statement, at_rest)
@@ -253,19 +264,3 @@ def stick_limit(build: Build, law: Friction, bound: Friction, own: Mapping[str, 
             static = build.variables.call(bound, bound.transverse_limit if two else bound.limit, at_rest)
             borne = static if static == borne else where(static > borne, static, borne)
         limits[d.axis] = limits.get(d.axis, 0) + build.stretch * borne
-
-
-def _caution(build: Build, law: Friction, bound: Friction) -> None:
-    """Tell where a law bears less at rest than it resists sliding with, which happens to no contact."""
-    given = {"p": ONE, **REST}  # 1 Pa stands for any pressure: coefficients are compared
-    kinetic = build.variables.call(bound, bound.statement, given)
-    if {"mu_s", "mu_k"} <= vars(bound).keys():  # that of fast sliding, to which that at rest falls
-        static, kinetic = vars(bound)["mu_s"], vars(bound)["mu_k"]
-    else:
-        static = build.variables.call(bound, bound.limit, given)
-    if static != kinetic:
-        text = (
-            f"the static friction of {law.title} is below its sliding friction; what resists sliding from rest on is "
-            "what sticking bears"
-        )
-        build.notes.append(Caution(static - kinetic, text))

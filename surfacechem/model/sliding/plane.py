@@ -21,8 +21,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial, reduce
+from typing import Any
 
 import symengine
 
@@ -31,23 +32,14 @@ from surfacechem.expressions import Expression, cos, depends, derivative, norm, 
 from surfacechem.model.automaton import Constraint, Mode, Register
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import ACROSS, LENGTH, FarField, far_field
+from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, in_the_plane
-from surfacechem.model.sliding.formulation import (
-    NONE,
-    PLACE,
-    UNSTABLE,
-    Formulation,
-    beside,
-    evolve,
-    name_traction,
-)
+from surfacechem.model.sliding.formulation import NONE, PLACE, UNSTABLE, Formulation, evolve, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import MOMENT, PICOMETRE, ROUNDING, SQRT_EPS, STILL
 
 SPEED, TURNED = symengine.symbols("speed turn")
-SLIDES = SLIP
 BEGAN = symengine.symbols("began began_2")
 WORDS = {0.0: "sticks", 1.0: "slides"}
 
@@ -64,24 +56,27 @@ error. The turn is accurate to a part of one radian, not of itself.
 class Side:
     """One of the two directions: what pulls, what resists sliding, and what sticking bears."""
 
-    kind: Formulation
+    d: Direction
     far: FarField
-    """The far field less ``t_a``."""
     u: Expression
     rate: Expression
-    resisted: Expression
-    needed: Expression
-    """Traction that friction has to bear for the interface to stick."""
-    limit: Expression
     t_a: Expression
     """Traction of what stands beside friction."""
+    resisted: Expression
+    limit: Expression
+
+    @property
+    def needed(self) -> Expression:
+        """Traction that friction has to bear for the interface to stick."""
+        return self.far.force(self.u, NONE) - self.t_a
 
     @property
     def driving(self) -> Expression:
-        return self.far.force(self.u, self.rate) - self.resisted - self.far.c_g * self.rate
+        """Traction that drives sliding."""
+        return self.far.force(self.u, self.rate) - self.t_a - self.resisted - self.far.c_g * self.rate
 
 
-def states(build: Build, kinds: Sequence[Formulation]) -> None:
+def states(build: Build, kinds: Sequence[Formulation]) -> Iterator[Constraint]:
     """Displacements, speed and direction, and the velocities that follow."""
     inertial = kinds[0].inertial
     if not inertial and not all(kind.rate_dependent for kind in kinds):
@@ -90,42 +85,32 @@ def states(build: Build, kinds: Sequence[Formulation]) -> None:
             "mounting a mass `m`, or a damper `c_b` along both directions.",
             PLACE,
         )
-    role = "evolved" if inertial else "algebraic"
     mode = Mode("slip", 0.0, WORDS, where(SPEED > 0, 1.0, 0.0) if inertial else None)
-    began = [
-        Register(str(b), "component of the direction in which sliding began", initial, partial(_began, v))
-        for b, initial, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True)
-    ]
-    slip = build.constrain(Constraint((mode,), tuple(began), active=SLIDES)).active
-    build.variables.define("sticking", lambda: 1 - slip, "mode", "sticks or slides")
+    registers = (
+        Register(str(b), "component of the direction in which sliding began", first, partial(_began, v))
+        for b, first, v in zip(BEGAN, (1.0, 0.0), ("v", "v_2"), strict=True)
+    )
+    yield Constraint((mode,), tuple(registers), active=SLIP)
+    build.variables.define("sticking", 1 - SLIP, "mode", "sticks or slides")
     for kind in kinds:
-        u = evolve(build, kind.d.displacement)
-        build.variables.define(kind.d.displacement, partial(_same, u), "evolved", "mechanics.tangential")
-    speed = evolve(build, "speed", algebraic=not inertial, scale=SWIFT if inertial else LENGTH)
-    build.variables.define("speed", lambda: speed, role, "balance of the tangential tractions")
-    evolve(build, "turn", algebraic=not inertial, scale=RADIAN)
-    if inertial:  # the initial speed is given by both components of the velocity
-        start = {f"initial.{v}": build.scene.initial.get(v, 0.0) for v in ("v", "v_2")}
-        for j, v, of in ((-2, "v", _speed), (-1, "v_2", _straight)):
-            given = Given(VARIABLES[v], start[f"initial.{v}"], of)
-            build.states[j] = replace(build.states[j], initial=of(start), given=given)
+        evolve(build, kind.d.displacement, "mechanics.tangential")
+    by, scale, slow = "balance of the tangential tractions", SWIFT if inertial else LENGTH, not inertial
+    start: dict[str, Any] = {"speed": {}, "turn": {}}
+    if inertial:  # both are given by the components of the initial velocity
+        along, across = (build.scene.initial.get(v, 0.0) for v in ("v", "v_2"))
+        start["speed"] = {"start": math.hypot(along, across), "given": Given(VARIABLES["v"], along, _speed)}
+        start["turn"] = {"start": 0.0, "given": Given(VARIABLES["v_2"], across, lambda _: 0.0)}
+    evolve(build, "speed", by, algebraic=slow, scale=scale, **start["speed"])
+    evolve(build, "turn", algebraic=slow, scale=RADIAN, **start["turn"])
     for kind, cosine in zip(kinds, _unit_vector(), strict=True):
-        build.variables.define(kind.d.cosine, partial(_same, slip * cosine), role, "turn")
+        build.variables.define(kind.d.cosine, SLIP * cosine, "evolved" if inertial else "algebraic", "turn")
         velocity = build.name(VARIABLES[kind.d.velocity], SPEED * cosine)
-        build.variables.define(kind.d.velocity, partial(_same, velocity), "derived", "speed and turn")
+        build.variables.define(kind.d.velocity, velocity, "derived", "speed and turn")
         build.motion.gap_rates[kind.d.displacement] = velocity
-
-
-def _same(expression: Expression) -> Expression:
-    return expression
 
 
 def _speed(values: Mapping[str, float]) -> float:
     return math.hypot(values.get("initial.v", 0.0), values.get("initial.v_2", 0.0))
-
-
-def _straight(values: Mapping[str, float]) -> float:
-    return 0.0
 
 
 def _began(v: str, values: Mapping[str, float]) -> float:
@@ -134,65 +119,81 @@ def _began(v: str, values: Mapping[str, float]) -> float:
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
-def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power | Constraint]:
+def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power | Constraint | Margin]:
     """Balances along and across the direction of sliding, and the edges between sticking and sliding."""
-    sides = [_side(build, kind) for kind in kinds]
-    for side in sides:
-        build.rows.kinematics(side.kind.d.displacement, side.rate)
-        assert side.kind.mount is not None
-        yield from far_field(build, side.kind.mount).book(build, side.u, side.rate)
-        name_traction(build, side.kind.d, SLIDES, side.t_a + side.resisted, side.t_a + side.needed)
-    still = _inertial(build, sides) if kinds[0].inertial else _steady(build, sides)
-    beyond = _largest(sides) - norm(*_scaled(sides))
+    sides, rubs = [], build.energy.rubs
+    for kind in kinds:
+        assert kind.mount is not None
+        d, u, far = kind.d, symengine.Symbol(kind.d.displacement), far_field(build, kind.mount)
+        rate, t_a = build.motion.gap_rates[d.displacement], derivative(build.psi, u)
+        resisted, limit = (rubs * by[d.axis] for by in (build.motion.sliding_tractions, build.motion.stick_limits))
+        side = Side(d, far, u, rate, t_a, resisted, limit)
+        sides.append(side)
+        build.rows.kinematics(d.displacement, rate)
+        yield from far.book(build, u, rate)
+        name_traction(build, d, SLIP, t_a + resisted, t_a + side.needed)
+    a, b = (side.limit for side in sides)
+    largest = a if a == b else where(a > b, a, b)
+    if kinds[0].inertial:
+        still = _inertial(build, sides, largest)
+    else:
+        still, growth = _steady(build, sides, largest)
+        if a != b:
+            # Without inertia friction along one direction alone leaves open how sliding begins.
+            reason = "dry friction acts along one of two directions: the way of slip is undetermined"
+            ratio = where(largest > 0, where(a > b, b, a) / where(largest > 0, largest, 1) - SQRT_EPS, 1)
+            remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
+            yield Margin("friction in both directions", ratio, reason, remedy=remedy)
+        yield Margin(f"{STABLE}speed", growth, UNSTABLE, when={SLIP: (1,)}, stability="speed")
+    pull = _scaled(sides, largest)
+    # Sliding begins where the pull points; what nothing holds back begins in the direction of its drive.
+    drive = [build.total_derivative(side.far.force(NONE, NONE) - side.t_a) for side in sides]
+    size, pace = norm(*pull), norm(*drive)
+    led = [where(pace > 0, x / where(pace > 0, pace, 1), began) for began, x in zip(BEGAN, drive, strict=True)]
+    aimed = [where(size > 0, x / where(size > 0, size, 1), other) for x, other in zip(pull, led, strict=True)]
     stops = (SPEED,) if kinds[0].inertial else ()
-    yield in_the_plane(beyond, _aim(build, sides), TURNED, still, breaks_bonds(build), stops)
+    aim = dict(zip(BEGAN, aimed, strict=True))
+    yield in_the_plane(largest - size, aim, TURNED, still, breaks_bonds(build), stops)
 
 
-def _side(build: Build, kind: Formulation) -> Side:
-    assert kind.mount is not None
-    motion, u = build.motion, symengine.Symbol(kind.d.displacement)
-    t_a = derivative(build.psi, u)
-    far = beside(far_field(build, kind.mount), t_a)
-    resisted, limit = (build.energy.rubs * by[kind.d.axis] for by in (motion.sliding_tractions, motion.stick_limits))
-    return Side(kind, far, u, motion.gap_rates[kind.d.displacement], resisted, far.force(u, NONE), limit, t_a)
-
-
-def _inertial(build: Build, sides: Sequence[Side]) -> Expression:
+def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expression:
     """Newton's law along and across the direction of sliding; returns what is zero where sliding stops."""
     turn, m = symengine.Symbol("dturn_dt"), sides[0].far.m
     (x, y), (c, s) = (side.driving for side in sides), _unit_vector()
     along, across = c * x + s * y, c * y - s * x
     # The speed that friction takes away within the rounding of time counts as the least one.
-    least = MOMENT * _largest(sides) / m * build.t + SLOWEST
-    build.rows.momentum("speed", along, m, SLIDES)
-    build.rows.switched("turn", SLIDES, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
+    least = MOMENT * largest / m * build.t + SLOWEST
+    build.rows.momentum("speed", along, m, SLIP)
+    build.rows.switched("turn", SLIP, sqrt(SPEED**2 + least**2) * turn - across / m, turn)
     return SPEED + STILL / MOMENT * least
 
 
-def _steady(build: Build, sides: Sequence[Side]) -> Expression:
-    """Balances without inertia; returns what is zero where sliding stops, the one along its direction.
+def _steady(build: Build, sides: Sequence[Side], largest: Expression) -> tuple[Expression, Expression]:
+    r"""Balances without inertia; returns what is zero where sliding stops, and by how much they grow with the speed.
 
-    What resists has to grow with the speed. The direction follows at once, so it has no part in that.
+    What resists sliding in the direction n is the vector :math:`(a n_x, b n_y)`, whose half axes a and b grow with the
+    speed. Its balance with the pull :math:`\mathbf P`, along n and across it, is
+
+    .. math:: \mathbf P\cdot n - a - (b - a)\,n_y^2 = 0, \quad \mathbf P\cdot n_\perp - (b - a)\,n_x n_y = 0.
+
+    An ellipse of dry friction is stretched to a circle instead, where one direction does not feel the other. The
+    direction follows at once, so that it has no part in what has to grow with the speed.
     """
-    _refuse_rails(build, sides)
     pull, sizes = [side.needed for side in sides], [_resistance(build, side) for side in sides]
-    (size, other), (x, y) = sizes, _unit_vector()
+    (a, b), (n_x, n_y) = sizes, _unit_vector()
     ahead, aside = _turned(pull)
-    along, across = ahead - (size + (other - size) * y**2), aside - (other - size) * x * y
+    along, across = ahead - (a + (b - a) * n_y**2), aside - (b - a) * n_x * n_y
     # What rounding leaves of the balance in which sliding begins must not stop it.
-    still = along.subs({SPEED: 0}) + STILL * _largest(sides)
-    if size != other:
+    still = along.subs({SPEED: 0}) + STILL * largest
+    if a != b:
         rubs = sum((part.subs({SPEED: 0}) for part in sizes), NONE)
         along, across = (where(rubs > 0, *pair) for pair in zip(_elliptic(pull, sizes), (along, across), strict=True))
     slope = derivative(along, SPEED)
     linear = slope != 0 and not depends(slope, SPEED)
-    along_row = -along.subs({SPEED: 0}) / slope - SPEED if linear else along
-    build.rows.switched("speed", SLIDES, along_row, SPEED)
-    build.rows.switched("turn", SLIDES * norm(*pull), across, TURNED)  # what nothing pulls has no direction
+    build.rows.switched("speed", SLIP, -along.subs({SPEED: 0}) / slope - SPEED if linear else along, SPEED)
+    build.rows.switched("turn", SLIP * norm(*pull), across, TURNED)  # what nothing pulls has no direction
     build.motion.slides_by |= {"speed": SPEED, "turn": TURNED}
-    stable = -derivative(build.expanded(along), SPEED)
-    build.margins.append(Margin(f"{STABLE}speed", stable, UNSTABLE, when={SLIDES: (1,)}, stability="speed"))
-    return still
+    return still, -derivative(build.expanded(along), SPEED)
 
 
 def _unit_vector() -> tuple[Expression, Expression]:
@@ -212,18 +213,28 @@ def _turned(pull: Sequence[Expression]) -> tuple[Expression, Expression]:
 
 
 def _elliptic(pull: Sequence[Expression], sizes: Sequence[Expression]) -> tuple[Expression, Expression]:
-    r"""The balances where the ellipse of what resists is stretched to a circle: its size [Pa], then half the angle that
-    is left to turn.
+    r"""The balances on an ellipse that is stretched to a circle: its size [Pa], then half the angle left to turn.
 
-    With the pull (x, y) and the half axes a, b, stretching by (b, a) makes the circle a b, and the pull reaches
-    :math:`\rho = |(x b, y a)|`. The size is :math:`|(x, y)| (\rho^2 - a^2 b^2) / \rho (\rho + a b)`: it does not feel
-    the direction, and is all but linear in the speed. Its numerator is expanded in powers of the speed, about
-    ``reach_0`` and the product ``r_0`` at none, so that it does not lose the least speed beside dry friction.
+    The pull (x, y) is in balance with the half axes a, b where :math:`n = (x/a, y/b)` is a unit vector. Stretched by
+    a b this is the vector (x b, y a), whose length, the ``reach`` :math:`\rho`, is that of the circle, the ``radius``
+    :math:`r = a b`. The first balance,
+
+    .. math:: |(x, y)|\,(\rho - r)/\rho = |(x, y)|\,(\rho^2 - r^2) / \rho\,(\rho + r) = 0,
+
+    does not feel the direction, and is all but linear in the speed s. The ``excess`` :math:`\rho^2 - r^2` is a
+    polynomial of s, since :math:`a = a_0 + a_1 s`, :math:`b = b_0 + b_1 s`, so that with
+    :math:`r = r_0 + r_1 s + r_2 s^2` its terms are
+
+    .. math:: (\rho_0 - r_0)(\rho_0 + r_0), \quad 2\,(x^2 b_0 b_1 + y^2 a_0 a_1 - r_0 r_1), \quad
+              x^2 b_1^2 + y^2 a_1^2 - r_1^2 - 2 r_0 r_2, \quad -2 r_1 r_2, \quad -r_2^2.
+
+    The least speed is not lost in them beside dry friction. The second balance is the tangent of half the angle from n
+    to the stretched pull, its part ``across`` n over the sum of its length and its part along n.
     """
     (x, y), (a, b) = pull, sizes
     (a_0, a_1), (b_0, b_1) = ((size.subs({SPEED: 0}), derivative(size, SPEED)) for size in sizes)
     if depends(a_1, SPEED) or depends(b_1, SPEED):
-        (a_0, b_0), (a_1, b_1) = (a, b), (NONE, NONE)
+        (a_0, b_0), (a_1, b_1) = (a, b), (NONE, NONE)  # no polynomial: as it is
     r_0, r_1, r_2, reach_0 = a_0 * b_0, a_0 * b_1 + a_1 * b_0, a_1 * b_1, norm(x * b_0, y * a_0)
     excess = (
         (reach_0 - r_0) * (reach_0 + r_0),
@@ -246,44 +257,16 @@ def _power_series(terms: Sequence[Expression]) -> Expression:
 
 def _resistance(build: Build, side: Side) -> Expression:
     """What resists sliding along one of the directions alone [Pa]."""
-    own = BEGAN[side.kind.d is ACROSS]
-    sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURNED: NONE, SLIDES: symengine.Integer(1)}
+    own = BEGAN[side.d is ACROSS]
+    sliding = {b: symengine.Integer(b == own) for b in BEGAN} | {TURNED: NONE, SLIP: symengine.Integer(1)}
     return build.expanded(side.resisted).subs(sliding) + (side.far.c_b + side.far.c_g) * SPEED
 
 
-def _largest(sides: Sequence[Side]) -> Expression:
-    """The larger half axis of what sticking bears."""
-    a, b = (side.limit for side in sides)
-    return a if a == b else where(a > b, a, b)
-
-
-def _scaled(sides: Sequence[Side]) -> list[Expression]:
+def _scaled(sides: Sequence[Side], top: Expression) -> list[Expression]:
     """The pull where the ellipse that sticking bears is stretched to a circle about its larger half axis."""
-    top = _largest(sides)
     if all(side.limit == top for side in sides):
         return [side.needed for side in sides]
     # What sticking bears along one direction has to be told from none beside the other.
     least = where(top > 0, ROUNDING * top, 1)
     known = [where(side.limit > ROUNDING * top, side.limit, least) for side in sides]
     return [side.needed * where(top > 0, top / limit, 1) for side, limit in zip(sides, known, strict=True)]
-
-
-def _aim(build: Build, sides: Sequence[Side]) -> dict[Expression, Expression]:
-    """The direction in which sliding begins; what nothing holds back begins in that of its drive."""
-    pull, drive = _scaled(sides), [build.total_derivative(side.far.force(NONE, NONE)) for side in sides]
-    size, pace = norm(*pull), norm(*drive)
-    led = [where(pace > 0, x / where(pace > 0, pace, 1), b) for b, x in zip(BEGAN, drive, strict=True)]
-    return {
-        b: where(size > 0, x / where(size > 0, size, 1), other) for b, x, other in zip(BEGAN, pull, led, strict=True)
-    }
-
-
-def _refuse_rails(build: Build, sides: Sequence[Side]) -> None:
-    """Without inertia friction along one direction alone leaves open how sliding begins."""
-    a, b = (side.limit for side in sides)
-    if a == b:
-        return
-    top, reason = _largest(sides), "dry friction acts along one of two directions: the way of slip is undetermined"
-    ratio = where(top > 0, where(a > b, b, a) / where(top > 0, top, 1) - SQRT_EPS, 1)
-    remedy = "Give the mounting a mass `m`, or friction along the other direction, too."
-    build.margins.append(Margin("friction in both directions", ratio, reason, remedy=remedy))

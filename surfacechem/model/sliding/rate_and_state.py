@@ -12,14 +12,14 @@ as an asinh by Rice, Lapusta & Ranjith (2001), doi 10.1016/S0022-5096(01)00042-4
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import symengine
 
 from surfacechem.contracts.terms import Friction, Varying, reads
 from surfacechem.expressions import Expression
 from surfacechem.model.build import Build
-from surfacechem.model.system import Given, State
+from surfacechem.model.sliding.formulation import evolve
+from surfacechem.model.system import Given
 from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import PICOMETRE
 
@@ -39,8 +39,13 @@ def law_of_traction(build: Build, *, inertial: bool) -> Friction | None:
 
     Without inertia the balance may need the velocity itself, where parameters vary with it.
     """
+
+    def varies_with_velocity(law: Friction) -> bool:
+        factors = (factor for value in _varying(law).values() for factor in value.factors)
+        return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
+
     laws = [law for law in build.interface.frictions if law.velocity is not None]
-    return next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
+    return next((law for law in laws if inertial or not varies_with_velocity(law)), None)
 
 
 def _varying(law: Friction) -> dict[str, Varying]:
@@ -48,17 +53,11 @@ def _varying(law: Friction) -> dict[str, Varying]:
     return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
 
-def _varies_with_velocity(law: Friction) -> bool:
-    factors = [factor for value in _varying(law).values() for factor in value.factors]
-    return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
-
-
 def evolve_drive(build: Build, law: Friction, *, inertial: bool) -> Expression:
     """The state that stands for the velocity; what reads the velocity itself gets it from there.
 
     A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
     """
-    symbol, dot = symengine.symbols(f"{DRIVE} d{DRIVE}_dt")
     bound = build.bound(law)
     if inertial and (varying := _varying(law)):
         symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
@@ -81,17 +80,12 @@ def evolve_drive(build: Build, law: Friction, *, inertial: bool) -> Expression:
         except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
             return 0.0
 
-    role, by = ("evolved", "mechanics.tangential") if inertial else ("algebraic", "balance of the tangential tractions")
-    build.variables.define(DRIVE, partial(_same, symbol), role, by)
-    build.variables.define("v", velocity, "derived", f"{law.path}, from its traction")
     given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), at_start)
+    by = "mechanics.tangential" if inertial else "balance of the tangential tractions"
     scale = EFFECT if inertial else 1.0
-    build.states.append(State(VARIABLES[DRIVE], symbol, dot, 0.0, scale, algebraic=not inertial, given=given))
+    symbol = evolve(build, DRIVE, by, algebraic=not inertial, scale=scale, given=given)
+    build.variables.define("v", velocity, "derived", f"{law.path}, from its traction")
     return symbol
-
-
-def _same(expression: Expression) -> Expression:
-    return expression
 
 
 def stands_for_velocity(build: Build) -> bool:

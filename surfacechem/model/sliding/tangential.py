@@ -1,70 +1,307 @@
-"""The tangential motion, in one direction or two.
+r"""The tangential motion: the balance of the tractions in each direction, sticking and sliding.
 
-Smooth friction moves the interface in each direction by the same equations. What sticks has one direction of sliding in
-the plane, which both share.
+Exact sticking holds the displacement; elastic sticking lets the elastic gap take it up. Sliding is inertial, resisted
+by something that depends on its rate, or rate-independent, in which case the traction itself determines it. With the
+far field's traction t_F, that of adhesion beside friction t_a and of friction t_f the driving traction t_F - t_a - t_f
+is :math:`m\,\dot v`, zero, or zero by its rate, as the mounting has a mass, a damper, or neither. Smooth friction moves
+the interface in two directions by the same equations; what sticks in the plane has one direction of sliding, which both
+share.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator
 from functools import partial
 
-from surfacechem.expressions import Expression, norm, sign, where
-from surfacechem.model.automaton import Constraint
-from surfacechem.model.balances import Power
+import symengine
+
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
+from surfacechem.model.automaton import Constraint, Equilibrium, Mode, When
+from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import ACROSS, ALONG
-from surfacechem.model.sliding import line, plane
-from surfacechem.model.sliding.formulation import Formulation, directions, displacement, formulations, in_parallel
+from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
+from surfacechem.model.constraints.set_valued import SLIP, along_a_line, breaks_bonds
+from surfacechem.model.sliding import plane, rate_and_state
+from surfacechem.model.sliding.formulation import (
+    NONE,
+    ONE,
+    PLACE,
+    UNSTABLE,
+    Formulation,
+    directions,
+    displacement,
+    evolve,
+    formulations,
+    in_parallel,
+    in_series,
+    name_traction,
+)
+from surfacechem.model.sliding.rate_and_state import DRIVE, stands_for_velocity
+from surfacechem.model.system import STABLE, Margin
 from surfacechem.quantities import VARIABLES
+from surfacechem.tolerances import STILL
+
+WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
+SINGLE_BALANCE = "balance of the tangential tractions"
 
 
-def variables(build: Build) -> None:
+def variables(build: Build) -> Iterator[Constraint]:
     """States and modes of the tangential motion."""
     found = build.motion.slips = formulations(build)
     if not found:
         _prescribed_direction(build)
-    elif _in_the_plane(found):
-        plane.states(build, found)
+    elif _in_the_plane(build):
+        yield from plane.states(build, found)
     else:
         for kind in found:
-            line.states(build, kind)
+            yield from _states(build, kind)
 
 
-def _in_the_plane(found: Sequence[Formulation]) -> bool:
-    return len(found) == 2 and found[0].sticks
+def laws(build: Build) -> Iterator[Power | Constraint | Equilibrium | Margin]:
+    """Balance of the tangential tractions, and the edges between sticking and sliding."""
+    if _in_the_plane(build):
+        yield from plane.motion(build, build.motion.slips)
+    else:
+        for kind in build.motion.slips:
+            yield from _motion(build, kind)
+
+
+def _in_the_plane(build: Build) -> bool:
+    return len(build.motion.slips) == 2 and build.motion.slips[0].sticks
 
 
 def _prescribed_direction(build: Build) -> None:
     """The direction of sliding where its velocity is prescribed: a sign, or a unit vector."""
+    variables, reader = build.variables, "the friction"
     if in_parallel(build):
-        build.variables.define("v", partial(_along_displacement, build), "derived", "the prescribed displacement")
-    if len(directions(build)) == 1:
-        if build.variables.has("v"):
-            build.variables.define("direction", lambda: sign(build.variables.get("v", "the friction")), "internal", "v")
-        return
 
-    def along(velocity: str) -> Expression:
-        speed = build.variables.get("speed", "the friction")
-        return build.variables.get(velocity, "the friction") / where(speed > 0, speed, 1)
+        def v() -> Expression:
+            return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
+
+        variables.define("v", v, "derived", "the prescribed displacement")
+    if len(directions(build)) == 1:
+        if variables.has("v"):
+            variables.define("direction", lambda: sign(variables.get("v", reader)), "internal", "v")
+        return
 
     def speed() -> Expression:
-        v, v_2 = (build.variables.get(name, "the friction") for name in ("v", "v_2"))
-        return build.name(VARIABLES["speed"], norm(v, v_2))
+        return build.name(VARIABLES["speed"], norm(variables.get("v", reader), variables.get("v_2", reader)))
 
-    build.variables.define("speed", speed, "derived", "v and v_2")
+    def component(velocity: str) -> Expression:
+        size = variables.get("speed", reader)
+        return variables.get(velocity, reader) / where(size > 0, size, 1)
+
+    variables.define("speed", speed, "derived", "v and v_2")
     for d in (ALONG, ACROSS):
-        build.variables.define(d.cosine, partial(along, d.velocity), "internal", "v and v_2")
+        variables.define(d.cosine, partial(component, d.velocity), "internal", "v and v_2")
 
 
-def _along_displacement(build: Build) -> Expression:
-    return build.name(VARIABLES["v"], build.rate_of(str(displacement(build))))
+def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
+    """States and modes of the motion in one direction."""
+    v, rates, u = kind.d.velocity, build.motion.gap_rates, kind.d.displacement
+    alone = len(build.motion.slips) == 1
+    if kind.sticks:
+        mode = Mode("slip", 0.0, WORDS, sign(symengine.Symbol("v")) if kind.slides_inertially else None)
+        yield Constraint((mode,), active=SLIP**2)
+        build.variables.define("direction", SLIP, "mode", "sticks or slides")
+        build.variables.define("sticking", 1 - SLIP**2, "mode", "sticks or slides")
+    if kind.mount is not None:
+        _displacement(build, kind, alone)
+    if kind.elastic:
+        # It gives way while the interface sticks; the displacement is prescribed where no mounting holds it.
+        names = " and ".join(law.name() for law in in_series(build))
+        evolve(build, "g_t", f"{names} in series with friction" if build.interface.frictions else names)
+        rates["g_t"] = symengine.Symbol("dg_t_dt")
+        if kind.mount is None:
+            build.variables.get("u_t", "the elastic gap")
+            rates["u_t"] = build.rate_of("u_t")
+    if kind.rate_dependent and not kind.slides_inertially:
+        law = rate_and_state.law_of_traction(build, inertial=False) if alone else None
+        if law is not None:
+            build.motion.slides_by[v] = rate_and_state.evolve_drive(build, law, inertial=False)
+        else:
+            build.motion.slides_by[v] = evolve(build, v, SINGLE_BALANCE, algebraic=True)
+        if not kind.elastic:
+            rates[u] = symengine.Symbol(v)
+    elif not kind.slides_inertially:
+
+        def sliding() -> Expression:
+            """Of what does not stick."""
+            if not kind.slides:
+                return NONE
+            if build.variables.has("v_t"):
+                build.variables.get("v_t", "sliding")
+            rate = rates[u] - rates["g_t"] if kind.elastic else rates[u]
+            return build.name(VARIABLES[v], build.constraint("slip").active * rate)
+
+        build.variables.define(v, sliding, "derived", "what does not stick")
 
 
-def laws(build: Build) -> Iterator[Power | Constraint]:
-    """Balance of the tangential tractions, and the edges between sticking and sliding."""
-    if _in_the_plane(build.motion.slips):
-        yield from plane.motion(build, build.motion.slips)
+def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
+    """The displacement, and its velocity where that has inertia or follows from dampers."""
+    assert kind.mount is not None
+    name, mount, place = kind.d.displacement, kind.mount, f"mechanics.{KEYS[kind.d.axis]}"
+    u, rates, v = evolve(build, name, place), build.motion.gap_rates, kind.own_velocity
+    rates[name] = symengine.Symbol(f"d{name}_dt")
+    if kind.inertial:
+        rates[name] = symengine.Symbol(v)
+        law = rate_and_state.law_of_traction(build, inertial=True) if v == "v" and alone else None
+        if law is None:
+            evolve(build, v, place)
+        else:
+            rate_and_state.evolve_drive(build, law, inertial=True)
+    elif kind.elastic and mount.damped:
+
+        def yielding() -> Expression:
+            """Velocity at which the dampers bear what is out of balance with the elastic gap."""
+            traction = derivative(build.psi, symengine.Symbol("g_t")) + derivative(build.psi, u)
+            return build.name(VARIABLES["v_t"], far_field(build, mount).yielding(u, traction))
+
+        rates[name] = symengine.Symbol("v_t")
+        build.variables.define("v_t", yielding, "derived", place)
+
+
+def _motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint | Equilibrium | Margin]:
+    """Balance of the tractions in one direction, and the edges between sticking and sliding."""
+    far = far_field(build, kind.mount) if kind.mount else None
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "the mechanics", "mechanics")
+    d, u = kind.d, symengine.Symbol(kind.d.displacement)
+    v, rate = build.variables.get(d.velocity, "the friction"), build.motion.gap_rates[d.displacement]
+    rubs, t_a = build.energy.rubs, derivative(build.psi, u)
+    t_f = build.motion.sliding_tractions.get(d.axis, NONE)
+    if kind.elastic:
+        # Per area on which friction acts, however small that is.
+        needed = derivative(build.psi if rubs == 1 else build.energy.rubbed, symengine.Symbol("g_t"))
+        carried = held = rubs * needed
+    else:
+        assert far is not None
+        carried = t_f = rubs * t_f
+        held = needed = far.force(u, NONE) - t_a
+    slides = build.constraint("slip").active if kind.sticks else symengine.Integer(kind.slides)
+    in_proportion = False
+    if far is None:
+        text = "work of the far field on the tangential displacement"
+        yield Power(WORK, OUTSIDE, MECHANICS, (carried + t_a) * rate, "W_t", text)
+    else:
+        derived = rate == symengine.Symbol("v_t") and not kind.inertial
+        yield from far.book(build, u, rate, symengine.Symbol("du_t_dt") if derived else None)
+        in_proportion = yield from _balance(build, kind, far, slides, carried, t_a)
+    if kind.elastic:
+        in_proportion = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
+    name_traction(build, d, slides, t_a + carried, t_a + held)
+    if not kind.sticks or "sticks" in (margin.name for margin in build.margins):
         return
-    for kind in build.motion.slips:
-        yield from line.motion(build, kind)
+    stops, still, slack = [], v, NONE
+    if kind.slides_inertially:
+        still = symengine.Symbol(_velocity_state(build, kind))
+        stops = [still]
+    elif in_proportion and build.motion.creeping is None:
+        # Where tractions give a velocity in proportion it is their balance at rest that is zero where sliding stops:
+        # what is left of this as sliding begins is rounding, which must not stop it.
+        still = build.expanded(needed - t_f).subs({v: 0})
+        size = absolute(needed) if kind.elastic or far is None else far.size(u)
+        beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
+        slack = STILL * (size + absolute(t_f) + beside)
+    back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
+    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else rubs)
+    equilibrates = not (kind.slides_inertially or kind.rate_dependent)
+    yield along_a_line(needed, limit, back, breaks_bonds(build), stops, equilibrates=equilibrates)
+
+
+def _velocity_state(build: Build, kind: Formulation) -> str:
+    """The state that is the velocity, or stands for it."""
+    return DRIVE if not kind.elastic and stands_for_velocity(build) else kind.own_velocity
+
+
+def _balance(
+    build: Build, kind: Formulation, far: FarField, slides: Expression, carried: Expression, t_a: Expression
+) -> Generator[Equilibrium | Margin, None, bool]:
+    """Rows of the displacement and its velocity; returns whether this is in proportion to the tractions."""
+    name = kind.d.displacement
+    u, du = symengine.symbols(f"{name} d{name}_dt")
+    rate, tractions = build.motion.gap_rates[name], (carried, t_a)
+    if kind.inertial:
+        state = _velocity_state(build, kind)
+        inertia = rate_and_state.inertia(build, far.m) if state == DRIVE else None
+        active = ONE if kind.elastic else slides
+        yield from far.balance(build, rate, tractions, velocity=state, inertia=inertia, active=active)
+    elif kind.elastic:
+        # The body's spring in series with the elastic gap, which follows at once while it cannot slide.
+        along = {"g_t": ONE if kind.rate_dependent else 1 - slides}
+        yield from far.balance(build, rate, tractions, along=along)
+    elif kind.rate_dependent:
+        v = symengine.Symbol(kind.d.velocity)
+        build.rows.kinematics(name, v)
+        return (yield from _sliding_row(build, kind, slides, far.force(u, v) - t_a - carried - far.c_g * v))
+    elif far.k == 0 and not depends(t_a, u):
+        # Under a dead load alone an interface that sticks does not move, and nothing holds one that slides.
+        build.rows.kinematics(name, NONE)
+        limit = build.motion.stick_limits.get("t")
+        if limit is None:
+            message = "nothing resists the far-field traction F_t. Give the tangential mounting k, m or a damper."
+            raise InputError(message, PLACE)
+        reason = "the dead load exceeds what sticking bears, and nothing holds what slides; a mass or a stiffness would"
+        yield Margin("sticks", limit - absolute(far.force(u, NONE) - t_a - carried), reason)
+    else:
+        stiffness = far.k if far.k != 0 else 1
+        yield from far.balance(build, rate, tractions, active=slides, held=stiffness * du, slides=1)
+    return False
+
+
+def _elastic_rows(
+    build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
+) -> Generator[Margin, None, bool]:
+    """Rows of the elastic gap and of sliding without inertia; returns whether that is in proportion to tractions."""
+    dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
+    if kind.rate_dependent:
+        build.rows.kinematics("g_t", rate - v)
+        return (yield from _sliding_row(build, kind, slides, t_e - t_f))
+    residual = t_f - t_e
+    build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
+    size = absolute(t_e) + absolute(t_f)
+    # Before that of the displacement: what slides finds its place first.
+    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, size, active=slides, slides=-1))
+    stiffness = derivative(t_e, symengine.Symbol("g_t"))
+    if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
+        reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
+        yield Margin("tangential stiffness", where(stiffness > 0, stiffness, -1), reason, when=_while_sliding(kind))
+    return False
+
+
+def _sliding_row(
+    build: Build, kind: Formulation, slides: Expression, driving: Expression
+) -> Generator[Margin, None, bool]:
+    """A velocity without inertia follows from the tractions, and is stable while what resists it grows with it.
+
+    Returns whether it is in proportion to them.
+    """
+    v = build.motion.slides_by[kind.d.velocity]
+    slope, balance = -derivative(build.expanded(driving), v), driving
+    in_proportion = slope != 0 and not depends(slope, v)
+    if in_proportion:
+        # Solved for the velocity, which is nothing but rounding of the tractions as sliding begins.
+        whole = driving if derivative(driving, v) == -slope else build.expanded(driving)
+        balance = whole.subs({v: 0}) / slope - v
+    # What sticks may have nothing that resists sliding, as where nothing presses it, and no such balance.
+    if kind.sticks:
+        build.rows.switched(str(v), slides, balance, v)
+    else:
+        build.rows.balance(str(v), balance)
+    damped = kind.mount is not None and kind.mount.damped and not kind.elastic
+    if build.motion.creeping is not None and len(build.interface.frictions) == 1 and damped:
+        return in_proportion  # both friction and damper resist the more, the faster it slides
+    if slope == 0:
+        raise InputError(
+            "nothing determines the sliding velocity: friction does not depend on it. Give the tangential mounting a "
+            "mass or a damper.",
+            PLACE,
+        )
+    yield Margin(f"{STABLE}{v}", slope, UNSTABLE, when=_while_sliding(kind), stability=str(v))
+    return in_proportion
+
+
+def _while_sliding(kind: Formulation) -> When:
+    """Modes in which the interface slides; any, where it cannot stick."""
+    return {SLIP: (-1, 1)} if kind.sticks else {}
