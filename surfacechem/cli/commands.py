@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -48,10 +49,17 @@ def exit_codes(own: Mapping[int, str]) -> str:
 
 
 EXIT_CODES = exit_codes(CODES)
+NO_REFERENCE = "a case has no reference on which two methods agree; all else is written"
+PRECISION_CODES = exit_codes({0: "finished; solves that failed are in the report", 4: NO_REFERENCE})
+STABILITY_CODES = exit_codes({0: "finished; what failed or is wrong is in the report"})
 
 
 class SignalledError(BaseException):
     """A signal asks the process to end."""
+
+
+class _TriedError(Exception):
+    """Ends the trial of an output."""
 
 
 def _end(number: int, _frame: object) -> None:
@@ -110,6 +118,11 @@ class Commands(TyperGroup):
             raise typer.Exit(UNWRITTEN) from None
 
 
+def written_to(text: str) -> Any:
+    """The option that names the file of a command's output."""
+    return Option("--output", "-o", help=text)
+
+
 CaseName = Annotated[str, Argument(metavar="CASE", help="A case file, or the name of a shipped case.")]
 Changes = Annotated[
     list[str] | None, Option("--set", metavar="PATH=VALUE", help="Change a value of the case; repeatable.")
@@ -151,22 +164,14 @@ def wait_for(work: Callable[[], R]) -> R:
     >>> wait_for(lambda: 42)
     42
     """
-    done: list[R] = []
-    failed: list[BaseException] = []
-
-    def task() -> None:
-        try:
-            done.append(work())
-        except BaseException as error:
-            failed.append(error)
-
-    thread = threading.Thread(target=task, daemon=True)
-    thread.start()
-    while thread.is_alive():
-        thread.join(0.5)
-    if failed:
-        raise failed[0]
-    return done[0]
+    pool = ThreadPoolExecutor(1)
+    try:
+        future = pool.submit(work)
+        while not future.done():
+            wait([future], 0.5)
+        return future.result()
+    finally:
+        pool.shutdown(wait=False)
 
 
 def solved(run: Callable[[], R], quiet: bool, brief: bool = False) -> R:
@@ -180,10 +185,6 @@ def solved(run: Callable[[], R], quiet: bool, brief: bool = False) -> R:
     if not (quiet or stepper.is_compiled()):
         typer.echo("compiling the stepper, once on this machine; this takes a minute or less ...", err=True)
     return wait_for(run)
-
-
-class _TriedError(Exception):
-    """Ends the trial of an output."""
 
 
 def refuse_unwritable(*targets: Path) -> None:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
 
-from surfacechem.cli import studies
 from surfacechem.cli.commands import (
     DIFFERENT,
     EXIT_CODES,
+    PRECISION_CODES,
+    STABILITY_CODES,
     CaseName,
     Changes,
     Commands,
     Quiet,
     SolverName,
+    SolverNames,
     Tolerance,
     Wanted,
     check_picture,
@@ -26,8 +31,14 @@ from surfacechem.cli.commands import (
     listed,
     refuse_unwritable,
     solved,
+    written_to,
 )
 from surfacechem.errors import InputError, Place, suggestion
+
+if TYPE_CHECKING:
+    from surfacechem.studies.report import Study
+
+MOST_DECADES = 20
 
 app = typer.Typer(
     cls=Commands,
@@ -58,7 +69,7 @@ def main(
 @app.command(epilog=EXIT_CODES)
 def run(
     case: CaseName,
-    output: Annotated[Path | None, Option("--output", "-o", help="netCDF file; <case name>.nc if not given.")] = None,
+    output: Annotated[Path | None, written_to("netCDF file; <case name>.nc if not given.")] = None,
     changes: Changes = None,
     solver: SolverName = None,
     rtol: Tolerance = None,
@@ -96,9 +107,7 @@ def run(
 @app.command(epilog=EXIT_CODES)
 def sweep(
     case: CaseName,
-    output: Annotated[
-        Path | None, Option("--output", "-o", help="netCDF file; <case name>-sweep.nc if not given.")
-    ] = None,
+    output: Annotated[Path | None, written_to("netCDF file; <case name>-sweep.nc if not given.")] = None,
     over: Annotated[
         list[str] | None,
         Option("--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."),
@@ -188,11 +197,9 @@ def laws(name: Annotated[str | None, Argument(help="Show all about this law.")] 
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of case files."""
-    import json
+    from surfacechem.format.schema import text
 
-    from surfacechem.format.schema import schema as document
-
-    typer.echo(json.dumps(document(), indent=2, ensure_ascii=False))
+    typer.echo(text(), nl=False)
 
 
 @app.command()
@@ -209,7 +216,7 @@ def mechanism(
     phase: Annotated[str | None, Option("--phase", help="The phase, where the file has several.")] = None,
     temperature: Annotated[str, Option("--temperature", "-T", help="Range, or one value.")] = "280..360 K",
     force: Annotated[str, Option("--force", help="Range of the force per bond, or one value.")] = "0..100 pN",
-    output: Annotated[Path | None, Option("--output", "-o", help="Plot to .png, .svg or .pdf.")] = None,
+    output: Annotated[Path | None, written_to("Plot to .png, .svg or .pdf.")] = None,
 ) -> None:
     """Print species, reactions, rates over temperature and force, and what is consistent."""
     from surfacechem.mechanism import load_mechanism
@@ -232,9 +239,7 @@ def mechanism(
 @app.command(epilog=EXIT_CODES)
 def plot(
     source: Annotated[str, Argument(metavar="FILE.nc|CASE", help="A dataset, or a case to run first.")],
-    output: Annotated[
-        Path | None, Option("--output", "-o", help=".png, .svg or .pdf; <name>.png if not given.")
-    ] = None,
+    output: Annotated[Path | None, written_to(".png, .svg or .pdf; <name>.png if not given.")] = None,
     variables: Annotated[str | None, Option("--variables", help="Variables to plot, with commas between.")] = None,
     against: Annotated[
         str | None, Option("--against", metavar="VARIABLE", help="A variable as the axis, instead of time.")
@@ -262,7 +267,7 @@ def plot(
 @app.command(epilog=EXIT_CODES)
 def rerun(
     file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
-    output: Annotated[Path | None, Option("--output", "-o", help="Write the new dataset here.")] = None,
+    output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""
@@ -285,6 +290,92 @@ def rerun(
             typer.echo(f"written to {output}")
 
 
-# Last, as `--help` lists the commands in this order.
-app.command(epilog=studies.PRECISION_CODES)(studies.precision)
-app.command(epilog=studies.STABILITY_CODES)(studies.stability)
+@app.command(epilog=PRECISION_CODES)
+def precision(
+    cases: Annotated[list[str], Argument(metavar="CASE...", help="Case files, or names of shipped cases.")],
+    solvers: SolverNames = None,
+    tolerances: Annotated[
+        str | None, Option("--tolerances", help="Relative tolerances, 1e-4,1e-8, or their decades, 1e-4..1e-8.")
+    ] = None,
+    variables: Annotated[
+        str | None, Option("--variables", help="Variables whose errors count; the states if not given.")
+    ] = None,
+    repeat: Annotated[int | None, Option("--repeat", help="Timed rounds; 5 if not given.")] = None,
+    output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; precision if not given.")] = None,
+    changes: Changes = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run cases with several solvers over tolerances: error against run time, as table, netCDF, figure and report."""
+    from surfacechem.studies import precision as studies
+
+    settings = {
+        "solvers": None if solvers is None else listed(solvers),
+        "tolerances": None if tolerances is None else _tolerances(tolerances),
+        "variables": None if variables is None else listed(variables),
+        "repeat": repeat,
+    }
+    given = {name: value for name, value in settings.items() if value is not None}
+    _conduct(lambda: studies.precision(cases, overrides=changes or (), **given), output or Path("precision"), quiet)  # type: ignore[arg-type]
+
+
+@app.command(epilog=STABILITY_CODES)
+def stability(
+    regimes: Annotated[
+        list[str] | None, Argument(metavar="[REGIME]...", help="Names of regimes; all if none is given.")
+    ] = None,
+    solvers: SolverNames = None,
+    quick: Annotated[bool, Option("--quick", help="Four values of each regime, from mild to extreme.")] = False,
+    search: Annotated[
+        int | None, Option("--search", help="Rounds of the search for worst corners; 12 if not given, 0: none.")
+    ] = None,
+    rtol: Tolerance = None,
+    output: Annotated[Path | None, written_to("Name of .nc, .svg, .png and .html; stability if not given.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Solve dangerous regimes over decades of their parameter with several solvers, and report what each keeps."""
+    from surfacechem.studies import stability as studies
+
+    settings = {"solvers": None if solvers is None else listed(solvers), "rtol": rtol, "rounds": search}
+    given = {name: value for name, value in settings.items() if value is not None}
+    _conduct(lambda: studies.stability(*(regimes or ()), quick=quick, **given), output or Path("stability"), quiet)  # type: ignore[arg-type]
+
+
+def _conduct(run: Callable[[], Study], target: Path, quiet: bool) -> None:
+    """Run a study, which takes minutes, so that it says on a terminal what it is at; write and print it."""
+    from surfacechem.studies.report import targets
+
+    files = targets(target).values()
+    refuse_unwritable(*files)
+    if sys.stderr.isatty() and not quiet:
+        import logging
+
+        logging.basicConfig(format="%(message)s ...")
+        logging.getLogger("surfacechem").setLevel(logging.INFO)
+    study = solved(run, quiet)
+    study.write(target)
+    if not quiet:
+        typer.echo(study.page.text())
+        typer.echo(f"\nwritten to {', '.join(map(str, files))}")
+    leave_with(study.status)
+
+
+def _tolerances(text: str) -> list[float]:
+    """Numbers with commas between, or all decades of a range.
+
+    >>> _tolerances("1e-4..1e-6"), _tolerances("1e-3, 1e-7")
+    ([0.0001, 1e-05, 1e-06], [0.001, 1e-07])
+    """
+    place = Place(path="--tolerances")
+    loose, dots, tight = text.partition("..")
+    try:
+        values = [float(part) for part in ((loose, tight) if dots else listed(text))]
+    except ValueError:
+        message = f"'{text}' are no tolerances; give numbers, 1e-4,1e-8, or decades, 1e-4..1e-12."
+        raise InputError(message, place) from None
+    if not dots:
+        return values
+    last, first = sorted(values)
+    if not 0 < last <= first:
+        raise InputError(f"'{text}' is no range of tolerances, for example 1e-4..1e-12.", place)
+    count = min(round(math.log10(first / last)), MOST_DECADES)
+    return [float(f"{first * 10.0**-k:.12g}") for k in range(count + 1)]

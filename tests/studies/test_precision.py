@@ -377,7 +377,7 @@ def test_bad_input_is_refused_before_anything_runs(arguments, message, tmp_path,
 
 
 def test_tolerances_may_be_decades(study):
-    from surfacechem.cli.studies import _tolerances
+    from surfacechem.cli.main import _tolerances
 
     assert _tolerances("1e-4..1e-12") == [float(f"1e-{k}") for k in range(4, 13)]
     assert study.axes["tolerance"] == [1e-4, 1e-7, 1e-10]
