@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import threading
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 
+# Exit code of each way in which a run ends.
 STATUS = {"finished": 0, "stopped": 3, "failed": 4}
-"""Exit code of each way in which a run ends."""
 
 DIFFERENT, BAD_INPUT, UNWRITTEN, SIGNALLED = 1, 2, 5, 128
 
@@ -164,6 +163,8 @@ def wait_for(work: Callable[[], R]) -> R:
     >>> wait_for(lambda: 42)
     42
     """
+    from concurrent.futures import ThreadPoolExecutor, wait
+
     pool = ThreadPoolExecutor(1)
     try:
         future = pool.submit(work)

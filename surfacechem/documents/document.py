@@ -17,8 +17,8 @@ from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
 
+# Mappings and lists inside each other.
 DEEPEST = 24
-"""Mappings and lists inside each other."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Limits:
     """Values, with what aliases repeat; they are read in some 2 s."""
 
 
+# Of a case; longer tables belong into files of their own.
 CASE = Limits()
-"""Of a case; longer tables belong into files of their own."""
 
+# What stands for the file in messages about a value that the user has set from outside the document.
 ORIGIN = "override"
-"""What stands for the file in messages about a value that the user has set from outside the document."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_][A-Za-z0-9]+)*")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}")

@@ -9,11 +9,11 @@ from dataclasses import replace
 from surfacechem.documents.document import ORIGIN, Tree, from_plain, labels, parse, with_paths
 from surfacechem.errors import InputError, Place, suggestion
 
+# Keys of a value that may also stand by itself.
 WRITTEN_OUT = ("level", "value", "rises-to")
-"""Keys of a value that may also stand by itself."""
 
+# Sections that may be one value, and the key that it is short for.
 WHOLE = {"interface.mechanism": "file"}
-"""Sections that may be one value, and the key that it is short for."""
 
 
 def apply(tree: Tree, overrides: Sequence[str] | Mapping[str, object]) -> Tree:

@@ -37,20 +37,20 @@ from surfacechem.quantities import INTERNAL, VARIABLES
 
 Schema = dict[str, Any]
 
+# A number, with or without a unit.
 QUANTITY = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*(\S.*)?$"
-"""A number, with or without a unit."""
 
+# Default of a key that must be given.
 REQUIRED = MISSING
-"""Default of a key that must be given."""
 
+# Names of temperatures start with T, so that they never clash with another quantity.
 NODE = re.compile(r"T[A-Za-z0-9_]*")
-"""Names of temperatures start with T, so that they never clash with another quantity."""
 
+# Entries of a list. Of laws each may be the same again, and names are numbered up to a thousand.
 MOST = 500
-"""Entries of a list. Of laws each may be the same again, and names are numbered up to a thousand."""
 
+# Parameters that are a change of their variable, so that degrees Celsius have no meaning for them.
 DIFFERENCES = ("amplitude",)
-"""Parameters that are a change of their variable, so that degrees Celsius have no meaning for them."""
 
 UNITS = {name: variable.unit for name, variable in VARIABLES.items() if name not in INTERNAL}
 

@@ -17,8 +17,8 @@ from surfacechem.errors import InputError, suggestion
 from surfacechem.format.declarations import Context, read
 from surfacechem.format.sections import LINEAR, MOST_AXES, MOST_RUNS, SWEPT, UNTIL, RangeSection, SweepSection
 
+# Statistics of the load at rupture, with their words, where runs end at a load.
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
-"""Statistics of the load at rupture, with their words, where runs end at a load."""
 
 
 @dataclass(frozen=True)

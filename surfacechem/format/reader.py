@@ -9,15 +9,14 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
-from surfacechem.contracts.terms import Property
+from surfacechem.contracts.terms import Law, Property
 from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.format.declarations import UNITS, Context, is_name, keys, read
-from surfacechem.format.mechanism import with_numbers
+from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
 from surfacechem.format.sections import (
     BODY_NAME,
     LINEAR,
@@ -32,7 +31,6 @@ from surfacechem.format.sections import (
     MediumSection,
     ReferenceSection,
     RunSection,
-    StageSection,
     Threshold,
 )
 from surfacechem.quantities import VARIABLES
@@ -43,15 +41,18 @@ from surfacechem.tolerances import DEFAULT_RTOL, NOTHING
 
 if TYPE_CHECKING:
     from surfacechem.mechanism import Mechanism
+    from surfacechem.mechanism.mixture import Species
 
+L = TypeVar("L", bound=Law)
+
+# Names that stand for the temperature of body 1, of body 2 and of the interface.
 OWNERS = {"T_1": 0, "T_2": 1, "T_c": 2}
-"""Names that stand for the temperature of body 1, of body 2 and of the interface."""
 
 RESERVED = ("T_a", "T_from", "T_to")
 TAKEN = ("interface", "surroundings", "reference")
 
+# Cells of a body before a run has chosen them.
 FIRST_CELLS = 16
-"""Cells of a body before a run has chosen them."""
 
 
 @dataclass(frozen=True)
@@ -267,27 +268,27 @@ def _stiffness(body: BodySection) -> float | None:
 
 
 def _stages(case: Document) -> tuple[Stage, ...]:
-    stages = tuple(_stage(name, section) for entry in case.programme for name, section in entry.items())
+    stages = []
+    for name, section in (item for entry in case.programme for item in entry.items()):
+        stage, until = Stage(name, section.more, place=section.tree.place), section.until
+        if section.has("for") and section.has("until"):
+            raise section.error("the stage has two ends: give `for` or `until`.", "until")
+        if not isinstance(until, Mapping):
+            stages.append(replace(stage, duration=section.duration, event=until or ""))
+            continue
+        ((variable, value),) = until.items()
+        if isinstance(value, Threshold):
+            ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
+            if len(ends) != 1:
+                raise value.error("give `rises-to` or `falls-to`.")
+            stages.append(replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None))
+        else:
+            stages.append(replace(stage, variable=variable, value=value))
     for stage in stages[:-1]:
         if stage.duration is None and not stage.variable and not stage.event:
             message = f"only the last stage may be without end: give {stage.name} `for` or `until`."
             raise case.error(message, "programme")
-    return stages
-
-
-def _stage(name: str, section: StageSection) -> Stage:
-    stage = Stage(name, section.more, place=section.tree.place)
-    if section.has("for") and section.has("until"):
-        raise section.error("the stage has two ends: give `for` or `until`.", "until")
-    if not isinstance(section.until, Mapping):
-        return replace(stage, duration=section.duration, event=section.until or "")
-    ((variable, value),) = section.until.items()
-    if not isinstance(value, Threshold):
-        return replace(stage, variable=variable, value=value)
-    ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
-    if len(ends) != 1:
-        raise value.error("give `rises-to` or `falls-to`.")
-    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
+    return tuple(stages)
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:
@@ -326,7 +327,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
 
     def load(path: Path, shown: str) -> Mechanism:
         loaded = load_mechanism(path, section.phase, section.bonds or (), tree.place, evaluate, neighbours, shown)
-        return with_numbers(loaded, section.species, section.reactions)
+        return _renumbered(loaded, section.species, section.reactions)
 
     if content is None:
         path = _find(file, base, tree.value["file"] if isinstance(named, MechanismSection) else tree)
@@ -351,6 +352,50 @@ def _find(name: str, base: Path, tree: Tree) -> Path:
             return path
     known = [path.stem for path in shipped.mechanisms().glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
+
+
+def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | None) -> Mechanism:
+    """The mechanism with other numbers of some species, by name, and of some reactions, by label."""
+    if species is not None:
+        (mixture,) = mechanism.potentials
+        given = species.mapping(mechanism.species, "species")
+        known: dict[str, Species] = {item.name: item for item in vars(mixture)["species"]}
+        if given and any(item.fixed for item in known.values()):
+            raise species.error("Cantera evaluates reactions here with the thermo of the file. Change it in the file.")
+        known |= {name: _species(known[name], child) for name, child in given.items()}
+
+        def renewed(law: L) -> L:
+            return law.bind({"species": tuple(known[item.name] for item in vars(law)["species"])})
+
+        laws = tuple(renewed(law) for law in mechanism.reactions)
+        mechanism = replace(mechanism, potentials=(renewed(mixture),), reactions=laws)
+    if reactions is not None:
+        given = reactions.mapping([law.label for law in mechanism.reactions], "reactions")
+        laws = tuple(_changed(law, given[law.label]) if law.label in given else law for law in mechanism.reactions)
+        mechanism = replace(mechanism, reactions=laws)
+    return mechanism
+
+
+def _species(item: Species, tree: Tree) -> Species:
+    """A species with numbers for its bond and for its thermo, by temperature range where it has several."""
+    ranges = item.gibbs.ranges
+    own: list[Law] = [law for law in (item.spring, ranges.get("")) if law is not None]
+    keys = {name: law for law in own for name, _ in law.specs()}
+    fields = tree.mapping([*keys, *filter(None, ranges)])
+
+    def renewed(law: L, part: Tree | None = None) -> L:
+        inner = {key: child for key, child in fields.items() if keys.get(key) is law}
+        return _changed(law, part or replace(tree, value=inner))
+
+    forms = [renewed(form, fields.get(key)) for key, form in ranges.items()]
+    return replace(item, gibbs=item.gibbs.with_forms(forms), spring=item.spring and renewed(item.spring))
+
+
+def _changed(law: L, tree: Tree) -> L:
+    """A law with the numbers that a case gives for it."""
+    specs = {name: law.refine(name, spec) for name, spec in law.specs() if spec.varies}
+    fields = tree.mapping(specs, "parameters")
+    return law.given({name: number(child, specs[name], name) for name, child in fields.items()})
 
 
 # -- run and exact solution -------------------------------------------------------------------------------------------

@@ -60,8 +60,8 @@ from surfacechem.tolerances import DEFAULT_RTOL
 
 BODY_NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 
+# Variables beside temperatures and bonds that some scenes evolve; whether this one does, its assembly decides.
 EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t", "w_t2", "F_n", "F_t", "F_t2", "p")
-"""Variables beside temperatures and bonds that some scenes evolve; whether this one does, its assembly decides."""
 
 LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
@@ -69,8 +69,8 @@ LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
 MOST_AXES = 2
 
+# Ratio of the widths of the first and the last cell at most, so that they keep their order in doubles.
 STEEPEST = 1e6
-"""Ratio of the widths of the first and the last cell at most, so that they keep their order in doubles."""
 
 
 def _variables(names: Sequence[str], content: Content) -> dict[str, Key]:
@@ -372,13 +372,13 @@ def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
         yield from ((item.name, item.metadata["spec"]) for item in dataclasses.fields(references.get(name)))  # type: ignore[arg-type]
 
 
+# An exact solution, by name or with its parameters.
 REFERENCE = Shapes(
     OneOf("exact solution", references.names),
     Nested(ReferenceSection),
     wanted="an exact solution is given by its name, for example `reference: exothermic-bonding`, or as "
     "`{name: ..., parameters}`",
 )
-"""An exact solution, by name or with its parameters."""
 
 
 class RangeSection(Section):
@@ -394,8 +394,8 @@ class RangeSection(Section):
 
 OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
 
+# Values of a swept parameter, in its unit.
 SWEPT = Shapes(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
-"""Values of a swept parameter, in its unit."""
 
 SWEPT_BY_PATH = Entries(
     others=Later(SWEPT),
@@ -404,6 +404,7 @@ SWEPT_BY_PATH = Entries(
     wanted=f"a sweep needs `over`: one or two parameters, for example `{OVER}`",
 )
 
+# A prescribed variable and the value at which each run of a sweep ends.
 UNTIL = Entries(
     others=amount("[x]"),
     names=lambda _: UNITS,
@@ -411,7 +412,6 @@ UNTIL = Entries(
     at_most=1,
     wanted="`until` is one prescribed variable and its value, for example `until: {f: 200 pN}`",
 )
-"""A prescribed variable and the value at which each run of a sweep ends."""
 
 
 class SweepSection(Section):

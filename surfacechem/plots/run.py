@@ -22,6 +22,7 @@ from surfacechem.plots import style
 from surfacechem.plots.style import Array, meaning, symbol, unit, unit_text, varies
 from surfacechem.tolerances import EPS, ROUNDING
 
+# Panels of the usual figure: title, unit and pattern of the names.
 KINDS: tuple[tuple[str, str, str], ...] = (
     ("Temperature", "K", r".*"),
     ("Bonding", "1", r"(?!formed_|departure_|.*_residual$|J_c$|n_c$|gamma_m$|ln_theta$|drive$).*"),
@@ -32,31 +33,30 @@ KINDS: tuple[tuple[str, str, str], ...] = (
     ("Heat flux", "W m-2", r"q_(?!m$|t$|.*_nominal$)\w+"),
     ("Dissipation", "W m-2", r"D_\w+"),
 )
-"""Panels of the usual figure: title, unit and pattern of the names."""
 
+# Residuals and the attributes that hold their largest relative values.
 RESIDUALS = {"energy_residual": "energy_error", "entropy_residual": "entropy_error", "site_residual": "site_error"}
-"""Residuals and the attributes that hold their largest relative values."""
 
+# Residuals below this, which is far below the last digit of what is balanced, are drawn as this.
 LEAST = EPS / 256
-"""Residuals below this, which is far below the last digit of what is balanced, are drawn as this."""
 
+# Times that span more than this go on a logarithmic axis, unless they are evenly spaced.
 DECADES = 1e3
-"""Times that span more than this go on a logarithmic axis, unless they are evenly spaced."""
 
+# A title of so many letters does not fit beside a panel.
 TOO_LONG = 26
-"""A title of so many letters does not fit beside a panel."""
 
+# Names of the temperatures across bodies, functions of time and place.
 PROFILE = re.compile("profile_[12]")
-"""Names of the temperatures across bodies, functions of time and place."""
 
+# Times at which profiles are drawn, evenly spread over the outputs.
 PROFILE_TIMES = 6
-"""Times at which profiles are drawn, evenly spread over the outputs."""
 
+# Up to this many events have their names written to them; above so many lines nothing could be told from them.
 FEW, MANY = 8, 60
-"""Up to this many events have their names written to them; above so many lines nothing could be told from them."""
 
+# Part of the run that a stage must last for its name to fit.
 WIDE = 0.09
-"""Part of the run that a stage must last for its name to fit."""
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,15 @@ def figure(dataset: xarray.Dataset) -> Figure:
 
 # -- run time against error --------------------------------------------------------------------------------------------
 
+# Variables that name what lies along a dimension; CF allows coordinate variables of numbers only.
 LABELS = {"case": "case_name", "solver": "solver_name", "variable": "variable_name"}
-"""Variables that name what lies along a dimension; CF allows coordinate variables of numbers only."""
 
+# Variables on x, with their labels.
 ERRORS = {
     "error_max": "largest relative error",
     "error_event": "error of the times of events",
     "energy_error": "energy residual",
 }
-"""Variables on x, with their labels."""
 
 POINT, CASE = ("case", "solver", "tolerance"), ("case",)
 NUMBERS = {
@@ -42,12 +42,12 @@ NUMBERS = {
     **dict.fromkeys((*ERRORS, "run_seconds", "run_seconds_median", "stepping_seconds"), POINT),
     **dict.fromkeys(("uncertainty_max", "uncertainty_event"), CASE),
 }
+# Variables that are read, with their dimensions.
 TEXTS = {"status": POINT, **{name: (dimension,) for dimension, name in LABELS.items()}}
-"""Variables that are read, with their dimensions."""
 
+# Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
+# of its own.
 SMALLEST = EPS / 16
-"""Errors below this are drawn as this: below the last digit, so that an error of zero has a place on a logarithmic axis
-of its own."""
 
 BELOW, INSIDE = "below the uncertainty of the reference", "inside the library's own steps"
 
@@ -117,11 +117,11 @@ def _legend(dataset: xarray.Dataset, looks: list[tuple[str, str]]) -> list[Line2
 
 # -- digits kept -------------------------------------------------------------------------------------------------------
 
+# Marks of the outcomes that are not a plain solution.
 MARKS = {"refused": "R", "failed": "×", "wrong": "!", "sensitive": "~"}
-"""Marks of the outcomes that are not a plain solution."""
 
+# Colours of the outcomes whose digits say nothing.
 NO_ANSWER = {"failed": "0.75", "wrong": "#d62728", "sensitive": "#f0c36d"}
-"""Colours of the outcomes whose digits say nothing."""
 
 MEANING = {
     "refused": "ended for the right reason",
@@ -130,8 +130,8 @@ MEANING = {
     "sensitive": "too sensitive for the tolerance",
 }
 
+# Digits above which the colour of a cell is dark.
 DARK = 8.0
-"""Digits above which the colour of a cell is dark."""
 
 
 def stability(dataset: xarray.Dataset) -> Figure:

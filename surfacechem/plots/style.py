@@ -24,8 +24,8 @@ from surfacechem.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
 
+# The palette of Okabe and Ito, which colour-blind readers can tell apart.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
-"""The palette of Okabe and Ito, which colour-blind readers can tell apart."""
 
 STYLE: Any = {
     "axes.grid": True,
@@ -45,8 +45,8 @@ STYLE: Any = {
     "ytick.labelsize": 8.5,
 }
 
+# A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it.
 FLAT = 1000 * ROUNDING
-"""A curve that changes by less than this part of its size, 9e-10, is constant: rounding may be all of it."""
 
 GREEK = ("alpha", "beta", "epsilon", "eta", "kappa", "lambda", "mu", "phi", "rho", "sigma", "tau", "theta")
 

@@ -19,8 +19,8 @@ from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_
 
 PREFIXES = tuple((10.0 ** (-3 * k), prefix) for k, prefix in enumerate(["", "m", "μ", "n", "p", "f"]))
 
+# Values of a second parameter that are drawn as curves of their own.
 MOST_CURVES = 7
-"""Values of a second parameter that are drawn as curves of their own."""
 
 
 def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None) -> Figure:

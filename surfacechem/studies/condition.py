@@ -23,15 +23,15 @@ Array = NDArray[np.float64]
 Answer = Mapping[str, Array]
 Data = Mapping[str, float]
 
+# The output times among the data.
 TIME = "t"
-"""The output times among the data."""
 
+# Relative steps of the data, from 1e-6 to 16 roundings.
 STEPS = tuple(2.0**-k for k in (20, 24, 28, 32, 36, 40, 44, 48))
-"""Relative steps of the data, from 1e-6 to 16 roundings."""
 
+# Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
+# to one digit. Less would ask for shorter steps, in whose slopes there is more rounding.
 STRAIGHT = 0.1
-"""Relative change of a slope from one step to the next, below which it is one: a choice, as condition numbers are told
-to one digit. Less would ask for shorter steps, in whose slopes there is more rounding."""
 
 
 def condition(problem: Trial, names: Collection[str]) -> float:

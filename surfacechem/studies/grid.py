@@ -21,17 +21,17 @@ from surfacechem.solve.run import Trajectory
 
 # Choices: a busy scheduler takes turns of milliseconds; of brief runs over 50 ms some are undisturbed, and the least
 # time counts.
+# Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often.
 BRIEF, LEAST_REPEATS, MOST_REPEATS = 0.05, 3, 20
-"""Runs briefer than this [s] are repeated within a round up to this time, at least and at most so often."""
 
+# A solver at one value is not timed again once it has taken this long [s].
 BUDGET = 10.0
-"""A solver at one value is not timed again once it has taken this long [s]."""
 
+# Relative tolerance above which no solver is asked.
 LOOSEST = 0.1
-"""Relative tolerance above which no solver is asked."""
 
+# Errors with which libraries end that cannot even say how a run failed.
 FAULTS = (ArithmeticError, RuntimeError, ValueError)
-"""Errors with which libraries end that cannot even say how a run failed."""
 
 
 @dataclass

@@ -31,8 +31,8 @@ from surfacechem.results.findings import ROUNDED
 
 Array = NDArray[np.float64]
 
+# A reaction, by its label, or a pair of one-way reactions.
 Step = str | Opposed
-"""A reaction, by its label, or a pair of one-way reactions."""
 
 TEMPERATURE, FORCE = symengine.symbols("T_c f")
 

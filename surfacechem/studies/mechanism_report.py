@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Temperature [K] at which the thermo of the species is shown, where it is in range.
 STANDARD = 298.15
-"""Temperature [K] at which the thermo of the species is shown, where it is in range."""
 
+# Values of a range that tables and curves show.
 COLUMNS, POINTS = 5, 200
-"""Values of a range that tables and curves show."""
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 REPEAT, MOST_REPEAT = 5, 1000
 
+# Counts of a solver.
 COUNTS = {
     "steps": "steps taken",
     "rejected": "steps rejected",
@@ -35,7 +36,6 @@ COUNTS = {
     "jacobians": "Jacobians",
     "factorizations": "matrices factored",
 }
-"""Counts of a solver."""
 
 HEADING = ("solver", "rtol", "final", "max", "L2", "events", "energy", "time", "median", "longest", "in steps", *COUNTS)
 

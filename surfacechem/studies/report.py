@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+# Packages whose versions a report states.
 LIBRARIES = ("surfacechem", "numpy", "scipy", "numba", "symengine", "cantera", "scikit-sundae", "xarray", "matplotlib")
-"""Packages whose versions a report states."""
 
+# The files of a study, in the order in which they are written.
 SUFFIXES = (".nc", ".svg", ".png", ".html")
-"""The files of a study, in the order in which they are written."""
 
 
 class PageTable(NamedTuple):

@@ -34,34 +34,29 @@ from surfacechem.tolerances import EPS
 
 log = logging.getLogger(__name__)
 
+# Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer; an answer to a
+# problem whose condition leaves no digits at the tolerance.
 SOLVED, REFUSED, FAILED, WRONG, SENSITIVE = OUTCOMES = ("solved", "refused", "failed", "wrong", "sensitive")
-"""Right to some digits; ended or refused for the right reason; a failure that says so; a wrong answer; an answer to a
-problem whose condition leaves no digits at the tolerance.
-"""
 
+# Tolerance of every solver, and the steps after which a run has failed. Choices: all of the libraries take this
+# tolerance, and need 60 to 440 steps at it where a regime is mild.
 RTOL, STEPS = 1e-10, 1500
-"""Tolerance of every solver, and the steps after which a run has failed.
 
-Choices: all of the libraries take this tolerance, and need 60 to 440 steps at it where a regime is mild.
-"""
-
+# Digits below which a value that is given out as an answer is wrong, and those that a double holds.
 LEAST, MOST = 2.0, 16.0
-"""Digits below which a value that is given out as an answer is wrong, and those that a double holds."""
 
 SOLVERS = (OWN, "lsoda", "bdf", "scipy-radau", "cvode", "ida")
 
+# Rounds of a search for a worst corner, and the most that may be asked for.
 ROUNDS, MOST_ROUNDS = 12, 10_000
-"""Rounds of a search for a worst corner, and the most that may be asked for."""
 
 SEED = 20210301
+# Differential evolution: points kept, length of a difference, share of its coordinates that is taken. Few points, since
+# each is a case to be compiled; the other two are in the ranges that Storn & Price advise.
 POPULATION, WEIGHT, CROSSOVER = 8, 0.7, 0.8
-"""Differential evolution: points kept, length of a difference, share of its coordinates that is taken.
 
-Few points, since each is a case to be compiled; the other two are in the ranges that Storn & Price advise.
-"""
-
+# A failure counts as worse than any error, a wrong answer as worse than a failure.
 BADNESS = {FAILED: MOST, WRONG: 2 * MOST}
-"""A failure counts as worse than any error, a wrong answer as worse than a failure."""
 
 MEANING = (
     f"Digits kept are -log10 of the largest relative error; {MOST:g} is rounding. R: ended or refused by physics, for "

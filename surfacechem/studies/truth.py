@@ -34,32 +34,31 @@ Array = NDArray[np.float64]
 Values = Mapping[str, Array]
 
 # Different families: collocation twice, by different authors, and multistep. A bug of one is not one of the other.
+# Methods that a reference may be made of; the last only where it is needed.
 METHODS = ("radau", "scipy-radau", "lsoda", "cantera")
-"""Methods that a reference may be made of; the last only where it is needed."""
 
 # Closer tolerances would differ by little more than rounding, others would leave the range where errors follow them.
+# Ratio of the two tolerances from which a method is extrapolated.
 DECADE = 10.0
-"""Ratio of the two tolerances from which a method is extrapolated."""
 
+# A solve that takes longer than this counts as failed, unless the case allows less; one for a reference may take so
+# long [s]: which methods it is made of must not depend on how busy a machine is.
 MOST_SECONDS, LONGEST = 60.0, 900.0
-"""A solve that takes longer than this counts as failed, unless the case allows less; one for a reference may take so
-long [s]: which methods it is made of must not depend on how busy a machine is.
-"""
 
+# Relative tolerances of a study, if none are given.
 TOLERANCES = tuple(10.0**-k for k in (4, 6, 8, 10, 12))
-"""Relative tolerances of a study, if none are given."""
 
+# Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance.
 AGREE = TOLERANCES[0] / 100
-"""Methods that differ by more do not agree: a reference must still tell the errors of the loosest tolerance."""
 
 KINDS = ("final", "max", "l2")
+# The kinds of errors; the last is not of variables.
 MEANING = {
     "final": "relative error at the end",
     "max": "largest relative error",
     "l2": "root mean square in time of the relative error",
     "event": "largest relative error of the times of events",
 }
-"""The kinds of errors; the last is not of variables."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from surfacechem.cli import commands
 from surfacechem.cli.main import app
 from surfacechem.documents import shipped as data
+from surfacechem.laws import FAMILIES, laws
 from surfacechem.runs import listing
 
 pytestmark = pytest.mark.around
@@ -44,6 +45,9 @@ loading: {Q_1: -50 W/m^2}
 initial: {T: 300 K}
 run: {until: 400 s, outputs: 41}
 """
+
+
+LAWS = [law for contract in FAMILIES for law in laws(contract).values()]
 
 
 @pytest.fixture
@@ -85,21 +89,13 @@ class TestRun:
         assert "phi, T; perfect contact; radau at rtol 1e-10" in done.stdout
         assert files(tmp_path) == {"bonding.nc"}
 
-    def test_settings_of_the_command_line_are_recorded(self, call):
-        assert call("run", "bonding.yaml", "--solver", "lsoda", "--rtol", "1e-8", "-o", "x.nc").exit_code == 0
-        with netCDF4.Dataset("x.nc") as file:
-            assert (file.solver, file.rtol) == ("lsoda", 1e-8)
-
-    def test_set_changes_the_case_that_the_dataset_carries(self, call):
-        assert call("run", "bonding.yaml", "--set", "initial.T=310 K", "--set", "run.outputs=5").exit_code == 0
-        with netCDF4.Dataset("bonding.nc") as file:
-            assert file["T"][0] == 310.0
-            assert len(file["T"]) == 5
-            assert "310 K" in file.case
-
-    def test_quiet_prints_nothing(self, call):
-        done = call("run", "bonding.yaml", "-q")
+    def test_settings_and_changes_are_recorded(self, call):
+        options = ["--solver", "lsoda", "--rtol", "1e-8", "--set", "initial.T=310 K", "--set", "run.outputs=5"]
+        done = call("run", "bonding.yaml", *options, "-o", "x.nc", "-q")
         assert (done.exit_code, done.output) == (0, "")
+        with netCDF4.Dataset("x.nc") as file:
+            assert (file.solver, file.rtol, file["T"][0], len(file["T"])) == ("lsoda", 1e-8, 310.0, 5)
+            assert "310 K" in file.case
 
     def test_stopped_by_physics_is_written_and_explained(self, call):
         done = call("run", "cooling.yaml")
@@ -108,15 +104,12 @@ class TestRun:
         with netCDF4.Dataset("cooling.nc") as file:
             assert file.status == "stopped"
             assert file["time"][-1] <= 300.0
-
-    def test_stopped_by_physics_speaks_up_when_quiet(self, call):
         done = call("run", "cooling.yaml", "--quiet")
         assert (done.exit_code, done.stdout) == (3, "")
         assert "reached zero" in done.stderr
 
     def test_numerical_failure_is_written_up_to_there(self, call):
-        done = call("run", "bonding.yaml", "--set", "run.max-steps=2")
-        assert done.exit_code == 4
+        assert call("run", "bonding.yaml", "--set", "run.max-steps=2").exit_code == 4
         with netCDF4.Dataset("bonding.nc") as file:
             assert file.status == "failed"
             assert 0 < len(file["time"]) < 26
@@ -139,61 +132,65 @@ class TestRun:
         (["run", "bonding.yaml", "--set", "initial.T=3 m"], "initial.T"),
         (["run", "bonding.yaml", "-o", "no/folder/x.nc"], "no/folder/x.nc: cannot be written"),
         (["run", "bonding.yaml", "-o", "."], "is a directory"),
+        (
+            ["run", "bonding.yaml", "-o", "x.csv"],
+            "x.csv: datasets are written as netCDF, not as '.csv': .nc, .nc4, .cdf.",
+        ),
+        (["run", "bonding.yaml", "-o", "bonding.yaml"], "is the case itself"),
+        (["run", "loop.yaml"], "surfacechem: loop.yaml: is a link to loop.yaml, where no file is."),
+        (
+            ["sweep", "bonding.yaml", "--over", "initial.T=[300]", "-o", "x.csv"],
+            "not as '.csv': .nc, .nc4, .cdf. Give x.nc",
+        ),
         (["equations", "bonding.yaml", "--format", "pyton"], "Did you mean 'python'?"),
         (["laws", "colomb"], "Did you mean 'coulomb'?"),
         (["plot", "nothing.nc"], "nothing.nc: is not a readable netCDF dataset"),
         (["plot", "bonding.yaml", "-o", "x.gif"], "no format 'gif'"),
+        (["plot", "bonding.yaml", "-o", "no/x.png"], "no/x.png: cannot be written"),
         (["plot", "bonding.yaml", "--variables", "T,fi"], "no variable 'fi'"),
         (["rerun", "bonding.yaml"], "bonding.yaml: is not a readable netCDF dataset"),
         (["check", "bonding.yaml", "--set", "interface.potential.bond-energy.K_2=700 J/m^2"], "capacity at T was lost"),
     ],
 )
-def test_bad_input_is_one_message_and_nothing_is_written(call, tmp_path, arguments, message):
+def test_bad_input_is_one_message_and_nothing_is_written(call, tmp_path, arguments, message, monkeypatch):
+    from surfacechem.runs.simulation import Simulation
+
+    if "-o" in arguments:  # what cannot be written is not computed either
+        monkeypatch.setattr(Simulation, "run", lambda *_, **__: pytest.fail("computed"))
+    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
     done = call(*arguments)
     assert done.exit_code == 2
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
     assert done.stdout == ""
-    assert files(tmp_path) == set()
-
-
-def test_unwritable_output_is_refused_before_computing(call, monkeypatch):
-    from surfacechem.runs.simulation import Simulation
-
-    monkeypatch.setattr(Simulation, "run", lambda *_, **__: pytest.fail("computed"))
-    assert call("run", "bonding.yaml", "-o", "no/x.nc").exit_code == 2
-    assert call("plot", "bonding.yaml", "-o", "no/x.png").exit_code == 2
+    assert files(tmp_path) == {"loop.yaml"}
+    assert (tmp_path / "bonding.yaml").read_text() == BONDING
 
 
 class TestCheck:
     def test_says_the_scene_back(self, call):
-        done = call("check", "bonding.yaml")
+        done = call("check", "bonding.yaml", "--set", "loading.p=1 kPa")
         assert done.exit_code == 0
         for words in ("perfect contact:", "T_c  merged", "phi  [1]  evolved", "bonding    linear-affinity"):
             assert words in done.stdout
+        assert "Warnings\n  loading: p is prescribed but nothing reads it." in done.stdout
 
     def test_numbers(self, call):
-        done = call("check", "bonding.yaml", "--set", "interface.potential.bond-energy.K_2=150 J/m^2")
-        values = dict(re.findall(r"^  (kappa_\d|t_fast|stiffness) +(\S+)", done.stdout, re.MULTILINE))
+        """phi' = c_r K_0 (1 - phi) / N_c relaxes in 1 / (c_r K_0 / N_c) = 0.4975 s."""
+        text = call("check", "bonding.yaml").stdout
+        assert re.search(r"t_fast +0.4975 s", text)
+        assert re.search(r"stiffness +5.025", text)
+        text = call("check", "bonding.yaml", "--set", "interface.potential.bond-energy.K_2=150 J/m^2").stdout
+        values = dict(re.findall(r"^  (kappa_\d) +(\S+)", text, re.MULTILINE))
         assert float(values["kappa_0"]) == pytest.approx(300 / (2 * 300))
         assert float(values["kappa_2"]) == pytest.approx(150 / (2 * 300))
-        assert "must be below 1: valid" in done.stdout
+        assert "must be below 1: valid" in text
 
-    def test_time_scales_are_those_of_the_equations(self, call):
-        """phi' = c_r K_0 (1 - phi) / N_c relaxes in 1 / (c_r K_0 / N_c) = 0.4975 s."""
-        done = call("check", "bonding.yaml")
-        assert re.search(r"t_fast +0.4975 s", done.stdout)
-        assert re.search(r"stiffness +5.025", done.stdout)
-
-    def test_algebraic_rows_are_named(self, call):
-        text = (
-            BONDING.replace("temperature: T, C", "temperature: T_k, C").replace("T_k", "T_1", 1).replace("T_k", "T_2")
-        )
-        text = re.sub(r"interface:.*?(?=initial)", "interface: {temperature: T_c}\n", text, flags=re.DOTALL)
+    def test_algebraic_rows_are_named(self, call, tmp_path):
         heat = "".join(f"  - conductance: {{between: [interface, {b}], h: 10 W/m^2/K}}\n" for b in ("lower", "upper"))
-        text = text.replace("initial: {phi: 0, T: 300 K}", f"heat:\n{heat}initial: {{T_1: 300 K, T_2: 320 K}}")
-        with open("medium.yaml", "w") as file:
-            file.write(text)
+        bodies = BONDING.partition("interface:")[0].replace("T, C", "T_1, C", 1).replace("T, C", "T_2, C", 1)
+        initial = "initial: {T_1: 300 K, T_2: 320 K}\nrun: {until: 2.5 s}\n"
+        (tmp_path / "medium.yaml").write_text(f"{bodies}interface: {{temperature: T_c}}\nheat:\n{heat}{initial}")
         done = call("check", "medium.yaml")
         assert re.search(r"T_c +\[K\] +algebraic", done.stdout), done.output
         assert "separate interface temperature" in done.stdout
@@ -202,15 +199,10 @@ class TestCheck:
         ("other", "regime"),
         [("300 K", "isothermal"), ("301 K", "prescribed temperatures"), (RISING, "prescribed temperatures")],
     )
-    def test_given_temperatures_are_no_separate_one(self, call, other, regime):
-        with open("given.yaml", "w") as file:
-            file.write(GIVEN.replace("OTHER", other))
+    def test_given_temperatures_are_no_separate_one(self, call, other, regime, tmp_path):
+        (tmp_path / "given.yaml").write_text(GIVEN.replace("OTHER", other))
         done = call("check", "given.yaml")
         assert re.search(rf"regime +{regime}: bodies and interface", done.stdout), done.output
-
-    def test_what_has_no_effect_is_a_warning(self, call):
-        done = call("check", "bonding.yaml", "--set", "loading.p=1 kPa")
-        assert "Warnings\n  loading: p is prescribed but nothing reads it." in done.stdout
 
 
 def test_equations_run(call):
@@ -225,46 +217,32 @@ def test_equations_run(call):
 
 class TestListings:
     def test_every_law_is_listed_with_its_units_and_source(self, call):
-        from surfacechem.laws import FAMILIES, laws
-
         text = call("laws").stdout
-        every = [law for contract in FAMILIES for law in laws(contract).values()]
-        assert text.count("Source: ") == len(every)
+        assert text.count("Source: ") == len(LAWS)
         assert "not stated" not in text
-        for law in every:
+        for law in LAWS:
             assert f"\n  {law.name()}\n" in text
         assert "mu [1]: sliding friction coefficient, >= 0" in text
         assert "\\" not in text
 
     def test_a_law_in_full(self, call):
+        """Of the commands of a formula only names of functions and text stay words."""
         text = call("laws", "coulomb").stdout
         assert text.startswith("coulomb (friction)\n")
         assert "Amontons-Coulomb dry friction." in text
-        assert "mu [1]: sliding friction coefficient, >= 0" in text
-
-    def test_formulas_have_no_words_of_latex(self, call):
-        """Of the commands of a formula only names of functions and text stay words."""
-        from surfacechem.laws import FAMILIES, laws
-
-        for law in (law for contract in FAMILIES for law in laws(contract).values()):
-            text = call("laws", law.name()).stdout
+        for law in LAWS:
+            text = listing.law_page(law.name())
             assert not re.search(r"\\|:math|\.\. math|[{}]", text.partition(">>>")[0]), text
             commands = set(re.findall(r"\\([A-Za-z]{2,})", inspect.getdoc(law) or ""))
             layout = "|".join(commands - {"ln", "exp", "sin", "cos", "min", "max", "sqrt"})
             formulas = " ".join(listing.formulas(law))
             assert not (layout and re.search(rf"(?<![A-Za-z])(?:{layout})(?![A-Za-z])", formulas)), formulas
 
-    def test_schema_is_json(self, call):
+    def test_schema_cases_and_version(self, call):
         assert json.loads(call("schema").stdout)["type"] == "object"
-
-    def test_cases_have_titles(self, call):
-        from surfacechem.documents.shipped import cases
-
         lines = call("cases").stdout.splitlines()
-        assert len(lines) == len(list(cases().glob("*.yaml")))
+        assert len(lines) == len(list(data.cases().glob("*.yaml")))
         assert any(re.match(r"exothermic +Exothermic bonding", line) for line in lines)
-
-    def test_version(self, call):
         assert call("--version").stdout == f"surfacechem {version('surfacechem')}\n"
 
     @pytest.mark.parametrize("command", [[], ["run"], ["rerun"]])
@@ -286,23 +264,16 @@ class TestRerun:
             for name in first.variables:
                 np.testing.assert_array_equal(first[name][...], second[name][...])
 
-    def test_of_a_stopped_run_is_the_same(self, call):
+    def test_every_difference_is_told(self, call):
         call("run", "cooling.yaml")
         assert call("rerun", "cooling.nc").exit_code == 0
-
-    def test_one_bit_is_a_difference(self, call):
-        call("run", "bonding.yaml")
-        with netCDF4.Dataset("bonding.nc", "a") as file:
-            file["phi"][3] = np.nextafter(float(file["phi"][3]), 1.0)
-        done = call("rerun", "bonding.nc")
-        assert done.exit_code == 1
-        assert done.stderr == "surfacechem: bonding.nc: 1 variables differ: phi\n"
-
-    def test_missing_variables_and_other_shapes_are_differences(self, call):
-        call("run", "bonding.yaml")
-        with netCDF4.Dataset("bonding.nc", "a") as file:
-            file.renameVariable("phi", "fi")
-        assert "fi, phi" in call("rerun", "bonding.nc").stderr
+        with netCDF4.Dataset("cooling.nc", "a") as file:
+            file["T"][3] = np.nextafter(float(file["T"][3]), 1.0)
+        done = call("rerun", "cooling.nc")
+        assert (done.exit_code, done.stderr) == (1, "surfacechem: cooling.nc: 1 variables differ: T\n")
+        with netCDF4.Dataset("cooling.nc", "a") as file:
+            file.renameVariable("T", "Temp")
+        assert "Temp, T" in call("rerun", "cooling.nc").stderr
 
     def test_a_file_of_others_is_refused(self, call):
         with netCDF4.Dataset("other.nc", "w"):
@@ -318,60 +289,31 @@ class TestPlot:
         call("run", "bonding.yaml")
         done = call("plot", "bonding.nc", "-o", f"x.{kind}")
         assert (done.exit_code, done.stdout) == (0, f"x.{kind}\n")
-        start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
         content = (tmp_path / f"x.{kind}").read_bytes()
-        assert content.startswith(start)
+        assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind])
         assert len(content) > 10_000
 
-    def test_of_a_case(self, call, tmp_path):
+    def test_of_a_case_ends_like_the_run(self, call, tmp_path):
         assert call("plot", "bonding.yaml", "--set", "run.outputs=9", "--variables", "T, phi").exit_code == 0
-        assert files(tmp_path) == {"bonding.png"}
-
-    def test_of_a_stopped_case_ends_like_the_run(self, call, tmp_path):
         assert call("plot", "cooling.yaml").exit_code == 3
-        assert files(tmp_path) == {"cooling.png"}
+        assert files(tmp_path) == {"bonding.png", "cooling.png"}
 
 
-def test_a_case_is_not_overwritten_by_its_own_dataset(call, tmp_path):
-    case = tmp_path / "mine.yaml"
-    case.write_text((data.cases() / "exothermic.yaml").read_text())
-    result = call("run", case, "-o", case)
-    assert result.exit_code == 2
-    assert "is the case itself" in result.stderr
-    assert case.read_text().startswith("title")
+class TestSweep:
+    def test_has_no_other_axis(self, call, tmp_path):
+        assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0
+        done = call("plot", "s.nc", "--against", "phi")
+        assert done.exit_code == 2
+        assert "--against: a sweep is plotted over what it sweeps" in done.stderr
+        assert files(tmp_path) == {"s.nc"}
 
-
-def test_a_link_that_leads_nowhere_is_called_that(call, tmp_path):
-    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
-    done = call("run", "loop.yaml")
-    assert done.exit_code == 2
-    assert done.stderr == "surfacechem: loop.yaml: is a link to loop.yaml, where no file is.\n"
-
-
-@pytest.mark.parametrize("command", [("run", "bonding.yaml"), ("sweep", "bonding.yaml", "--over", "initial.T=[300]")])
-def test_other_formats_than_netcdf_are_refused(call, tmp_path, command):
-    done = call(*command, "-o", "x.csv")
-    assert done.exit_code == 2
-    assert "x.csv: datasets are written as netCDF, not as '.csv': .nc, .nc4, .cdf. Give x.nc" in done.stderr
-    assert files(tmp_path) == set()
-
-
-def test_a_sweep_has_no_other_axis(call, tmp_path):
-    assert call("sweep", "bonding.yaml", "--over", "initial.T=[300, 310]", "-o", "s.nc", "-q").exit_code == 0
-    done = call("plot", "s.nc", "--against", "phi")
-    assert done.exit_code == 2
-    assert "--against: a sweep is plotted over what it sweeps" in done.stderr
-    assert files(tmp_path) == {"s.nc"}
-
-
-def test_a_sweep_all_of_whose_runs_stop_is_stopped(call):
-    done = call("sweep", "cooling.yaml", "--over", "initial.T=[280, 300]", "-o", "s.nc")
-    assert done.exit_code == 3
-    assert "2 runs: 2 stopped" in done.output
-    some = call("sweep", "cooling.yaml", "--over", "initial.T=[300, 900]", "-o", "s.nc")
-    assert some.exit_code == 0
-    with netCDF4.Dataset("s.nc") as file:
-        assert file.status == "finished"
+    def test_all_of_whose_runs_stop_is_stopped(self, call):
+        done = call("sweep", "cooling.yaml", "--over", "initial.T=[280, 300]", "-o", "s.nc")
+        assert done.exit_code == 3
+        assert "2 runs: 2 stopped" in done.output
+        assert call("sweep", "cooling.yaml", "--over", "initial.T=[300, 900]", "-o", "s.nc").exit_code == 0
+        with netCDF4.Dataset("s.nc") as file:
+            assert file.status == "finished"
 
 
 @pytest.mark.parametrize("handler", [None, signal.SIG_IGN, signal.SIG_DFL, signal.default_int_handler])

@@ -2,6 +2,7 @@
 
 from io import BytesIO
 
+import matplotlib
 import numpy as np
 import pytest
 import xarray
@@ -46,45 +47,60 @@ def labels(plot):
     return [[text.get_text() for text in ax.get_legend().get_texts()] for ax in plot.axes if ax.get_legend()]
 
 
-def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
+def titles(plot):
+    return [ax.get_ylabel() for ax in plot.axes]
+
+
+def texts(ax):
+    return [text.get_text() for text in ax.texts]
+
+
+def with_events(times, names, mode="", text=""):
+    given = {
+        "event_time": ("event", np.array(times), {"units": "s"}),
+        "event_name": ("event", np.array(names, dtype=object), {"units": "1"}),
+    }
     t = np.linspace(0.0, 2.0, 21)
-    more = {"g_n": ("m", t), "u_t": ("m", 2 * t), "ln_theta": ("1", t), "gamma_m": ("1", 1 + t)}
-    plot = figure(dataset(**more))
-    titles = [ax.get_ylabel() for ax in plot.axes]
-    assert titles[1:4] == ["Bonding [1]", "Gap [m]", "Displacement [m]"]
-    assert labels(plot)[1:4] == [[r"$\phi$"], ["$g_{n}$"], ["$u_{t}$"]]
+    data = dataset(**({mode: ("1", np.where(t < 0.55, 0.0, 1.0))} if mode else {})).assign(given)
+    if mode:
+        data[mode].attrs["long_name"] = text
+    return data
 
 
 def test_panels_of_the_usual_figure():
     plot = figure(dataset())
-    titles = [ax.get_ylabel() for ax in plot.axes]
-    assert titles == ["Temperature [K]", "Bonding [1]", "Heat flux [W m$^{-2}$]", "Balance residual [1]"]
+    assert titles(plot) == ["Temperature [K]", "Bonding [1]", "Heat flux [W m$^{-2}$]", "Balance residual [1]"]
     assert labels(plot) == [["$T_{1}$", "$T_{2}$", "exact"], [r"$\phi$"], ["$q_{1}$ = $q_{2}$"], ["energy"]]
+    assert [line.get_linestyle() for line in plot.axes[0].get_lines()] == ["-", "-", "--"]  # exact: where there is one
     assert plot.axes[-1].get_xlabel() == "Time [s]"
     assert plot.axes[-1].get_yscale() == "log"
+    (residual,) = plot.axes[-1].get_lines()
+    assert np.max(residual.get_ydata()) == pytest.approx(1e-12)  # relative, as the attribute states
+    assert merged(dataset(), ("q_1", "q_2", "q_12")) == [["q_1", "q_2"], ["q_12"]]
 
 
-def test_exact_curve_is_dashed_and_only_where_there_is_one():
-    lines = figure(dataset()).axes[0].get_lines()
-    assert [line.get_linestyle() for line in lines] == ["-", "-", "--"]
-
-
-def test_residuals_are_relative():
-    (line,) = figure(dataset()).axes[-1].get_lines()
-    assert np.max(line.get_ydata()) == pytest.approx(1e-12)
+def test_sliding_is_no_gap_and_logarithms_are_no_bonds():
+    t = np.linspace(0.0, 2.0, 21)
+    more = {"g_n": ("m", t), "u_t": ("m", 2 * t), "ln_theta": ("1", t), "gamma_m": ("1", 1 + t)}
+    plot = figure(dataset(**more))
+    assert titles(plot)[1:4] == ["Bonding [1]", "Gap [m]", "Displacement [m]"]
+    assert labels(plot)[1:4] == [[r"$\phi$"], ["$g_{n}$"], ["$u_{t}$"]]
 
 
 def test_chosen_variables_are_grouped_by_unit():
-    plot = figure(dataset(), ["q_12", "phi", "q_1"])
-    assert labels(plot) == [["$q_{12}$", "$q_{1}$"], [r"$\phi$"]]
-    with pytest.raises(InputError, match="Did you mean 'phi'"):
-        figure(dataset(), ["phy"])
+    assert labels(figure(dataset(), ["q_12", "phi", "q_1"])) == [["$q_{12}$", "$q_{1}$"], [r"$\phi$"]]
+    (constant,) = figure(dataset(), ["v"]).axes
+    assert constant.get_ylim() == pytest.approx((0.095, 0.105))
+    for arguments in ((["phy"],), (None, "phy")):
+        with pytest.raises(InputError, match="Did you mean 'phi'"):
+            figure(dataset(), *arguments)
 
 
-def test_a_constant_is_a_flat_line_when_asked_for():
-    (ax,) = figure(dataset(), ["v"]).axes
-    low, high = ax.get_ylim()
-    assert (low, high) == pytest.approx((0.095, 0.105))
+def test_another_axis_than_time():
+    (ax,) = figure(dataset(), ["T_1", "phi"], "phi").axes
+    assert ax.get_xlabel() == r"Phi $\phi$ [1]"
+    assert ax.get_lines()[0].get_xdata()[-1] == pytest.approx(1 - np.exp(-2.0))
+    assert all("residual" not in title for title in titles(figure(dataset(), against="phi")))
 
 
 def test_time_axis_is_logarithmic_where_times_span_decades():
@@ -94,63 +110,24 @@ def test_time_axis_is_logarithmic_where_times_span_decades():
     assert figure(dataset(np.linspace(0, 1, 5001))).axes[0].get_xscale() == "linear"
 
 
-def test_events_are_marked():
-    events = {"event_time": ("event", np.array([0.5]), {"units": "s"})}
-    plot = figure(dataset().assign(events))
-    assert any(line.get_linestyle() == ":" for line in plot.axes[0].get_lines())
+def test_few_events_have_lines_and_names_and_many_are_counted():
+    """Curves over time do not show more events than outputs."""
+    few = figure(with_events([0.5, 1.5], ["debond", "touch"])).axes[0]
+    assert any(line.get_linestyle() == ":" for line in few.get_lines())
+    assert texts(few) == ["debond", "touch"]
+    many = figure(with_events(np.linspace(0.1, 1.9, 22), ["snap"] * 22)).axes[0]
+    assert texts(many) == []
+    assert many.get_title(loc="left").endswith("22 events between 21 outputs")
+    assert "events" not in few.get_title(loc="left")
 
 
-def texts(ax):
-    return [text.get_text() for text in ax.texts]
-
-
-def with_events(times, names, **modes):
-    given = {
-        "event_time": ("event", np.array(times), {"units": "s"}),
-        "event_name": ("event", np.array(names, dtype=object), {"units": "1"}),
-    }
-    return dataset(**modes).assign(given)
-
-
-def test_more_events_than_outputs_are_said():
-    """Curves over time do not show them."""
-    events = xarray.Dataset({"event_time": ("event", np.linspace(0.0, 2.0, 22), {"units": "s"})})
-    heading = figure(dataset().merge(events)).axes[0].get_title(loc="left")
-    assert heading.endswith("22 events between 21 outputs")
-    assert "events" not in figure(dataset()).axes[0].get_title(loc="left")
-
-
-def test_few_events_have_their_names():
-    assert texts(figure(with_events([0.5, 1.5], ["debond", "touch"])).axes[0]) == ["debond", "touch"]
-    many = np.linspace(0.1, 1.9, 20)
-    assert texts(figure(with_events(many, ["snap"] * 20)).axes[0]) == []
-
-
-def test_modes_are_bands():
-    t = np.linspace(0.0, 2.0, 21)
-    data = with_events([0.55], ["debond"], bonded=("1", np.where(t < 0.55, 1.0, 0.0)))
-    data["bonded"].attrs["long_name"] = "mode (0: debonded, 1: bonded)"
-    first, *_ = figure(data).axes
-    (band,) = first.patches
+def test_modes_and_stages_are_bands():
+    plot = figure(with_events([0.55], ["debond"], "bonded", "mode (0: bonded, 1: debonded)"))
+    (band,) = plot.axes[0].patches
     assert (band.get_x(), band.get_width()) == pytest.approx((0.55, 1.45))
-    assert "bonded" not in "".join(str(names) for names in labels(figure(data)))
-
-
-def test_stages_have_their_names():
-    t = np.linspace(0.0, 2.0, 21)
-    data = with_events([0.55], ["end of press"], stage=("1", np.where(t < 0.55, 0.0, 1.0)))
-    data["stage"].attrs["long_name"] = "mode (0: press, 1: after the last stage)"
-    assert texts(figure(data).axes[0]) == ["press", "after the last stage"]
-
-
-def test_another_axis_than_time():
-    plot = figure(dataset(), ["T_1", "phi"], "phi")
-    (ax,) = plot.axes
-    assert ax.get_xlabel() == r"Phi $\phi$ [1]"
-    assert ax.get_lines()[0].get_xdata()[-1] == pytest.approx(1 - np.exp(-2.0))
-    assert all("residual" not in ax.get_ylabel() for ax in figure(dataset(), against="phi").axes)
-    with pytest.raises(InputError, match="Did you mean 'phi'"):
-        figure(dataset(), against="phy")
+    assert "bonded" not in "".join(map(str, labels(plot)))
+    staged = with_events([0.55], ["end of press"], "stage", "mode (0: press, 1: after the last stage)")
+    assert texts(figure(staged).axes[0]) == ["press", "after the last stage"]
 
 
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
@@ -163,53 +140,29 @@ def test_files_are_the_same_every_time(kind):
 
 
 def test_notebooks_show_it_and_settings_stay_as_they_were():
-    import matplotlib
-
     before = dict(matplotlib.rcParams)
     assert figure(dataset())._repr_png_().startswith(b"\x89PNG")
     assert dict(matplotlib.rcParams) == before
 
 
-def test_a_file_is_read(tmp_path):
-    path = tmp_path / "x.nc"
-    dataset().to_netcdf(path)
-    assert len(figure(path).axes) == 4
+def test_files_are_read_and_those_of_others_refused(tmp_path):
+    """Whatever else the dataset holds, such as the reasons of the events in words."""
+    assert texts(figure(surfacechem.run("coulomb-stop").write(tmp_path / "stop.nc")).axes[0]) == ["stop"]
+    xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "foreign.nc")
+    with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
+        figure(tmp_path / "foreign.nc")
     with pytest.raises(InputError, match="not a readable"):
         figure(tmp_path / "nothing.nc")
 
 
-def test_a_run_with_events_is_drawn_from_its_file(tmp_path):
-    """Whatever else the dataset holds, such as the reasons of the events in words."""
-    path = surfacechem.run("coulomb-stop").write(tmp_path / "stop.nc")
-    assert texts(figure(path).axes[0]) == ["stop"]
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_runs_that_ended_at_once(count):
-    short = dataset(np.linspace(0.0, 1.0, count))
-    if count:
-        assert figure(short).axes
-    else:
-        with pytest.raises(InputError, match="nothing to plot"):
-            figure(short)
-
-
-def test_values_that_are_not_finite_leave_gaps():
+def test_runs_that_ended_at_once_and_values_that_are_not_finite():
+    assert figure(dataset(np.zeros(1))).axes
+    with pytest.raises(InputError, match="nothing to plot"):
+        figure(dataset(np.zeros(0)))
     values = np.linspace(300.0, 400.0, 21)
-    values[3] = np.nan
+    values[3] = np.nan  # leaves a gap
     save(figure(dataset(T_3=("K", values))), BytesIO(), "png")
-
-
-def test_curves_that_coincide_share_a_label():
-    assert merged(dataset(), ("q_1", "q_2", "q_12")) == [["q_1", "q_2"], ["q_12"]]
 
 
 def test_symbols():
     assert symbol("theta_bond_s") == r"$\theta_{\mathrm{bond\ s}}$"
-
-
-def test_a_dataset_that_misses_a_variable_is_named(tmp_path):
-    path = tmp_path / "foreign.nc"
-    xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(path)
-    with pytest.raises(InputError, match=r"foreign\.nc: has no variable 'time'"):
-        figure(path)

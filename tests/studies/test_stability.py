@@ -98,19 +98,24 @@ def expecting(name: str, value: float, expected):
 
 
 def test_wrong_expectations_are_caught():
-    assert expecting("seconds", 1.0, Exact(lambda t: {"T": np.full_like(t, 250.0)})).outcome == WRONG
-    assert expecting("stop", 1.0, Exact(lambda t: {"v": 0 * t}, events=2)).reason == "1 events, not 2"
-    assert expecting("film", 0.0, Stops("g_n reached zero", 20.0)).outcome == WRONG
-    assert expecting("film", 0.0, Stops("the temperature T reached zero", 10.0)).outcome == WRONG
-    assert expecting("film", 0.0, Exact(lambda t: {"T": 300.0 + 0 * t})).outcome == FAILED
-    assert expecting("seconds", 1.0, Refused("capacity")).outcome == WRONG
-    assert expecting("endothermic", 0.0, Refused("no such reason")).outcome == FAILED
-    assert expecting("endothermic", 0.0, Exact(lambda t: {"T": 0 * t})).outcome == FAILED
+    for name, value, expected, outcome in (
+        ("seconds", 1.0, Exact(lambda t: {"T": np.full_like(t, 250.0)}), WRONG),
+        ("stop", 1.0, Exact(lambda t: {"v": 0 * t}, events=2), WRONG),
+        ("film", 0.0, Stops("g_n reached zero", 20.0), WRONG),
+        ("film", 0.0, Stops("the temperature T reached zero", 10.0), WRONG),
+        ("film", 0.0, Exact(lambda t: {"T": 300.0 + 0 * t}), FAILED),
+        ("seconds", 1.0, Refused("capacity"), WRONG),
+        ("endothermic", 0.0, Refused("no such reason"), FAILED),
+        ("endothermic", 0.0, Exact(lambda t: {"T": 0 * t}), FAILED),
+    ):
+        cell = expecting(name, value, expected)
+        assert cell.outcome == outcome, cell
+        if name == "stop":
+            assert cell.reason == "1 events, not 2"
 
 
 def test_a_value_that_is_missed_by_a_part_in_a_thousand_keeps_three_digits():
-    problem = regimes()["seconds"].problem(1.0)
-    values = problem.expected.values
+    values = regimes()["seconds"].problem(1.0).expected.values
     cell = expecting("seconds", 1.0, Exact(lambda t: {"T": values(t)["T"] * 1.001}))
     assert (cell.outcome, cell.text) == (SOLVED, "3.0")
 
@@ -171,11 +176,15 @@ def study():
     return stability("seconds", "ignition", solvers=("radau", "ida"), quick=True, rounds=0)
 
 
-def test_the_dataset_holds_every_cell(study, tmp_path):
-    files = study.write(tmp_path / "study")
+@pytest.fixture(scope="module")
+def files(study, tmp_path_factory):
+    return study.write(tmp_path_factory.mktemp("stability") / "study")
+
+
+def test_the_dataset_holds_every_cell(files):
     assert [file.suffix for file in files] == [".nc", ".svg", ".png", ".html"]
     with xarray.open_dataset(files[0]) as data:
-        assert data["digits"].dims == ("regime", "decade", "solver")
+        assert dict(data["digits"].sizes) == {"regime": 2, "decade": 4, "solver": 2}
         assert data["regime"].values.tolist() == ["seconds", "ignition"]
         assert data["outcome"].sel(regime="ignition", solver="radau").values.tolist()[-1] == REFUSED
         assert data["value"].sel(regime="seconds").values[0] == 1e-15
@@ -185,10 +194,9 @@ def test_the_dataset_holds_every_cell(study, tmp_path):
         assert float(data["possible"].sel(regime="seconds").min()) > 14
         assert data.attrs["command"] == "surfacechem stability seconds ignition --solvers radau,ida --quick --search 0"
         assert data.attrs["versions"].startswith("surfacechem ")
-    assert study.dataset["digits"].shape == (2, 4, 2)
 
 
-def test_the_report_says_what_every_solver_keeps(study):
+def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(study, monkeypatch):
     text, html = study.page.text(), study.page.html()
     assert "Least digits kept over all values, at rtol 1e-10" in text
     assert "tau [s]: 1e-15 .. 1e+15" in text
@@ -198,26 +206,6 @@ def test_the_report_says_what_every_solver_keeps(study):
     assert "Every cell" not in text
     assert "no temperature T_c balances the heat" in html
     assert "<svg" in html
-
-
-def test_the_figure_is_drawn_from_the_file(study, tmp_path):
-    study.write(tmp_path / "study")
-    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "-o", str(tmp_path / "again.svg")])
-    assert done.exit_code == 0, done.output
-    text = (tmp_path / "again.svg").read_text()
-    for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits", "possible"):
-        assert f"<!-- {word} -->" in text
-    plot = study.figure()
-    plot.draw_without_rendering()
-    legend = plot.legends[0].get_window_extent()
-    assert 0 <= legend.x0 < legend.x1 <= plot.bbox.width  # however few values a regime has
-    done = CliRunner().invoke(app, ["plot", str(tmp_path / "study.nc"), "--variables", "digits"])
-    assert done.exit_code == 2
-    assert "the figure of a study has no choice of variables" in done.output
-
-
-def test_the_report_says_what_was_left_out_and_nothing_else(study, monkeypatch):
-    text = study.page.text()
     assert "8 of 16 values of the regimes, for the sake of time" in text
     assert "the solvers lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
     assert "the search for worst corners, which was not asked for" in text
@@ -228,10 +216,27 @@ def test_the_report_says_what_was_left_out_and_nothing_else(study, monkeypatch):
     assert "<p>Nothing.</p>" in everything.page.html()
 
 
-def test_runs_that_take_too_many_steps_are_counted(monkeypatch):
+def test_the_figure_is_drawn_from_the_file(study, files, tmp_path):
+    done = CliRunner().invoke(app, ["plot", str(files[0]), "-o", str(tmp_path / "again.svg")])
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "again.svg").read_text()
+    for word in ("seconds", "ignition", "radau", "ida", "R  ended for the right reason", "digits", "possible"):
+        assert f"<!-- {word} -->" in text
+    plot = study.figure()
+    plot.draw_without_rendering()
+    legend = plot.legends[0].get_window_extent()
+    assert 0 <= legend.x0 < legend.x1 <= plot.bbox.width  # however few values a regime has
+    done = CliRunner().invoke(app, ["plot", str(files[0]), "--variables", "digits"])
+    assert done.exit_code == 2
+    assert "the figure of a study has no choice of variables" in done.output
+
+
+def test_runs_that_take_too_many_steps_are_counted_and_a_study_tells_what_it_is_at(monkeypatch, caplog):
     monkeypatch.setattr("surfacechem.studies.stability.STEPS", 20)
-    found = stability("capacity", solvers=["radau"], quick=True, rounds=0)
+    with caplog.at_level("INFO", "surfacechem"):
+        found = stability("capacity", solvers=["radau"], quick=True, rounds=0)
     assert "what lies beyond 20 steps of a run: 4 took as many, and count as failed" in found.page.omissions
+    assert caplog.messages == ["capacity: 4 values, regime 1 of 1"]
 
 
 @pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
@@ -244,23 +249,20 @@ def test_where_an_answer_has_no_digits_the_summary_of_the_run_says_so(name, valu
     assert "warning" in run_summary(solution, None)
 
 
-def test_a_study_tells_what_it_is_at(caplog):
-    with caplog.at_level("INFO", "surfacechem"):
-        stability("seconds", "bell", solvers=("radau",), quick=True, rounds=0)
-    assert caplog.messages == ["seconds: 4 values, regime 1 of 2", "bell: 4 values, regime 2 of 2"]
-
-
-def test_names_get_the_nearest_guess():
-    for arguments, message in (
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
         (("endotermic",), "no regime 'endotermic'. Did you mean 'endothermic'?"),
         (("seconds", "--solvers", "radua"), "no solver 'radua'. Did you mean 'radau'?"),
         (("seconds", "--rtol", "2"), "--rtol: 2 is outside its range"),
         (("seconds", "--search", "-1"), "--search: -1 is outside its range: >= 0"),
         (("seconds", "--solvers", ","), "--solvers: at least one is needed."),
-    ):
-        done = CliRunner().invoke(app, ["stability", *arguments])
-        assert done.exit_code == 2
-        assert message in done.output
+    ],
+)
+def test_names_get_the_nearest_guess(arguments, message):
+    done = CliRunner().invoke(app, ["stability", *arguments])
+    assert done.exit_code == 2
+    assert message in done.output
 
 
 def test_the_command_writes_its_report(tmp_path, monkeypatch):

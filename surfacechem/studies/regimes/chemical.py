@@ -150,8 +150,8 @@ def cold(value: float) -> Trial:
 T, X = 300.0, 4e-10
 FORCE = BOLTZMANN * T / X
 
+# Logarithm of the rate [1/s] beyond which rupture is not resolved in time.
 IMMEDIATE = 230.0
-"""Logarithm of the rate [1/s] beyond which rupture is not resolved in time."""
 
 
 @regime(

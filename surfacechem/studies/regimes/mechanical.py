@@ -14,10 +14,9 @@ from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
 from surfacechem.studies.regimes import Array, Exact, Stops, Trial, regime
 
+# Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
+# bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
 SHORTEST = 1e-5
-"""Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
-bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
-"""
 
 
 @regime("Film that closes", "gap / initial gap", (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-14, 0.0))
