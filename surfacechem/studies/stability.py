@@ -167,8 +167,7 @@ def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
 def read(problem: Trial) -> Case:
     """The case of a problem with its changes."""
     changes = {**problem.changes, "run": {"times": list(problem.times)}}
-    shipped = "\n" not in problem.case
-    case = cases.load(problem.case, changes) if shipped else cases.load_text(problem.case, "regime", overrides=changes)
+    case = cases.load(problem.case, changes)
     return replace(case, reference=None)  # the regime has its own expectation
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -82,13 +83,18 @@ Expectation: TypeAlias = Exact | Stops | Refused
 
 @dataclass(frozen=True)
 class Trial:
-    """A shipped case by name, or the text of one, with changes by path, and what is expected of its run."""
+    """A case, by the name of a shipped one or by its file, with changes by path, and what is expected of its run."""
 
     case: str
     times: Sequence[float]
     """Output times [s]; the run begins at 0."""
     expected: Expectation
     changes: Mapping[str, object] = field(default_factory=dict)
+
+
+def beside(name: str) -> str:
+    """The file of a case that stands beside the regimes, since it shows nothing but where solvers fail."""
+    return str(Path(__file__).with_name(name))
 
 
 @dataclass(frozen=True)

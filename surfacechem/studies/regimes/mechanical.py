@@ -12,7 +12,7 @@ from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.film import ClosingFilm
 from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.regimes import Array, Exact, Stops, Trial, regime
+from surfacechem.studies.regimes import Array, Exact, Stops, Trial, beside, regime
 
 # Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
 # bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
@@ -29,27 +29,12 @@ def film(value: float) -> Trial:
     return Trial("closing-film", [last / 2, last], Exact.of(exact))
 
 
-PENALTY = """\
-T_0: 300 K
-bodies:
-  lower: {temperature: T, capacity: constant, C: 1 J/m^2/K, stiffness: 2e12 Pa/m}
-  upper: {temperature: T, capacity: constant, C: 1 J/m^2/K, stiffness: 2e12 Pa/m}
-interface:
-  temperature: T
-  potential:
-    - normal-stiffness: {E_n: 1 Pa/m}
-loading: {w_n: {ramp: {rate: -10 nm/s}}}
-initial: {T: 300 K}
-run: {until: 1 s}
-"""
-
-
 @regime("Contact stiffness to rigid", "E_n [Pa/m]", (1e0, 1e8, 1e12, 1e16, 1e20, 1e28, 1e38))
 def penalty(value: float) -> Trial:
     """A contact that becomes rigid: the gap k w / (k + E_n) vanishes and its traction stays."""
     exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
     changes = {"interface.potential.normal-stiffness.E_n": value}
-    return Trial(PENALTY, [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
+    return Trial(beside("contact.yaml"), [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
 
 
 @regime(

@@ -8,7 +8,7 @@ import numpy as np
 
 from surfacechem.references.semenov_fold import SemenovFold
 from surfacechem.references.three_temperatures import ThreeTemperatures
-from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, regime
+from surfacechem.studies.regimes import Exact, Refused, Stops, Trial, beside, regime
 
 BODIES = {"C_1": 1200.0, "C_2": 500.0, "C_c": 8.0, "h_1": 2500.0, "h_2": 700.0, "D_0": 150.0}
 
@@ -62,31 +62,6 @@ def stiffness(value: float) -> Trial:
     return three_temperatures(C_1=spread, C_2=1.0, C_c=1.0 / spread, h_1=1.0, h_2=1.0, D_0=1e-3)
 
 
-BETWEEN_RESERVOIRS = """\
-T_0: 300 K
-bodies:
-  lower: {temperature: 300 K}
-  upper: {temperature: 300 K}
-interface:
-  temperature: T_c
-"""
-
-MEDIUM = (
-    BETWEEN_RESERVOIRS
-    + """\
-  potential:
-    - bond-energy: {K_2: 240 J/m^2}
-    - interface-capacity: {C_c: 1 J/m^2/K}
-heat:
-  - conductance: {between: [lower, interface], h: 500 W/m^2/K}
-  - conductance: {between: [upper, interface], h: 300 W/m^2/K}
-loading: {phi: 0}
-initial: {T_c: 301 K}
-run: {until: 1 s}
-"""
-)
-
-
 @regime(
     "Capacity that bonds leave to the interface",
     "C_eff [J/(m^2 K)]",
@@ -96,27 +71,13 @@ def lost_capacity(value: float) -> Trial:
     """Bonds take 0.8 J/(m^2 K) from a medium of a little more, which settles, or of a little less, which is refused."""
     changes = {"interface.potential.interface-capacity.C_c": 0.8 + value}
     if value < 0:
-        return Trial(MEDIUM, [1.0], Refused("heat capacity at T_c was lost"), changes)
+        return Trial(beside("medium.yaml"), [1.0], Refused("heat capacity at T_c was lost"), changes)
     settled = Exact(
         lambda t: {"T_c": np.where(t < 1.0, 301.0, 300.0)},
         data={"T_1": 300.0, "T_2": 300.0},
         again=lambda data, t: {"T_c": np.full_like(t, (500.0 * data["T_1"] + 300.0 * data["T_2"]) / 800.0)},
     )
-    return Trial(MEDIUM, [1.0], settled, changes)
-
-
-FILM = (
-    BETWEEN_RESERVOIRS
-    + """\
-  friction:
-    - viscous: {eta: {value: 1 Pa s, times: [exponential: {beta: -0.05}]}}
-heat:
-  - conductance: {between: [lower, interface], h: 25 W/m^2/K}
-  - conductance: {between: [upper, interface], h: 25 W/m^2/K}
-loading: {g_n: 1 um, v: 0.1 m/s}
-run: {until: 1 s}
-"""
-)
+    return Trial(beside("medium.yaml"), [1.0], settled, changes)
 
 
 CRITICAL = 50.0 / (math.e * 0.05)
@@ -134,6 +95,6 @@ def ignition(value: float) -> Trial:
     heat = (1.0 - value) * CRITICAL
     changes = {"interface.friction.viscous.eta": {"value": heat * 1e-4, "times": [{"exponential": {"beta": -0.05}}]}}
     if value < 0:
-        return Trial(FILM, [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
+        return Trial(beside("film.yaml"), [1.0], Stops("ignition: no temperature T_c balances the heat", 0.0), changes)
     exact = SemenovFold(T_0=300.0, beta=0.05, H=50.0, D_0=heat)
-    return Trial(FILM, [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
+    return Trial(beside("film.yaml"), [1.0], Exact.of(exact, lambda fold, t: {"T_c": fold.solution(t)["T_c"]}), changes)
