@@ -384,7 +384,9 @@ def made_regimes() -> str:
     rows = []
     for name, regime in regimes().items():
         values = ", ".join(map(regime.label, regime.values))
-        rows.append((f"`{name}`", markdown(regime.text), regime.symbol, values))
+        rows.append(
+            (f"`{name}`", markdown(" ".join((inspect.getdoc(regime.problem) or "").split())), regime.symbol, values)
+        )
     return table(("regime", "what it is", "parameter", "values"), rows)
 
 

@@ -12,6 +12,9 @@ from surfacechem.errors import InputError, Place, suggestion
 # Keys of a value that may also stand by itself.
 WRITTEN_OUT = ("level", "value", "rises-to")
 
+# What removes a key or a law.
+NO_VALUE = (None, "")
+
 # Sections that may be one value, and the key that it is short for.
 WHOLE = {"interface.mechanism": "file"}
 
@@ -90,7 +93,7 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return replace(tree, value={**tree.value, "value": new}) if varies and bare else new
     if isinstance(tree.value, list):
         return _set_item(tree, keys, new, place)
-    (first, *rest), removes = keys, len(keys) == 1 and _removes(new)
+    (first, *rest), removes = keys, len(keys) == 1 and new.value in NO_VALUE
     if not rest and first in WRITTEN_OUT and not (isinstance(tree.value, dict) or removes):
         return new  # a bare value is, for example, the level of a constant history
     known = _entries(tree, place)
@@ -110,10 +113,6 @@ def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:
     return tree.value or {}
 
 
-def _removes(new: Tree) -> bool:
-    return new.value is None or new.value == ""
-
-
 def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
     """A value below an item ``name: {...}`` or a bare name of a list, which is found by its label."""
     known = labels(tree.value)
@@ -122,7 +121,7 @@ def _set_item(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         names = [label for label in known if label]
         raise InputError(f"nothing is called '{keys[0]}' in {tree.place.path}.{suggestion(keys[0], names)}", place)
     index = known.index(wanted)
-    item, changed = tree.value[index], [] if _removes(new) else [new]
+    item, changed = tree.value[index], [] if new.value in NO_VALUE else [new]
     if len(keys) > 1:
         whole = item.value if isinstance(item.value, dict) else {item.value: Tree(None, item.place)}
         ((name, inner),) = whole.items()

@@ -80,9 +80,12 @@ class Content(ABC):
     def read(self, tree: Tree, name: str, context: Context) -> Any:
         """The value; InputError with its place where it is none."""
 
-    @abstractmethod
+    definition: ClassVar[str] = ""
+    """The definition in the schema that is its own."""
+
     def schema(self) -> Schema:
         """JSON Schema of what may stand there."""
+        return reference(self.definition)
 
 
 @dataclass(frozen=True)
@@ -275,6 +278,7 @@ class Prescribed(Content):
     unit: str = "[x]"
     above_zero: bool = False
     words: str = "history"
+    definition: ClassVar[str] = "history"
 
     def read(self, tree: Tree, name: str, context: Context) -> Load:
         """The load."""
@@ -298,16 +302,13 @@ class Prescribed(Content):
             raise tree.error(f"{start:g} K is not an absolute temperature above zero.")
         return load
 
-    def schema(self) -> Schema:
-        """The definition of a history."""
-        return reference("history")
-
 
 @dataclass(frozen=True)
 class Temperature(Content):
     """The name of a temperature that is solved for, or its history."""
 
     words: str = "name or history"
+    definition: ClassVar[str] = "temperature"
 
     def read(self, tree: Tree, name: str, context: Context) -> str | Load:
         """The name or the load."""
@@ -318,10 +319,6 @@ class Temperature(Content):
             hint = "T_0 is the reference temperature" if value == "T_0" else f"start it with T, for example T_{value}"
             raise tree.error(f"'{value}' cannot name a temperature: {hint}.")
         return str(value)
-
-    def schema(self) -> Schema:
-        """The definition of a temperature."""
-        return reference("temperature")
 
 
 def is_name(tree: Tree | None) -> bool:
@@ -494,9 +491,8 @@ class Key:
         return {**found, "default": self.default} if isinstance(self.default, str | float | int) else found
 
 
-def key(content: Content, text: str = "", default: Any = None, *, name: str = "") -> Any:
-    """A key of a section, under the name of its field unless it has another; it may be left out unless REQUIRED."""
-    return Key(content, text, default, name)
+# A key as the value of its field, whose type is that of what it holds.
+key: Any = Key
 
 
 def amount(unit: str, text: str = "", **limits: float) -> Number:

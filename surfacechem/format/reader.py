@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeVar
@@ -340,16 +340,14 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
 
 def _find(name: str, base: Path, tree: Tree) -> Path:
     """Beside the case, in the package, or where Cantera itself looks."""
-
-    def of_cantera() -> Iterator[Path]:
+    path = document.beside(base, name, tree.place) or document.beside(shipped.mechanisms(), name, tree.place)
+    if path is None:
         import cantera  # slow, hence last
 
-        yield from (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
-
-    for folder in chain((base, shipped.mechanisms()), of_cantera()):
-        path = document.beside(folder, name, tree.place)
-        if path is not None:
-            return path
+        folders = (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
+        path = next(filter(None, (document.beside(folder, name, tree.place) for folder in folders)), None)
+    if path is not None:
+        return path
     known = [path.stem for path in shipped.mechanisms().glob("*.yaml")]
     raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
 

@@ -15,13 +15,15 @@ CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, 
 
 def schema() -> Schema:
     """The JSON Schema (draft 2020-12) of a case file."""
-    tables = [{"table": {"anyOf": [closed(table, [content]) for content, table in _csv_tables().items()]}}]
+    entries = {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
+    # A table from a file, or from its text.
+    tables = [closed({name: entries[name], "column": entries["column"]}, [name]) for name in ("file", "csv")]
     definitions: dict[str, Schema] = {
         "quantity": {
             "description": "a number in SI, or a number and a unit",
             "anyOf": [{"type": "number"}, {"type": "string", "pattern": QUANTITY}],
         },
-        "history": {"anyOf": [reference("quantity"), reference(Load.contract), *map(closed, tables)]},
+        "history": {"anyOf": [reference("quantity"), reference(Load.contract), closed({"table": {"anyOf": tables}})]},
         "temperature": {
             "description": "the name of a temperature (bodies that share one are in perfect contact), a value or a "
             "history",
@@ -29,7 +31,9 @@ def schema() -> Schema:
         },
     }
     for contract in CONTRACTS:
-        definitions |= {f"{contract.contract}.{law.name()}": _law(law) for law in laws.laws(contract).values()}
+        for name, law in laws.laws(contract).items():
+            kind = {} if _is_required(law) else {"type": ["object", "null"]}
+            definitions[f"{contract.contract}.{name}"] = {**schema_of(law), **kind}
         definitions[contract.contract] = _any_law(contract)
     document = schema_of(Document)
     document["properties"]["bodies"] |= {"minProperties": 2, "maxProperties": 2}
@@ -47,12 +51,6 @@ def text() -> str:
     return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-def _csv_tables() -> dict[str, Schema]:
-    """A table from a file, or from its text."""
-    entries = {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
-    return {name: {name: entries[name], "column": entries["column"]} for name in ("file", "csv")}
-
-
 def _any_law(contract: type[Law]) -> Schema:
     """One law: ``name: {...}``, or the bare name where nothing is required."""
     found = laws.laws(contract)
@@ -60,11 +58,6 @@ def _any_law(contract: type[Law]) -> Schema:
     one = {**closed(properties), "minProperties": 1, "maxProperties": 1}
     bare = [name for name, law in found.items() if not _is_required(law)]
     return {"anyOf": [one, {"enum": bare}]} if bare else one
-
-
-def _law(law: type[Law]) -> Schema:
-    found = schema_of(law)
-    return found if _is_required(law) else {**found, "type": ["object", "null"]}
 
 
 def _is_required(law: type[Law]) -> bool:

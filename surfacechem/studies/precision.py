@@ -71,10 +71,6 @@ class WorkPoint(Cell):
             return math.nan
         return self.errors.by_kind[kind].get(variable, math.nan) if variable else self.errors.worst(kind)
 
-    def least_stepping(self) -> float:
-        """Least time inside a library's own steps; not a number for a method that does outputs and events itself."""
-        return min(self.stepping, default=math.nan)
-
 
 @dataclass(frozen=True)
 class Compared:
@@ -225,7 +221,12 @@ def _variables() -> Iterator[Variable]:
         ("run_seconds", "s", "least run time", lambda p: min(p.seconds, default=math.nan)),
         ("run_seconds_median", "s", "median run time", lambda p: median(p.seconds or [math.nan])),
         ("run_seconds_max", "s", "longest run time", lambda p: max(p.seconds, default=math.nan)),
-        ("stepping_seconds", "s", "least time inside the library's own steps", WorkPoint.least_stepping),
+        (
+            "stepping_seconds",
+            "s",
+            "least time inside the library's own steps",
+            lambda p: min(p.stepping, default=math.nan),
+        ),
         ("repetitions", "1", "number of timed runs", lambda p: float(len(p.seconds))),
         *((f"count_{name}", "1", text, partial(WorkPoint.count, name=name)) for name, text in COUNTS.items()),
     ]
@@ -274,7 +275,7 @@ def _of_case(case: Compared) -> Iterator[PageSection]:
 def _row(point: WorkPoint, case: Compared) -> list[str]:
     """A line of the table: errors, of which those below the uncertainty of the reference say no more than that."""
     seconds = [f(point.seconds or [math.nan]) for f in (min, median, max)]
-    times = ["" if math.isnan(t) else duration(t) for t in (*seconds, point.least_stepping())]
+    times = ["" if math.isnan(t) else duration(t) for t in (*seconds, min(point.stepping, default=math.nan))]
     counts = ["" if math.isnan(n) else f"{n:.0f}" for n in map(point.count, COUNTS)]
     errors = ["failed", "", "", "", ""]
     if point.outcome != "failed":

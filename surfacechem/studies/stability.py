@@ -233,10 +233,7 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
     random = np.random.default_rng(seed)
     names, low, high = list(regime.space), *np.array(list(regime.space.values())).T
     log.info("%s: searching its worst corner", regime.name)
-    seen: list[tuple[dict[str, float], Attempt]] = []
-
-    def badness(cell: Attempt) -> float:
-        return MOST - cell.digits + BADNESS.get(cell.outcome, 0.0)
+    seen: list[tuple[float, dict[str, float], Attempt]] = []
 
     def kept(logarithms: NDArray[np.float64]) -> float:
         point = {name: float(10.0**x) for name, x in zip(names, logarithms, strict=True)}
@@ -244,8 +241,8 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
             cell = prepared(regime.corner(**point), rtol)(OWN)
         except InputError as error:  # the corner is outside of what the exact solution holds for
             cell = Attempt(REFUSED, error.message, MOST)
-        seen.append((point, cell))
-        return -badness(cell)
+        seen.append((MOST - cell.digits + BADNESS.get(cell.outcome, 0.0), point, cell))
+        return -seen[-1][0]
 
     differential_evolution(
         kept,
@@ -259,8 +256,8 @@ def worst_corner(regime: Regime, rounds: int = ROUNDS, rtol: float = RTOL, seed:
         polish=False,
         rng=random,
     )
-    point, cell = max(seen, key=lambda point_and_cell: badness(point_and_cell[1]))
-    return Corner(regime, point, cell, len(seen), sum(cell.outcome in BADNESS for _, cell in seen))
+    _, point, cell = max(seen, key=lambda found: found[0])
+    return Corner(regime, point, cell, len(seen), sum(cell.outcome in BADNESS for *_, cell in seen))
 
 
 # -- the dataset and the report ----------------------------------------------------------------------------------------

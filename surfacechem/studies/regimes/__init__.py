@@ -114,11 +114,6 @@ class Regime:
     space: Mapping[str, tuple[float, float]]
     """Decimal logarithms between which a search for the worst corner moves each parameter; empty where it does not."""
 
-    @property
-    def text(self) -> str:
-        """What it is."""
-        return " ".join((self.problem.__doc__ or "").split())
-
 
 def regime(
     title: str,
