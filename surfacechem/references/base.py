@@ -86,6 +86,7 @@ class Reference(ABC):
         times = np.asarray(t, dtype=np.float64)
         if not np.all((times >= 0.0) & (times <= self.end_time)):
             raise InputError(f"{self.name}: exact for 0 <= t <= {self.end_time!r} s only.")
+        # Formulas hold branches side by side; what is not a number is told below.
         with np.errstate(all="ignore"):
             values = self.quantities(times.reshape(-1))
         table = np.empty((len(values), times.size))

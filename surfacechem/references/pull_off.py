@@ -111,7 +111,8 @@ class CohesivePullOff(SpringAndZone):
     Source: Sauer, Duong & Mandadapu (2021), eq. ex:bt_czm with the sign of tension, with an elastic body.
 
     >>> bodies = CohesivePullOff(t_max=1e6, g_0=1e-8, k=1e13, w_dot=1e-8)
-    >>> f"{bodies.opening.g:.9e} {bodies.opening.w:.9e} {bodies.opening.release:.9e} {bodies.closing.release:.9e}"
+    >>> off, on = bodies.folds
+    >>> f"{off.g:.9e} {off.w:.9e} {off.release:.9e} {on.release:.9e}"
     '1.111832559e-08 1.105377225e-07 3.054240033e-02 1.000742319e-02'
     """
 
@@ -123,33 +124,18 @@ class CohesivePullOff(SpringAndZone):
     def __post_init__(self) -> None:
         """Refuse what starts beyond the closed branch."""
         super().__post_init__()
-        if not self.stable and self.w_i > self.opening.w:
-            raise InputError(f"{self.name}: w_i must not be above the fold at {self.opening.w!r} m.")
-
-    @property
-    def stable(self) -> bool:
-        """True if every displacement has one gap."""
-        return self.severity >= 1.0
-
-    @property
-    def opening(self) -> PullOffFold:
-        """The jump on opening; InputError if it is stable."""
-        return self.folds[0]
-
-    @property
-    def closing(self) -> PullOffFold:
-        """The jump on closing; InputError if it is stable."""
-        return self.folds[1]
+        if self.severity < 1.0 and self.w_i > self.folds[0].w:
+            raise InputError(f"{self.name}: w_i must not be above the fold at {self.folds[0].w!r} m.")
 
     def quantities(self, t: Array) -> Quantities:
         w = self.w_i + self.w_dot * t
-        if self.stable:
+        if self.severity >= 1.0:
             g, heat = self.gap(w, 0.0, math.inf), np.zeros_like(w)
         else:
-            fold, open_ = self.opening, w > self.opening.w
-            closed = self.gap(np.minimum(w, fold.w), 0.0, fold.g)
-            g = np.where(open_, self.gap(np.maximum(w, fold.w), self.closing.g, math.inf), closed)
-            heat = np.where(open_, fold.release, 0.0)
+            off, on = self.folds
+            closed = self.gap(np.minimum(w, off.w), 0.0, off.g)
+            opened = self.gap(np.maximum(w, off.w), on.g, math.inf)
+            g, heat = np.where(w > off.w, opened, closed), np.where(w > off.w, off.release, 0.0)
         return {"w_n": w, "g_n": g, "t_n": self.traction(g), "heat": heat}
 
 

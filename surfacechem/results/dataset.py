@@ -49,6 +49,7 @@ def quantity_columns(
     kept = [j for j, state in enumerate(system.states) if state.name not in system.inside]
     most = max(len(run.result.problem.times if axes else run.result.times) for run in runs)
     found = quantities(system)
+    # One table for all, so that a column is a view of it.
     table = np.full((len(runs), most, len(found)), np.nan)
     for rows, run in zip(table, runs, strict=True):
         reached = len(run.result.times)

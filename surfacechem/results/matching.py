@@ -121,6 +121,7 @@ def match(kind: type[Reference], options: Mapping[str, float], view: SceneView) 
 
     InputError where an option is not what the scene has, as after a change of the scene alone.
     """
+    # Options count for what the scene does not tell; where it does they must agree.
     values, told = dict(options), kind.from_scene(view)
     for item in dataclasses.fields(kind):  # type: ignore[arg-type]
         found, spec = told.get(item.name), item.metadata["spec"]
@@ -214,7 +215,8 @@ def _check_equations(near: Mapping[str, Array], run: Trajectory, t: Array, step:
     by_state, by_rate = program.derivatives(inputs)
     terms = by_rate * ydot[:, None, :]
     known = (np.abs(by_rate) * rounding[:, None, :]).sum(axis=2)
-    misses -= np.clip(misses, -known, known)
+    # What rounding of the rates may be is no miss.
+    misses = np.copysign(np.maximum(np.abs(misses) - known, 0.0), misses)
     sizes = np.abs(terms).sum(axis=2) + np.abs(misses - terms.sum(axis=2))
     # Near equilibrium an equation is a sum of nothing, so its largest size over the run is the scale.
     largest = sizes.max(axis=0)

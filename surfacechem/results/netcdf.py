@@ -113,7 +113,7 @@ def replacing(target: Path) -> Iterator[Path]:
     A link is followed; what is no regular file, or protected, is left alone: InputError. OutputError where what is
     written does not fit on the disk.
     """
-    target = target.resolve()
+    target = target.resolve()  # what a link points to, so that the link stays one
     place = Place(str(target))
     if target.is_dir():
         raise InputError("is a directory; give a file name to write to.", place)

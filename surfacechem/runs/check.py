@@ -64,6 +64,7 @@ def consistent_start(model: Model, values: Mapping[str, float]) -> Start | None:
     for _ in range(50):
         inputs = np.concatenate([[0.0], y, ydot, parameters])
         K, M = model.program.derivatives(inputs)
+        # The unknowns are the rates of what evolves and the values of what is algebraic.
         matrix, residual = np.where(algebraic, K, M), model.program.residual(inputs)
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
             return None
@@ -83,6 +84,7 @@ def rates(start: Start) -> NDArray[np.complex128]:
     """Finite growth rates [1/s] of small disturbances at the start; conserved quantities are left out."""
     from scipy.linalg import eigvals
 
+    # Rows in units of their own, since balances of energy and of sites differ by many decades.
     rows = np.maximum(np.abs(start.M).max(axis=1), np.abs(start.K).max(axis=1))
     scale = np.where(rows > 0, rows, 1.0)[:, None]
     alpha, beta = eigvals(-start.K / scale, start.M / scale, homogeneous_eigvals=True)

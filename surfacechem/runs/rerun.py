@@ -101,7 +101,7 @@ def run_again(record: Record) -> Solution | SweepSolution:
             times=tuple(departures.get("times", case.run.times)),
             atol=departures.get("atol", case.run.atol),
             max_steps=departures.get("max_steps", case.run.max_steps),
-            max_seconds=None,
+            max_seconds=None,  # seconds are not the same twice
         )
     except InputError as error:
         raise error.at(record.place) from None

@@ -86,7 +86,7 @@ class Simulation:
         ``error`` says where the error of the run is from: "auto", the exact solution of the case if there is one, else
         a second run at a tighter tolerance; "estimate", always a second run; "balances", no second run.
         """
-        check_way(error)
+        check_way(error)  # before anything is computed
         settings = run or self.case.run
         values = self._values(changes or {})
         if (freed := self._with_freed(values)) is not self:
@@ -133,6 +133,7 @@ class Simulation:
     def _with(self, scene: Scene) -> Simulation:
         """The same with the cells of another scene, assembled and compiled once for each choice of them."""
         key = spatial.grid(scene)
+        # Shared by all simulations of the case, so that a search for an accuracy compiles each grid once.
         if key not in self._grids:
             self._grids[key] = Simulation(replace(self.case, scene=scene), self._grids)
         return self._grids[key]
@@ -151,6 +152,7 @@ class Simulation:
 
         points = [values_of(system, {**values, **point}) for point in (plan.points if plan else [{}])]
         runs = sweeps.settings(system, plan, settings, points) if plan else [settings]
+        # Of a sweep all runs have the same cells, those of the run that needs the most.
         times = [spatial.shortest(system, *pair) for pair in zip(runs, points, strict=True)]
         cells: Scene | None = spatial.suited(scene, spatial.layers(system, points, times))
         for _ in range(1 + spatial.TRIALS):
@@ -171,6 +173,7 @@ class Simulation:
                 return [self.model.solve(settings, values)]
             from surfacechem.runs import sweeps
 
+            # Statistics of rupture are part of what is compiled.
             key = plan.until[0] if plan.until else ""
             if key not in self._sweep_models:
                 self._sweep_models[key] = Model(sweeps.prepared(self.system, plan)) if key else self.model
@@ -195,6 +198,7 @@ class Simulation:
             return self._halved(trajectory)
         if spatial.resolves(scene, parts) and (found := self._halved(trajectory)).converged:
             return found
+        # Cells wider than a layer agree on almost nothing having happened: only others that resolve it tell the error.
         other = self._with(spatial.suited(scene, parts, given=True))
         held_against = other._as_before(trajectory)
         own = other._halved(held_against)

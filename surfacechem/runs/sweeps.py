@@ -110,6 +110,7 @@ def accuracy(
     """
     unused, named = case.unused, case.reference
     second = cache(lambda: _second(done, threads))
+    # Options of a reference are those of the case as written, so that they fit no other run.
     if named is not None and not named.options:
         try:
             return _against_exact(case, done, named.name, second)
