@@ -197,11 +197,13 @@ class BimolecularBonding(Reference):
     n_c: float = parameter("1/m^2", "density of reference sites", above=0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0)
 
+    told = read(reaction="k_f k_r", initial="phi_i=phi")
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         N_c, N_1, N_2 = (scene.constant(name) for name in ("N_c", "N_1", "N_2"))
         sites = {"n_c": N_c, "n_1": N_c if N_1 is None else N_1, "n_2": N_c if N_2 is None else N_2}
-        return {**sites, **{name: scene.reaction(name) for name in ("k_f", "k_r")}, "phi_i": scene.initial("phi")}
+        return {**super().from_scene(scene), **sites}
 
     @property
     def equilibrium(self) -> float:

@@ -9,7 +9,7 @@ Talbot quadratures and rational approximations, BIT 46, for the contour.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from surfacechem.contracts.terms import Load, Varying, parameter
 from surfacechem.errors import InputError
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 if TYPE_CHECKING:
-    from surfacechem.scene import Body, Scene
+    from surfacechem.scene import Scene
 
 Complex: TypeAlias = NDArray[Any]
 """Complex values."""
@@ -112,20 +112,31 @@ class ConductingSlabs(Reference):
     T_far_2: float = parameter("K", "temperature beyond the far side of body 2", default=0.0, at_least=0)
     R: float = parameter("m^2 K/W", "resistance of the contact; 0: perfect", default=0.0, at_least=0)
 
+    told = read(
+        constant="C_1 C_2 thickness_1 thickness_2 conductivity_1 conductivity_2 h_far_1 h_far_2",
+        initial="T_1 T_2 T_far_1 T_far_2",
+    )
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         for reason in _beside_conduction(scene.scene):
             raise InputError(f"it knows conduction between two bodies alone, and {reason}.")
-        h = scene.total_conductance
-        return {"R": 1.0 / h if h else None, **_of_body(scene, 1), **_of_body(scene, 2)}
+        told, h = dict(super().from_scene(scene)), scene.total_conductance
+        told["R"] = 1.0 / h if h else None
+        for k in "12":  # what starts from a profile has no temperature at the contact of its own
+            told[f"T_{k}"] = scene.run.values.get(f"initial.profile_{k}", told[f"T_{k}"])
+            if told[f"T_far_{k}"] is not None and told[f"h_far_{k}"] is None:
+                told[f"h_far_{k}"] = HELD
+        return told
 
     @property
     def bodies(self) -> tuple[ConductingSlab, ConductingSlab]:
         """Both bodies."""
-        return (
-            ConductingSlab(self.T_1, self.C_1, self.thickness_1, self.conductivity_1, self.h_far_1, self.T_far_1),
-            ConductingSlab(self.T_2, self.C_2, self.thickness_2, self.conductivity_2, self.h_far_2, self.T_far_2),
+        first, second = (
+            ConductingSlab(**{item.name: getattr(self, f"{item.name}_{k}") for item in fields(ConductingSlab)})
+            for k in (1, 2)
         )
+        return first, second
 
     def _flux(self, s: Complex) -> Complex:
         """Transform of the heat flux from the first to the second body."""
@@ -156,17 +167,6 @@ class ConductingSlabs(Reference):
         return values
 
 
-def _of_body(scene: SceneView, k: int) -> dict[str, float | None]:
-    """The parameters of a body, which starts from a profile or from its temperature at the contact."""
-    names = {name: f"{name}_{k}" for name in ("T", "C", "thickness", "conductivity", "h_far", "T_far")}
-    found = {name: scene.constant(symbol) for name, symbol in names.items()}
-    found["T"] = scene.run.values.get(f"initial.profile_{k}", scene.initial(names["T"]))
-    found["T_far"] = scene.initial(names["T_far"])
-    if found["T_far"] is not None and found["h_far"] is None:
-        found["h_far"] = HELD
-    return {names[name]: value for name, value in found.items()}
-
-
 def _beside_conduction(scene: Scene) -> Iterator[str]:
     """The contents of a scene beside conduction, in words."""
     interface, bodies = scene.interface, {body.name for body in scene.bodies}
@@ -182,17 +182,11 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
         if path.name() != "conductance" or set(path.between) != bodies or not constant:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
-        yield from _varying(body)
-
-
-def _varying(body: Body) -> Iterator[str]:
-    """The contents of a body that are not constant, in words."""
-    if body.energy is not None and (
-        body.energy.name() != "constant" or isinstance(getattr(body.energy, "C", None), Varying)
-    ):
-        yield f"the heat capacity of {body.name} varies"
-    if body.conduction is not None and isinstance(body.conduction.conductivity, Varying):
-        yield f"the conductivity of {body.name} varies"
-    loads = [body.temperature, body.conduction.far if body.conduction else None]
-    if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
-        yield f"a temperature of {body.name} varies"
+        energy, conduction = body.energy, body.conduction
+        if energy is not None and (energy.name() != "constant" or isinstance(getattr(energy, "C", None), Varying)):
+            yield f"the heat capacity of {body.name} varies"
+        if conduction is not None and isinstance(conduction.conductivity, Varying):
+            yield f"the conductivity of {body.name} varies"
+        loads = [body.temperature, conduction.far if conduction else None]
+        if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
+            yield f"a temperature of {body.name} varies"

@@ -36,11 +36,12 @@ class SuddenDebonding(UniformBody):
     k: float = parameter("Pa/m", "stiffness of the bodies", above=0)
     compliance: float = parameter("m/Pa", "compliance 1/E_n of the bonded interface", default=0.0, at_least=0)
 
+    told = read(potential="K_0", initial="phi_i=phi", normal="k")
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
         loaded = scene.initial("t_n") if "t_n" in scene.scene.loading else scene.limit("t_max")
-        bonds = {"K_0": scene.potential("K_0"), "phi_i": scene.initial("phi")}
-        return {**super().from_scene(scene), **bonds, "t_n": loaded, "k": scene.normal("k")}
+        return {**super().from_scene(scene), "t_n": loaded}
 
     @property
     def traction(self) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from surfacechem.contracts.terms import parameter
 from surfacechem.quantities import BOLTZMANN
-from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView
+from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 
 class LatticeGasSprings(Reference):
@@ -38,13 +38,13 @@ class LatticeGasSprings(Reference):
     k_i: float = parameter("1/s", "initial rate of phi over the initial free fraction", default=0.0)
     phi_i: float = parameter("1", "initial bonding state", default=0.0, at_least=0, at_most=1)
 
+    told = read(potential="epsilon k_b", constant="n_c=N_c", temperature="T", initial="g_n phi_i=phi")
+
     @classmethod
     def from_scene(cls, scene: SceneView) -> Parameters:
-        bonds = {name: scene.potential(name) for name in ("epsilon", "k_b")}
-        phi, rate = scene.initial("phi"), scene.bonding_rate
-        forming = None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)
-        held = {"n_c": scene.constant("N_c"), "T": scene.temperature, "g_n": scene.initial("g_n")}
-        return {**held, **bonds, "k_i": forming, "phi_i": phi}
+        told, rate = super().from_scene(scene), scene.bonding_rate
+        phi = told["phi_i"]
+        return {**told, "k_i": None if phi is None or rate is None or phi == 1.0 else rate / (1.0 - phi)}
 
     def exponent(self, gap: ArrayLike) -> Array:
         """Free energy of a bond in units of k_B T."""
