@@ -21,10 +21,9 @@ import symengine
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import EXPONENT_CAP
-from surfacechem.mechanism.keys import REACTION
 from surfacechem.mechanism.rate_types import AffinityReaction, kinds
 from surfacechem.mechanism.rates import CoverageTerm, InterfaceArrhenius
-from surfacechem.mechanism.source import converted, own_parameters, sides
+from surfacechem.mechanism.source import REACTION, converted, own_parameters, sides
 from surfacechem.quantities import BOLTZMANN, KILO, MOLECULAR, VARIABLES
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import TINY

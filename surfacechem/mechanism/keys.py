@@ -1,7 +1,8 @@
 """What a mechanism file may hold. Cantera ignores what it does not know; here it is an error with its line.
 
-Below are the tables of keys, of what Cantera knows and the compiled path does not, with the way out, and of entries
-whose bare number Cantera would misread. :class:`Check` holds a file against them.
+The keys of entries stand in :mod:`surfacechem.mechanism.source`. Below are those inside them, what Cantera knows and
+the compiled path does not, with the way out, and entries whose bare number Cantera would misread. :class:`Check` holds
+a file against them.
 """
 
 from __future__ import annotations
@@ -13,26 +14,19 @@ from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, DEPENDENT, KEY, TOGETHER
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius
-from surfacechem.mechanism.source import ENERGY, Source, chosen, leading, sections, sides, unitless
+from surfacechem.mechanism.source import ENERGY, FILE, PHASE, REACTION, SPECIES, Source, leading, sides, unitless
 
 _words = str.split
 
-FILE = _words(
-    "description generator date input-files cantera-version git-commit note units phases species reactions elements "
-    "extensions"
-)
-PHASE = _words("name elements species thermo kinetics reactions site-density state transport note description")
 STATE = _words("T P coverages")
-SPECIES = _words("name composition thermo sites bond units note description transport coverage-dependencies")
-REACTION = _words("equation type orders negative-orders nonreactant-orders duplicate units id note description")
 CONSTANT_CP = _words("model T0 h0 s0 cp0 T-min T-max reference-pressure note")
 POLYNOMIAL = _words("model temperature-ranges data reference-pressure note")
 THERMO = {"constant-cp": CONSTANT_CP, "NASA7": POLYNOMIAL, "NASA9": POLYNOMIAL, "Shomate": POLYNOMIAL}
 BOND = {"stiffness": "N/m", "rest-length": "m"}
 """Keys of the elasticity of a bond with their units."""
-WRITTEN_SPECIES, WRITTEN_STATE = _words("size charge"), _words("X Y")
+WRITTEN_SPECIES, WRITTEN_STATE = {"size", "charge"}, ("X", "Y")
 """Keys that Cantera writes beside those that it documents; the state of a file is not used."""
-BESIDE = _words("adjacent-phases skip-undeclared-elements Motz-Wise")
+BESIDE = {"adjacent-phases", "skip-undeclared-elements", "Motz-Wise"}
 """Keys of a phase with neighbours; all elements of its species have to be declared in any case."""
 UNITS = _words("length mass time quantity current temperature pressure energy activation-energy")
 """Dimensions for which a file may say what a bare number means."""
@@ -125,6 +119,15 @@ def is_evaluated(entry: Any, names: Iterable[str], beside: bool) -> bool:
     return outside or special or _is_foreign(entry) or bool(_needs_neighbour(str(entry.get("type", ""))))
 
 
+def chosen(declared: Any, available: Iterable[str]) -> list[str]:
+    """Names of the species that a phase declares, those of a whole section included."""
+    listed = [] if isinstance(declared, str) else declared
+    plain = [str(item) for item in listed if not isinstance(item, Mapping)]
+    named = [names for item in listed if isinstance(item, Mapping) for names in item.values()]
+    whole = isinstance(declared, str) or "all" in named
+    return [*(available if whole else plain), *(str(name) for names in named if names != "all" for name in names)]
+
+
 class Check:
     """A phase of a mechanism, held against what it may hold.
 
@@ -143,10 +146,8 @@ class Check:
     def run(self) -> None:
         """Check all that the phase uses."""
         source, phase = self.source, self.phase
-        parts = ((part, key) for part in source.phases for key in ("species", "reactions"))
-        declared = {name for part, key in parts for name in sections(part.get(key, "all"), key)}
         # Sections that another phase of the file uses are known, though not looked into.
-        self._keys(source.data, {*FILE, *declared}, "the file")
+        self._keys(source.data, {*FILE, *source.sections}, "the file")
         self._units(source.data)
         self._phase()
         self._all_species(list(source.species(phase)))
@@ -166,8 +167,8 @@ class Check:
         title, model = f"phase {phase.get('name')}", str(phase.get("thermo"))
         if model in MODELS:
             raise error(f"{title}: thermo '{model}' is not lowered: {MODELS[model]}", phase, "thermo")
-        more = ["reference-state-coverage"] if model == DEPENDENT else []
-        self._keys(phase, (*PHASE, *more, *(BESIDE if self.beside else ())), title)
+        known = set(PHASE) - (set() if self.beside else BESIDE)
+        self._keys(phase, known - (set() if model == DEPENDENT else {"reference-state-coverage"}), title)
         if model not in ("ideal-surface", DEPENDENT):
             raise error(f"{title}: thermo '{model}' is not lowered: use `ideal-surface`.", phase, "thermo")
         kinetics = phase.get("kinetics", "surface")
@@ -208,7 +209,7 @@ class Check:
 
     def _species(self, entry: Any) -> None:
         source, title = self.source, f"species {entry.get('name')}"
-        self._keys(entry, (*SPECIES, *(WRITTEN_SPECIES if source.written else ())), title)
+        self._keys(entry, set(SPECIES) - (set() if source.written else WRITTEN_SPECIES), title)
         self._units(entry)
         self._numbers(entry, ("sites",), title)
         thermo = entry.get("thermo")

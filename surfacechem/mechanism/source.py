@@ -41,37 +41,56 @@ OWN = {
 LONGEST = 1e-5
 """Lengths [m] above this are not those of molecules, not even of tethers."""
 
-NUMBER, NAME = (int, float), (str, int, float)
-ENTRY: Mapping[str, tuple[type, ...]] = {"units": (dict,), "name": NAME, "thermo": (str, dict)}
-PHASE: Mapping[str, tuple[type, ...]] = {
-    **ENTRY,
+NUMBER, NAME, MAPPING, LIST = (int, float), (str, int, float), (dict,), (list,)
+
+Kinds = Mapping[str, tuple[type, ...]]
+
+
+def _any(keys: str) -> Kinds:
+    return dict.fromkeys(keys.split(), ())
+
+
+FILE: Kinds = {
+    "units": MAPPING,
+    **dict.fromkeys(("phases", "elements"), LIST),
+    **_any("description generator date input-files cantera-version git-commit note species reactions extensions"),
+}
+PHASE: Kinds = {
+    "name": NAME,
     "thermo": (str,),
     "species": (str, list),
     "reactions": (str, list),
-    "elements": (list,),
-    "state": (dict,),
-    "adjacent-phases": (list,),
+    "elements": LIST,
+    "state": MAPPING,
+    "adjacent-phases": LIST,
     "site-density": NAME,
     "reference-state-coverage": NUMBER,
+    **_any("kinetics transport skip-undeclared-elements Motz-Wise note description"),
 }
-SPECIES: Mapping[str, tuple[type, ...]] = {
-    **ENTRY,
-    "composition": (dict,),
-    "bond": (dict,),
-    "sites": NUMBER,
-    "size": NUMBER,
-    "charge": NUMBER,
+SPECIES: Kinds = {
+    "units": MAPPING,
+    "name": NAME,
+    "thermo": (str, dict),
+    "composition": MAPPING,
+    "bond": MAPPING,
+    **dict.fromkeys(("sites", "size", "charge"), NUMBER),
+    **_any("transport coverage-dependencies note description"),
 }
-REACTION: Mapping[str, tuple[type, ...]] = {
-    **ENTRY,
+REACTION: Kinds = {
+    "units": MAPPING,
     "equation": (str,),
     "type": (str,),
-    "orders": (dict,),
-    "coverage-dependencies": (dict,),
+    "orders": MAPPING,
+    "coverage-dependencies": MAPPING,
     "duplicate": (bool,),
     "id": NAME,
+    **_any("negative-orders nonreactant-orders note description"),
 }
-"""What kind of value each key has, where it matters before Cantera reads it."""
+"""Keys of an entry, each with the kinds of value that it may have where that matters before Cantera reads it.
+
+Some are for a kind of file or of phase only, and those of rate types stand with these: see
+:mod:`surfacechem.mechanism.keys`.
+"""
 
 KINDS = {dict: "a mapping", list: "a list", str: "a text", float: "a number", bool: "true or false"}
 
@@ -110,9 +129,12 @@ class Source:
         self.data = _placed(document.build(text, file, LIMITS))
         if not isinstance(self.data, Mapped):
             raise InputError("a mechanism is a mapping with `phases`, `species` and `reactions`.", Place(file))
-        self._check(self.data, {"units": (dict,), "phases": (list,), "elements": (list,)})
+        self._check(self.data, FILE)
         self.phases = self._entry_list("phases", PHASE)
-        self._entry_list("elements", ENTRY)
+        self._entry_list("elements", {})
+        parts = ((phase, key) for phase in self.phases for key in ("species", "reactions"))
+        self.sections = {name for phase, key in parts for name in sections(phase.get(key, "all"), key)}
+        """Names of the sections of species and reactions that some phase of the file uses."""
         self.written = str(self.data.get("generator")) == WRITER
         """Whether Cantera itself has written the file."""
 
@@ -153,16 +175,16 @@ class Source:
             raise self.error(f"{title}{key} = {value} is not a quantity in {spec.unit}.", node, key) from None
         return found
 
-    def _check(self, node: Any, kinds: Mapping[str, tuple[type, ...]]) -> None:
+    def _check(self, node: Any, kinds: Kinds) -> None:
         """InputError where a key does not hold the kind of value that it must."""
-        for key, allowed in kinds.items():
-            value = node.get(key)
+        for key, value in node.items():
+            allowed = kinds.get(key)
             # In Python true is a number; in a mechanism it is not.
-            if key in node and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
+            if allowed and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
                 wanted = " or ".join(KINDS[kind] for kind in allowed if kind in KINDS)
                 raise self.error(f"{key}: this must be {wanted}, not {_shown(value)}.", node, key)
 
-    def _entry_list(self, name: str, kinds: Mapping[str, tuple[type, ...]]) -> list[Any]:
+    def _entry_list(self, name: str, kinds: Kinds) -> list[Any]:
         """The mappings of a section; InputError at what is none."""
         entries = self.data.get(name)
         if entries is None:
@@ -198,7 +220,7 @@ class Source:
         if phase.get("reactions", "all") != "none":
             yield from self._entries(phase, "reactions", REACTION)
 
-    def _entries(self, phase: Any, key: str, kinds: Mapping[str, tuple[type, ...]]) -> Iterator[Any]:
+    def _entries(self, phase: Any, key: str, kinds: Kinds) -> Iterator[Any]:
         for name in sections(phase.get(key, "all"), key):
             # A phase that does not say where its entries are may have none.
             if name in self.data:
@@ -226,15 +248,6 @@ def sections(declared: Any, default: str) -> list[str]:
     if default == "species" and plain:
         plain = [default]
     return [*plain, *named]
-
-
-def chosen(declared: Any, available: Iterable[str]) -> list[str]:
-    """Names of the species that a phase declares, those of a whole section included."""
-    listed = [] if isinstance(declared, str) else declared
-    plain = [str(item) for item in listed if not isinstance(item, Mapping)]
-    named = [names for item in listed if isinstance(item, Mapping) for names in item.values()]
-    whole = isinstance(declared, str) or "all" in named
-    return [*(available if whole else plain), *(str(name) for names in named if names != "all" for name in names)]
 
 
 def sides(equation: str) -> tuple[dict[str, float], dict[str, float], bool]:
