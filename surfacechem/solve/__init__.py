@@ -1,4 +1,4 @@
-"""Solvers by name; each is imported when it is asked for.
+"""Solvers by name: our own, and those of the files in ``adapters``, each of which is imported when it is asked for.
 
 >>> solver("radua")
 Traceback (most recent call last):
@@ -6,22 +6,13 @@ Traceback (most recent call last):
 ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, ida, lsoda, radau, scipy-radau.
 """
 
+import ast
 import difflib
+import re
 from importlib import import_module
+from pathlib import Path
 
 from surfacechem.solve.contract import Solver
-
-_FACTORIES = {
-    "radau": ("radau.solver", "Radau"),
-    "lsoda": ("adapters.scipy_methods", "lsoda"),
-    "bdf": ("adapters.scipy_methods", "bdf"),
-    "scipy-radau": ("adapters.scipy_methods", "radau"),
-    "cvode": ("adapters.sundials", "CVODESolver"),
-    "ida": ("adapters.sundials", "IDASolver"),
-    "cantera": ("adapters.cantera_network", "CanteraSolver"),
-}
-
-names = tuple(_FACTORIES)
 
 AUTO = "auto"
 """The method is chosen for the scene, and the tolerance from the accuracy that is asked for."""
@@ -30,13 +21,29 @@ ASKING = ("cantera",)
 """Solvers that call Python for their right-hand sides, and so can ask something outside for rates."""
 
 
+def _adapters() -> dict[str, str]:
+    """Files of adapters by the names of their solvers, which are read without importing a library."""
+    found: dict[str, str] = {}
+    for file in sorted(Path(__file__).with_name("adapters").glob("*.py")):
+        declared = re.search(r"^NAMES = (\(.*\))$", file.read_text(encoding="utf-8"), re.MULTILINE)
+        found.update(dict.fromkeys(ast.literal_eval(declared[1]) if declared else (), file.stem))
+    return found
+
+
+_ADAPTERS = _adapters()
+
+names = ("radau", *sorted(_ADAPTERS, key=lambda name: name in ASKING))
+
+
 def solver(name: str) -> Solver:
     """The solver of this name; 'radau' is our own and the default."""
-    if name not in _FACTORIES:
-        near = difflib.get_close_matches(name, _FACTORIES, n=1)
+    if name not in names:
+        near = difflib.get_close_matches(name, names, n=1)
         guess = f" Did you mean '{near[0]}'?" if near else ""
-        raise ValueError(f"no solver '{name}'.{guess} Known: {', '.join(sorted(_FACTORIES))}.")
-    module, factory = _FACTORIES[name]
-    made = getattr(import_module(f"surfacechem.solve.{module}"), factory)()
+        raise ValueError(f"no solver '{name}'.{guess} Known: {', '.join(sorted(names))}.")
+    if name == "radau":
+        made = import_module("surfacechem.solve.radau.solver").Radau()
+    else:
+        made = import_module(f"surfacechem.solve.adapters.{_ADAPTERS[name]}").make(name)
     assert isinstance(made, Solver)
     return made

@@ -18,6 +18,8 @@ from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolve
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import NOISE, TINY
 
+NAMES = ("cantera",)
+
 LONGEST = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
 
@@ -127,7 +129,7 @@ class _SystemReactor(HeldReactor):
     def __init__(self, surface: Any, view: View, x: Array) -> None:
         super().__init__(surface)
         self.view = view
-        self.evaluation = Evaluation(view.problem.program, view.guess, view.parameters)
+        self.evaluation = Evaluation(view.problem.program, view.evaluation.y, view.parameters)
         self.unit = np.maximum(view.atol, TINY)
         self.scaled = x / self.unit
         self.names = tuple(f"x{i}" for i in range(len(x)))
@@ -204,3 +206,8 @@ class CanteraSolver(SteppingSolver):
 
     def begin(self, view: View, t: float, end: float, y: Array, ydot: Array) -> Method:
         return _Stretch(view, t, end, y)
+
+
+def make(_name: str) -> CanteraSolver:
+    """The solver."""
+    return CanteraSolver()

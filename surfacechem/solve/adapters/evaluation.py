@@ -20,39 +20,34 @@ class Evaluation:
     """State, derivatives and parameters of a program in one buffer, made consistent by :meth:`put`.
 
     ``y``, ``ydot`` and ``parameters`` are views of it; algebraic variables are searched from ``guess``, where they were
-    last.
+    last. ``ledger()`` are the rates of the ledger there, ``margins()`` the values of the margins.
     """
 
     def __init__(self, program: Program, y: Array, parameters: Array) -> None:
         n = program.n
         self.program = program
         self.inputs = np.concatenate(([0.0], y, np.zeros(n), parameters))
-        self.y, self.ydot, self.parameters = (
-            self.inputs[1 : n + 1],
-            self.inputs[n + 1 : 2 * n + 1],
-            self.inputs[2 * n + 1 :],
-        )
-        self.free = np.flatnonzero(~program.algebraic_mask)
-        self._algebraic = np.flatnonzero(program.algebraic_mask)
-        self.guess = y[self._algebraic]
+        self.y, self.ydot, self.parameters = np.split(self.inputs[1:], [n, 2 * n])
+        self.free, self.algebraic = map(np.flatnonzero, (~program.algebraic_mask, program.algebraic_mask))
+        self.guess = y[self.algebraic]
         self._counts = np.zeros((1, COLUMNS), np.int64)
         ends, table = self.inputs[: 2 * n + 1][None], self.parameters[None, None]
         self._batch = search_batch(program, ends, table, self._counts)
-        self._ledger = _Code(program.ledger, self.inputs)
-        self._margins = _Code(program.margins, self.inputs)
+        self.ledger = _Code(program.ledger, self.inputs)
+        self.margins = _Code(program.margins, self.inputs)
 
     def put(self, t: float, differential: Array) -> bool:
         """Go to a state; whether derivatives and algebraic variables were found there."""
         self.inputs[0] = t
         self.y[self.free] = differential
-        self.y[self._algebraic] = self.guess
+        self.y[self.algebraic] = self.guess
         self.ydot[:] = 0.0
         self._counts[:] = 0
         self.program.filled(self.inputs)
         stepper.run(self._batch, 0, 1)
         found = bool(self._counts[0, END] == 0)
         if found:
-            self.guess = self.y[self._algebraic]
+            self.guess = self.y[self.algebraic]
         return found
 
     def hold(self, t: float, y: Array, ydot: Array, whole: bool = True) -> None:
@@ -66,19 +61,11 @@ class Evaluation:
     def restart(self, y: Array) -> None:
         """Take over a state after a jump; algebraic variables are searched from there."""
         self.y[:] = y
-        self.guess = y[self._algebraic]
+        self.guess = y[self.algebraic]
 
     def rates(self) -> Array:
         """Derivatives of the differential variables and of the ledger."""
-        return np.concatenate((self.ydot[self.free], self._ledger()))
-
-    def ledger(self) -> Array:
-        """Rates of the ledger."""
-        return self._ledger()
-
-    def margins(self) -> Array:
-        """Values of the margins."""
-        return self._margins()
+        return np.concatenate((self.ydot[self.free], self.ledger()))
 
 
 class _Code:

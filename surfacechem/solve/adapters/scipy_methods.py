@@ -11,6 +11,8 @@ from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolve
 from surfacechem.solve.contract import Array
 from surfacechem.tolerances import EPS
 
+NAMES = ("lsoda", "bdf", "scipy-radau")
+
 SMALLEST_RTOL = 100 * EPS
 """SciPy raises smaller tolerances to this with a warning."""
 
@@ -56,16 +58,6 @@ class SciPySolver(SteppingSolver):
         return _Stretch(self.kind, view, t, end, y)
 
 
-def lsoda() -> SciPySolver:
-    """Adams and BDF with switching, from ODEPACK."""
-    return SciPySolver("lsoda", LSODA)
-
-
-def bdf() -> SciPySolver:
-    """BDF of variable order."""
-    return SciPySolver("bdf", BDF)
-
-
-def radau() -> SciPySolver:
-    """Radau IIA of order 5."""
-    return SciPySolver("scipy-radau", Radau)
+def make(name: str) -> SciPySolver:
+    """The solver of this name."""
+    return SciPySolver(name, {"lsoda": LSODA, "bdf": BDF, "scipy-radau": Radau}[name])

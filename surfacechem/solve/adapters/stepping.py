@@ -39,8 +39,8 @@ class View:
 
     problem: Problem
     parameters: Array
-    guess: Array
-    """Last algebraic variables found: the start of the next search."""
+    start: Array
+    """The state from which algebraic variables are first searched; later from where they were last."""
     residuals: int = 0
     """Right-hand sides that the library has asked for; those for outputs and events are not counted."""
     jacobians: int = 0
@@ -48,7 +48,7 @@ class View:
 
     def __post_init__(self) -> None:
         """Its buffer serves all states of the segment."""
-        self.evaluation = Evaluation(self.problem.program, self.guess, self.parameters)
+        self.evaluation = Evaluation(self.problem.program, self.start, self.parameters)
         self.differential = ~self.problem.program.algebraic_mask
         self.atol = self.problem.atol[self.differential]
 
@@ -57,12 +57,9 @@ class View:
 
     def complete(self, t: float, x: Array) -> tuple[Array, Array]:
         """State and derivative from the differential variables, the algebraic ones found from the equations."""
-        evaluation = self.evaluation
-        evaluation.guess = self.guess[~self.differential]
-        if not evaluation.put(t, x):
-            return np.full_like(evaluation.y, np.nan), np.full_like(evaluation.y, np.nan)
-        self.guess = evaluation.y.copy()
-        return self.guess, evaluation.ydot.copy()
+        if not self.evaluation.put(t, x):
+            return np.full_like(self.start, np.nan), np.full_like(self.start, np.nan)
+        return self.evaluation.y.copy(), self.evaluation.ydot.copy()
 
     def ledger_rates(self, t: float, y: Array, ydot: Array) -> Array:
         self.evaluation.hold(t, y, ydot)
@@ -234,11 +231,11 @@ class _Run:
 
     def _accept(self, step: DenseStep, reached: float, fired: Iterable[int]) -> None:
         """Move on to a time within the step, with its outputs and events."""
-        ledger = StepLedger(self.t, reached - self.t, self.ledger, np.zeros((len(NODES), 0)))
-        first = self.view.ledger_rates(self.t, self.y, self.ydot)
-        if len(first):
-            inside = [self.view.ledger_rates(t, *self._state(step, t)) for t in self._nodes(reached)]
-            ledger = StepLedger(self.t, reached - self.t, self.ledger, np.array([first, *inside]))
+        rates = np.zeros((len(NODES), 0))
+        if len(self.ledger):
+            states = [(self.t, self.y, self.ydot), *((t, *self._state(step, t)) for t in self._nodes(reached))]
+            rates = np.array([self.view.ledger_rates(*state) for state in states])
+        ledger = StepLedger(self.t, reached - self.t, self.ledger, rates)
         for t in self.problem.times[len(self.outputs) :]:
             if t > reached:
                 break
@@ -267,7 +264,7 @@ class _Run:
         x = step.y(t)
         if not self.solver.keeps_algebraic:
             return self.view.complete(t, x)
-        self.view.guess = x
+        self.view.evaluation.guess = x[self.view.evaluation.algebraic]
         return self.view.complete(t, x[self.view.differential])
 
     def _guards(self, t: float, x: Array) -> Array:
@@ -302,9 +299,8 @@ class _Run:
 
         def points(rows: Sequence[tuple[float, Array, Array, Array]]) -> list[Array]:
             columns = zip(*rows, strict=True) if rows else ((),) * 4
-            return [
-                np.array(c).reshape(len(rows), *size) for c, size in zip(columns, ((), (n,), (n,), (q,)), strict=True)
-            ]
+            sizes: tuple[tuple[int, ...], ...] = ((), (n,), (n,), (q,))
+            return [np.array(column).reshape(len(rows), *size) for column, size in zip(columns, sizes, strict=True)]
 
         outputs = np.array(self.outputs).reshape(-1, n + q)
         index = np.array([event[0] for event in self.events], dtype=np.int64)

@@ -11,6 +11,8 @@ from surfacechem.solve.adapters.stepping import Method, StepError, SteppingSolve
 from surfacechem.solve.contract import Array, Problem
 from surfacechem.tolerances import ROUNDING
 
+NAMES = ("cvode", "ida")
+
 
 class _Stretch(Method):
     """Single steps of either library; interpolation inside the last step is a step back to it."""
@@ -108,3 +110,8 @@ class IDASolver(SteppingSolver):
             algebraic_idx=list(np.flatnonzero(program.algebraic_mask)) or None,
         )
         return _Stretch(library, t, end, y, ydot)
+
+
+def make(name: str) -> SteppingSolver:
+    """The solver of this name."""
+    return CVODESolver() if name == "cvode" else IDASolver()
