@@ -167,43 +167,28 @@ def _warn(folder: Path, problem: str) -> None:
 
 
 @contextmanager
-def _settings() -> Iterator[None]:
-    """Numba's settings for the kernel, put back afterwards: they are global and belong to the caller's own functions.
-
-    Loops here run over a handful of states: vectorising them slows them down. What Numba makes on the way lives until
-    the end: a tenth of the time would go into looking for what is no longer used.
+def _compiling(parts: Collection[str]) -> Iterator[None]:
+    """Numba as it compiles a kernel in half the time; all is put back afterwards, as it is global and belongs to the
+    caller's own functions.
     """
     import numba
-
-    collecting = gc.isenabled()
-    config: Any = numba.config
-    usual = config.LOOP_VECTORIZE
-    try:
-        config.LOOP_VECTORIZE = 0
-        gc.disable()
-        yield
-    finally:
-        if collecting:
-            gc.enable()
-        config.LOOP_VECTORIZE = usual
-
-
-@contextmanager
-def _unfinished(parts: Collection[str]) -> Iterator[None]:
-    """Numba optimises and translates every function together with all it calls, level by level, as if each were called
-    from Python. Of the parts of a kernel only the code between is kept; the whole is optimised and translated once,
-    in half the time.
-    """
+    from numba.core import llvm_bindings
     from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+    from numba.core.targetconfig import TargetConfig
 
     library: Any = JITCodeLibrary
     codegen: Any = JITCPUCodegen
+    flags: Any = TargetConfig
+    llvm: Any = vars(llvm_bindings)["llvm"]
     optimise, finalise, set_environment = (
         library._optimize_final_module,
         library._finalize_final_module,
         codegen.set_env,
     )
+    pass_builder, digests = llvm.create_pass_builder, dict[Any, int]()
 
+    # Numba optimises and translates every function together with all it calls, level by level, as if each were called
+    # from Python. Of the parts of a kernel only the code between is kept; the whole is optimised and translated once.
     def optimise_whole(self: Any) -> None:
         if self.name not in parts:
             optimise(self)
@@ -218,47 +203,13 @@ def _unfinished(parts: Collection[str]) -> Iterator[None]:
         if self._engine.is_symbol_defined(name):
             set_environment(self, name, environment)
 
-    library._optimize_final_module, library._finalize_final_module = optimise_whole, finalise_whole
-    codegen.set_env = set_environment_of_whole
-    try:
-        yield
-    finally:
-        library._optimize_final_module, library._finalize_final_module = optimise, finalise
-        codegen.set_env = set_environment
-
-
-@contextmanager
-def _loops_kept() -> Iterator[None]:
-    """Loops over a handful of states or stages as they stand: four at a time there is more to decide than to do."""
-    from numba.core import llvm_bindings
-
-    bindings: Any = llvm_bindings
-    module = bindings.llvm
-    usual = module.create_pass_builder
-
+    # Loops over a handful of states or stages as they stand: four at a time there is more to decide than to do.
     def without_unrolling(machine: Any, options: Any) -> Any:
         options.loop_unrolling = False
-        return usual(machine, options)
+        return pass_builder(machine, options)
 
-    module.create_pass_builder = without_unrolling
-    try:
-        yield
-    finally:
-        module.create_pass_builder = usual
-
-
-@contextmanager
-def _compared_at_once() -> Iterator[None]:
-    """Numba finds what it has compiled by the flags it did so with, and lists all of them at every look; here only
-    where those that are set differ. The result is the same, a tenth of the time is not needed.
-    """
-    from numba.core.targetconfig import TargetConfig
-
-    flags: Any = TargetConfig
-    usual = flags.__hash__, flags.__eq__
-
-    digests: dict[Any, int] = {}
-
+    # Numba finds what it has compiled by the flags it did so with, and lists all of them at every look, a tenth of the
+    # time; here only where those that are set differ.
     def digest(self: Any) -> int:
         kind = type(self)
         if kind not in digests:
@@ -268,11 +219,29 @@ def _compared_at_once() -> Iterator[None]:
     def same(self: Any, other: Any) -> bool:
         return isinstance(other, flags) and bool(self._values == other._values or self.values() == other.values())
 
-    flags.__hash__, flags.__eq__ = digest, same
+    changes: list[tuple[Any, str, Any]] = [
+        (library, "_optimize_final_module", optimise_whole),
+        (library, "_finalize_final_module", finalise_whole),
+        (codegen, "set_env", set_environment_of_whole),
+        (llvm, "create_pass_builder", without_unrolling),
+        (flags, "__hash__", digest),
+        (flags, "__eq__", same),
+        # Vectorising short loops slows them down.
+        (numba.config, "LOOP_VECTORIZE", 0),
+    ]
+    usual = [getattr(owner, name) for owner, name, _ in changes]
+    collecting = gc.isenabled()
     try:
+        # What Numba makes on the way lives until the end: a tenth of the time would go into looking for what does not.
+        gc.disable()
+        for owner, name, changed in changes:
+            setattr(owner, name, changed)
         yield
     finally:
-        flags.__hash__, flags.__eq__ = usual
+        for (owner, name, _), before in zip(changes, usual, strict=True):
+            setattr(owner, name, before)
+        if collecting:
+            gc.enable()
 
 
 def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, parts: Collection[str] = ()) -> Any:
@@ -288,7 +257,7 @@ def compile_kernel(function: Callable[..., None], signature: Any, folder: Path, 
         kernel._cache = _Kept(folder)
     else:
         _warn(folder, problem)
-    with global_compiler_lock, _settings(), _unfinished(parts), _loops_kept(), _compared_at_once():
+    with global_compiler_lock, _compiling(parts):
         kernel.compile(signature)
     kernel.disable_compile()
     return kernel

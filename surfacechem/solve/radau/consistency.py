@@ -65,6 +65,7 @@ def _factor(w: Any) -> bool:
     for i in range(n):
         for j in range(n):
             w.real[i, j] = w.jacobian[0 if w.algebraic[j] else 1, i, j]
+    # Unknowns may differ by forty decades, as may equations: only entries beside those of their row can be compared.
     for j in range(n):
         largest = 0.0
         for i in range(n):
@@ -119,11 +120,12 @@ def _damped(w: Any, delta: Any) -> bool:
     Residuals are no measure: those of rates are as large as what they divide by is small, and linear anyway.
     Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 2.1, the natural monotonicity test.
     """
-    following, unit = w.g[1], w.error
+    following, unit = w.g[1], w.error  # memory that no step is using now
     for j in range(w.n):
         unit[j] = abs(w.trial[j]) + abs(delta[j]) + TINY
     before = _size(w, delta, unit)
     fraction = 1.0
+    # Forty halvings reach 1e-12 of the correction, which is no move any more.
     _move(w, delta, 1.0)
     for _halving in range(40):
         if _residual(w):

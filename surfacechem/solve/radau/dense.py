@@ -32,6 +32,7 @@ from surfacechem.solve.radau.work import (
 def _newton_form(k: int, values: Any, correction: Any, result: Any) -> None:
     """Divided differences of the polynomial through 0 and these values at the stages, with its correction."""
     s = stage_count(k)
+    # Newton's form keeps its digits at the nodes, where sums of powers lose them.
     for m in range(result.shape[0]):
         row = result[m]
         divide(k, values, m, row)
@@ -131,6 +132,7 @@ def integrate_ledger(w: Any, h: float) -> None:
     for i in range(s):
         set_stage(w, i, h)
         evaluate(w, LEDGER, w.rates[i])
+    # Radau's quadrature has the order 2s - 1 of the method, its polynomial that of the stages plus one.
     for m in range(w.n_ledger):
         defect = w.rates[7, m]
         for i in range(s):

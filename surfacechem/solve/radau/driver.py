@@ -198,7 +198,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
             h, size_last, norm_last, aim = first_size(w, end - w.base), 0.0, 1.0, np.inf
         left = (end - w.base) - w.tau
         remaining = min(left, aim - w.tau)
-        # Without a tiny last step.
+        # No tiny last step: two of half the length are better than a whole one and a rest.
         if h >= remaining * (1.0 - SQRT_EPS):
             h = remaining
         elif 2.0 * h > remaining:
@@ -223,6 +223,7 @@ def _run_segment(w: Any, i: int, end: float, goes_on: bool) -> int:
         if size == remaining:
             aim = np.inf
         _accept(w, i, size, end, goes_on)
+        # The controller compares steps that were judged by their error, whatever an event has left of them.
         size_last, norm_last = h, max(norm, LEAST_NORM)
         h = min(keep_matrices(w, h, min(proposed, limit)), growing_size(w))
         if any_true(w.fired):

@@ -87,6 +87,7 @@ def update_sides(w: Any) -> None:
     for m in range(w.n_margins):
         value, side = w.margin[m], w.side[m]
         w.margin_largest[m] = max(w.margin_largest[m], abs(value))
+        # What has left zero is on a side at once; what leaves it has to be seen clear of rounding first.
         least = 0.0 if abs(side) == 1.0 and w.kinds[m, 3] == 0 else noise(w, m)
         if abs(side) < AT_ZERO and abs(value) > least:
             w.side[m] = 1.0 if value > 0.0 else -1.0
@@ -137,6 +138,18 @@ def _follow_rates(w: Any, h: float) -> None:
 
 
 @compiled
+def _any_at_zero(w: Any) -> bool:
+    """Whether limits start a step at zero or beyond; how far each falls and rises in it is none yet."""
+    found = False
+    for m in range(w.n_margins):
+        if w.side[m] == RISING:
+            w.side[m] = AT_ZERO if abs(w.margin_before[m]) <= noise(w, m) else 1.0
+        found = found or abs(w.side[m]) == AT_ZERO
+        w.low[m] = w.high[m] = 0.0
+    return found
+
+
+@compiled
 def _sides_are_known(w: Any, h: float) -> bool:
     """Whether the step tells to which sides limits go that start at zero.
 
@@ -144,13 +157,7 @@ def _sides_are_known(w: Any, h: float) -> bool:
     wrong there, which may go either way. A shorter step tells what goes both ways by more; the shortest goes where it
     goes farther.
     """
-    found = False
-    for m in range(w.n_margins):
-        if w.side[m] == RISING:
-            w.side[m] = AT_ZERO if abs(w.margin_before[m]) <= noise(w, m) else 1.0
-        found = found or abs(w.side[m]) == AT_ZERO
-        w.low[m] = w.high[m] = 0.0
-    if not found:
+    if not _any_at_zero(w):
         return True
     # How far each falls and rises in the step, into the rows that will hold brackets.
     for i in range(4 * w.member + 9):
@@ -270,6 +277,7 @@ def _scan(w: Any, h: float) -> tuple[float, float]:
     """The first interval in which margins reach zero: its start, and its end; in place of that 0 if there is none,
     AT_START where a limit is passed there, SHORTER where one may be.
     """
+    # All points at once: one product of tables and stages instead of a polynomial at each.
     scan_step(w)
     if not _sides_are_known(w, h):
         return 0.0, SHORTER
@@ -312,11 +320,13 @@ def _bracketed(w: Any, h: float, m: int, low: float, high: float) -> float:
         if high - low <= SOLVED * high or value_high == 0.0:
             break
         x = low + (high - low) * (value_low / (value_low - value_high))
+        # Bisection at times: near a multiple zero the secants creep.
         if not low < x < high or iteration % 8 == 7:
             x = 0.5 * (low + high)
         value = _probe(w, h, m, x)
         if value * side <= 0.0:
             high, value_high = x, value
+            # An end that stays for a second time counts half, so that the secant moves past the zero.
             value_low *= 0.5 if kept == 1 else 1.0
             kept = 1
         else:
@@ -369,6 +379,12 @@ def _resolution(w: Any, size: float) -> float:
 
 
 @compiled
+def _onto(w: Any, size: float, worst: float) -> float:
+    """The size of a repeated step; 0 where it fails or its error is not below the worst."""
+    return size if _step_onto(w, size) < worst else 0.0
+
+
+@compiled
 def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
     """Step onto the zero of margin m, landing on the crossed side; returns the step size, or 0 where the repeated
     step fails or its error is not below the worst. A margin that touches zero has no slope to refine with, and one
@@ -380,26 +396,27 @@ def _refine(w: Any, h: float, m: int, x: float, worst: float) -> float:
     store_polynomial(w, h, 0.0)
     resolution = _resolution(w, size)
     for attempt in range(12):
-        if not _step_onto(w, size) < worst:
+        if _onto(w, size, worst) == 0.0:
             return 0.0
         value = w.margin[m]
         change = -value / slope * h if slope != 0.0 else 0.0
         crossed = value * side <= 0.0 or slope == 0.0
         # What is left after a few attempts is the rounding of the margin itself.
-        rounded = value == 0.0 or nudge > 0.0 or attempt >= 6 or abs(change) <= resolution * (1 + attempt)
-        if crossed and rounded:
+        if crossed and (abs(change) <= resolution * (1 + attempt) or nudge > 0.0 or attempt >= 6):
             return size
         if abs(value) > 2.0 * closest + ALIKE * noise(w, m):
             # Where it came closest it is zero, or the polynomial was too coarse to tell.
-            size, touches = best, closest <= ALIKE * noise(w, m)
-            return size if touches and _step_onto(w, size) < worst else 0.0
+            return _onto(w, best, worst) if closest <= ALIKE * noise(w, m) else 0.0
         if abs(value) < closest:
             best, closest = size, abs(value)
-        # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
-        nudge = max(2.0 * nudge, resolution) if not crossed and abs(change) <= resolution else 0.0
-        change = nudge if nudge > 0.0 else change
+        if not crossed and abs(change) <= resolution:
+            # A zero that time does not resolve is passed by the least that crosses it, and not gone back to.
+            nudge = change = max(2.0 * nudge, resolution)
+        else:
+            nudge = 0.0
+        # The secant may be wrong near a kink: no step is changed by more than a factor of two.
         size = min(max(size + change, 0.5 * size), min(2.0 * size, 1.25 * h))
-    return size if _step_onto(w, size) < worst else 0.0
+    return _onto(w, size, worst)
 
 
 @compiled
@@ -409,6 +426,7 @@ def _short_of(w: Any, h: float, m: int, size: float) -> float:
     """
     side = w.side[m]
     slope = max(abs(w.margin_slope[m]) / h, abs(w.margin_before[m]) / size)
+    # Twice as far at each attempt, so that few are needed whatever the slope.
     for attempt in range(40):
         shorter = size - _resolution(w, size) * 2.0**attempt
         if not (shorter > 0.5 * size and _step_onto(w, shorter) < np.inf):

@@ -34,6 +34,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
     threshold.
     """
     n = a.shape[0]
+    # Scales of the rows in units of the columns' typical sizes; a row of zeros, or one that is not finite, has none.
     for i in range(n):
         largest = 0.0
         for j in range(n):
@@ -54,6 +55,7 @@ def factor(a: Any, order: Any, columns: Any, rows: Any, threshold: float) -> boo
             for j in range(n):
                 a[k, j], a[p, j] = a[p, j], a[k, j]
             rows[k], rows[p] = rows[p], rows[k]
+        # A division less for each right-hand side, of which there are many.
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):

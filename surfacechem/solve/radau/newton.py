@@ -209,6 +209,7 @@ def _correct(w: Any) -> float:
     s = stage_count(k)
     # Local names spare the loops a look at the record after each store.
     parts, pairs, g, z, weight = w.parts, w.pairs, w.g, w.z, w.weight
+    # In the eigenbasis of the inverse collocation matrix the stages come apart (Butcher 1976; Bickart 1977).
     combine(TO_PARTS[k].ctypes.data, 7, s, s, g.ctypes.data, n, parts.ctypes.data)
     solve_real(w, parts[0])
     for pair in range(k + 1):
@@ -267,10 +268,12 @@ def solve_stages(w: Any, h: float) -> int:
                 break
             w.theta = rate
             contraction = max(rate / (1.0 - rate), SLOWEST_KNOWN)
+        # At loose tolerances one correction alone may hide a layer that its Jacobian has not seen.
         believed = iteration > 0 or w.rtol < COARSE
         if (believed and contraction * norm <= TIGHT) or norm <= 8.0 * w.roundoff:
             w.contraction = contraction
             return CONVERGED
         norm_last = max(norm, TINY)
+    # What does not converge any more may be rounding: then its contraction tells nothing.
     w.guessed = 0.0
     return CONVERGED if correction_is_noise(w, s) else DIVERGED

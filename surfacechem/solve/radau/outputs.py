@@ -85,6 +85,7 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
     if w.n_ledger > 0:
         integrate_ledger(w, h)
     factor_newton(w, h)
+    # They decide on the next step, which must not depend on the outputs that were asked for.
     w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 
 

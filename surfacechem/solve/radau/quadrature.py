@@ -46,6 +46,7 @@ def defect_norm(w: Any, defects: Any, h: float, remaining: float) -> float:
 @compiled
 def _group_norm(w: Any) -> float:
     """Largest error in units of what is allowed in its group."""
+    # Accounts of one kind are added up: what one of them misses counts beside the largest.
     norm, allowed = 0.0, max(LOOSER * w.rtol, LEAST)
     for group in range(GROUPS):
         miss, scale = 0.0, TINY

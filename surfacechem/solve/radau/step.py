@@ -38,6 +38,7 @@ from surfacechem.solve.radau.tables import FINEST, START_SLOPE
 from surfacechem.solve.radau.work import LEDGER, RESIDUAL, compiled, copy, evaluate, finite, put, row_of, set_inputs
 from surfacechem.tolerances import EPS, NEGLIGIBLE, ROUNDING, SOLVED, SQRT_EPS, TINY, ULPS
 
+# The first two as in RADAU5 (Hairer & Wanner II, IV.8).
 SAFETY = 0.9
 GROWTH = 8.0
 SHRINK = 0.1
@@ -72,6 +73,7 @@ def preferred_member(rtol: float) -> int:
 @compiled
 def loosening(rtol: float) -> float:
     """How much larger the low-order estimate may be than the tolerance."""
+    # The estimate has about half the order of the method: beside the true error it is the larger the tighter the run.
     return float(min(max(rtol, SOLVED), 0.1) ** -0.25)
 
 
@@ -80,6 +82,7 @@ def filter_residual(w: Any) -> bool:
     """Residual at the inputs through the real Newton matrix, an error of the state, into the error; whether it is
     finite.
     """
+    # Unfiltered, the defect of a stiff component would be as large as its rate (Hairer & Wanner II, IV.8).
     error = w.error
     evaluate(w, RESIDUAL, error)
     w.residuals += 1
@@ -120,12 +123,14 @@ def estimate_error(w: Any, h: float) -> float:
         for j in range(stage_count(k)):
             slope += START_SLOPE[k, j] * w.z[j, m]
         w.delta[m] = slope / h
+    # The equations at the start, with the slope of the polynomial there.
     put(w, 0.0, w.y, w.delta)
     if not filter_residual(w):
         return np.inf
     norm = error_norm(w, 0.0)
     if norm < NOISY:
         return norm
+    # Only an estimate that counts is worth the search for its noise, which costs eight evaluations.
     find_noise(w)
     return float(max(error_norm(w, MAGNIFIED), NOISY))
 
@@ -150,6 +155,7 @@ def next_size(w: Any, h: float, norm: float, h_last: float, norm_last: float) ->
     k = w.member
     limit = 7 + 2 * k
     safety = min(SAFETY, SAFETY * (2.0 * limit + 1.0) / (2.0 * limit + w.tries))
+    # The estimate of s stages goes with h^(s+1).
     exponent = 1.0 / (stage_count(k) + 1.0)
     factor = safety * max(norm, ROUNDING) ** -exponent
     if h_last > 0.0 and norm < 1.0:
@@ -170,6 +176,8 @@ def convergent_size(w: Any, h: float) -> float:
 def choose_member(w: Any, slowest: float) -> bool:
     """Lower order where Newton contracts slower than this, back up after a few easy steps; True if the member
     changed.
+
+    Source: Hairer & Wanner (1999), J. Comput. Appl. Math. 111: high order pays while the iteration is easy.
     """
     k = w.member
     if w.theta > slowest:
@@ -214,7 +222,10 @@ def _rate_norm(w: Any, rate: Any) -> float:
 
 @compiled
 def first_size(w: Any, span: float) -> float:
-    """Step over which the change of the rate, felt by a small trial step, stays within the tolerance."""
+    """Step over which the change of the rate, felt by a small trial step, stays within the tolerance.
+
+    Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.4.
+    """
     n = w.n
     speed = _rate_norm(w, w.ydot)
     if not 0.0 < speed < np.inf:
@@ -222,6 +233,7 @@ def first_size(w: Any, span: float) -> float:
     size = 0.0
     for j in range(n):
         size = max(size, abs(w.y[j]) / w.weight[j])
+    # Within a trial step the state changes by a millionth of itself at most, or by a hundredth of the tolerance.
     trial = min(max(NEGLIGIBLE**2 * size / w.loose, 1e-2) / speed, NEGLIGIBLE * span)
     for j in range(n):
         w.trial[j] = w.y[j] + (0.0 if w.algebraic[j] else trial * w.ydot[j])
@@ -281,6 +293,7 @@ def restart(w: Any) -> int:
         return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
     copy(w.trial, w.y)
     copy(w.trial_dot, w.ydot)
+    # The rates at the start of the first step; later ones begin with those at the end of the step before.
     if w.n_ledger > 0:
         set_inputs(w, w.y, w.ydot)
         evaluate(w, LEDGER, w.rates[7])
@@ -299,6 +312,7 @@ def _prepare(w: Any, h: float, foresee: bool) -> int:
             return NONFINITE
         w.fresh = CURRENT
         w.h_jacobian = h
+    # Factors that fail half-way are none.
     w.h_factored = 0.0
     copy(w.scale, w.pivot)
     if not factor_newton(w, h):
@@ -399,6 +413,7 @@ def keep_matrices(w: Any, h: float, proposed: float) -> float:
     if choose_member(w, SLOW):
         w.h_factored = 0.0
     elif w.theta < NEGLIGIBLE and h <= proposed <= 1.2 * h:
+        # A fifth of a step is worth less than new factors (Hairer & Wanner II, IV.8).
         return h
     if w.theta >= NEGLIGIBLE:
         w.h_factored = 0.0
@@ -450,6 +465,7 @@ def unseen(w: Any, h: float, spacing: float, remaining: float, begins: bool, end
     if points > 0 or begins or ends:
         keep_polynomial(w)
     if begins:
+        # From the narrowest outwards: the first that differs says how short the step has to be.
         for k in range(DECADES, 0, -1):
             if _differs(w, h, 10.0**-k, remaining):
                 return 10.0**-k

@@ -63,39 +63,20 @@ the cells what is in them.
 
 NUMBERS: dict[str, type] = {
     # The time is base + tau, with tau counted from the last restart: steps can be far smaller than an ulp of the time.
-    "base": float,
-    "tau": float,
-    # The stored polynomial: its step, and where predictions start in it (0 or 1).
-    "h_last": float,
-    "offset": float,
-    # Steps of the current factors and of the Jacobian.
-    "h_factored": float,
-    "h_jacobian": float,
+    # Of the stored polynomial the step, and where predictions start in it (0 or 1); of the factors and of the Jacobian
+    # the steps.
+    **dict.fromkeys(("base", "tau", "h_last", "offset", "h_factored", "h_jacobian"), float),
     # Newton: rate of contraction, what is left after a correction in units of it, how wrong the first guess of the
-    # stages was and how large rounding is in units of the tolerance.
-    "theta": float,
-    "contraction": float,
-    "guessed": float,
-    "roundoff": float,
-    # How much larger than the tolerance the estimate of low order may be.
-    "loose": float,
+    # stages was and how large rounding is in units of the tolerance. How much larger than the tolerance the estimate
+    # of low order may be.
+    **dict.fromkeys(("theta", "contraction", "guessed", "roundoff", "loose"), float),
     # Counters of a run.
-    "steps": int,
-    "rejected": int,
-    "residuals": int,
-    "jacobians": int,
-    "factorizations": int,
-    "iterations": int,
-    # Member of the Radau family now, and that of the stored polynomial.
-    "member": int,
-    "last_member": int,
-    # Newton iterations of this step; easy steps in a row; age of the Jacobian; steps that the ledger has refused.
-    "tries": int,
-    "calm": int,
-    "fresh": int,
-    "refused": int,
+    **dict.fromkeys(("steps", "rejected", "residuals", "jacobians", "factorizations", "iterations"), int),
+    # Member of the Radau family now, and that of the stored polynomial. Newton iterations of this step; easy steps in a
+    # row; age of the Jacobian; steps that the ledger has refused.
+    **dict.fromkeys(("member", "last_member", "tries", "calm", "fresh", "refused"), int),
 }
-"""Numbers of a trajectory."""
+"""Numbers of a trajectory that change."""
 
 WIDTH = 4
 """States in a vector of the processor."""
@@ -106,82 +87,52 @@ ROWS = 7 + WIDTH - 1
 SCAN_POINTS = 17
 """Points of a step of the highest order at which guards are examined."""
 
-MEMORY: dict[str, tuple[type, tuple[str | int, ...]]] = {
+
+def _arrays(names: str, *shape: str | int, kind: type = float) -> dict[str, tuple[type, tuple[str | int, ...]]]:
+    return dict.fromkeys(names.split(), (kind, shape))
+
+
+MEMORY = {
     # t, y, ydot, parameters: what every function of the program is given
-    "inputs": (float, ("n_inputs",)),
-    # state and rates now; a trial; weights of the error norm and typical sizes, now and when the matrices were factored
-    "y": (float, ("n",)),
-    "ydot": (float, ("n",)),
-    "trial": (float, ("n",)),
-    "trial_dot": (float, ("n",)),
-    "weight": (float, ("n",)),
-    "scale": (float, ("n",)),
-    "pivot": (float, ("n",)),
-    # error of the step, correction of its polynomial, right-hand sides and columns of linear systems
-    "error": (float, ("n",)),
-    "correction": (float, ("n",)),
-    "rhs": (float, ("n",)),
-    "delta": (float, ("n",)),
-    "columns": (float, ("n",)),
-    # rounding: of the variables; roughness of the equations over neighbouring times
-    "noise": (float, ("n",)),
-    "wobble": (float, ("n",)),
-    "wobble_now": (float, ("n",)),
-    "wobble_sums": (float, (3, "n")),
-    # stages: increments, those of the stored step, residuals and corrections, slopes, and both in the eigenbasis
-    "z": (float, (ROWS, "n")),
-    "z_last": (float, (ROWS, "n")),
-    "g": (float, (ROWS, "n")),
-    "slopes": (float, (ROWS, "n")),
-    "parts": (float, (ROWS, "n")),
-    "pairs": (complex, (3, "n")),
+    **_arrays("inputs", "n_inputs"),
+    # state and rates, now and as a trial; weights of the error norm; typical sizes, now and when factors were made
+    **_arrays("y ydot trial trial_dot weight scale pivot", "n"),
+    # error of the step, correction of its polynomial; right-hand sides and columns of linear systems
+    **_arrays("error correction rhs delta columns", "n"),
+    # rounding of the variables; roughness of the equations over neighbouring times
+    **_arrays("noise wobble wobble_now", "n"),
+    **_arrays("wobble_sums", 3, "n"),
+    # stages: increments, those of the stored step, residuals and corrections, slopes; corrections in the eigenbasis
+    **_arrays("z z_last g slopes parts", ROWS, "n"),
+    **_arrays("pairs", 3, "n", kind=complex),
     # derivatives by states and by rates, one behind the other as the compiled function writes them
-    "jacobian": (float, (2, "core", "core")),
-    "border_derivatives": (float, (2, "core", "links")),
-    "band_derivatives": (float, (2, "cells", 3)),
-    # Newton matrices and their factors
-    "real": (float, ("core", "core")),
-    "real_border": (float, ("core", "links")),
-    "real_bands": (float, ("cells", 3)),
-    "complex": (complex, (3, "core", "core")),
-    "complex_border": (complex, (3, "core", "links")),
-    "complex_bands": (complex, (3, "cells", 3)),
-    "order": (int, (4, "core")),
+    **_arrays("jacobian", 2, "core", "core"),
+    **_arrays("border_derivatives", 2, "core", "links"),
+    **_arrays("band_derivatives", 2, "cells", 3),
+    # Newton matrices, then their factors, and the order of the rows of these
+    **_arrays("real", "core", "core"),
+    **_arrays("real_border", "core", "links"),
+    **_arrays("real_bands", "cells", 3),
+    **_arrays("complex", 3, "core", "core", kind=complex),
+    **_arrays("complex_border", 3, "core", "links", kind=complex),
+    **_arrays("complex_bands", 3, "cells", 3, kind=complex),
+    **_arrays("order", 4, "core", kind=int),
     # polynomials in Newton's form: the stored one, and those of state and ledger over the step
-    "z_polynomial": (float, ("n", 9)),
-    "polynomial": (float, ("n", 9)),
-    "q_polynomial": (float, ("n_ledger", 9)),
+    **_arrays("z_polynomial polynomial", "n", 9),
+    **_arrays("q_polynomial", "n_ledger", 9),
     # change of the state and its rate at the points where guards are examined
-    "scanned": (float, (SCAN_POINTS + 3, "n")),
-    "scanned_rates": (float, (SCAN_POINTS + 3, "n")),
-    # ledger: now, at a trial, correction of its polynomial, a probe; errors, what they are held against, the largest
-    # so far, rates at a state that differs by its tolerance; at the stages; rates there and, last, at the start
-    "q": (float, ("n_ledger",)),
-    "q_trial": (float, ("n_ledger",)),
-    "q_correction": (float, ("n_ledger",)),
-    "q_probe": (float, ("n_ledger",)),
-    "q_miss": (float, ("n_ledger",)),
-    "q_scale": (float, ("n_ledger",)),
-    "q_largest": (float, ("n_ledger",)),
-    "q_nudged": (float, ("n_ledger",)),
-    "q_stage": (float, (7, "n_ledger")),
-    "rates": (float, (8, "n_ledger")),
-    # guards: value now, at the two points before and at the start of the step, elsewhere; largest size so far; slope;
-    # side of zero each was last seen on, at the start of the step and at the point before; ends of the interval in
-    # which it reaches zero; which have fired
-    "margin": (float, ("n_margins",)),
-    "margin_before": (float, ("n_margins",)),
-    "margin_earlier": (float, ("n_margins",)),
-    "margin_first": (float, ("n_margins",)),
-    "margin_probe": (float, ("n_margins",)),
-    "margin_largest": (float, ("n_margins",)),
-    "margin_slope": (float, ("n_margins",)),
-    "side": (float, ("n_margins",)),
-    "side_first": (float, ("n_margins",)),
-    "side_last": (float, ("n_margins",)),
-    "low": (float, ("n_margins",)),
-    "high": (float, ("n_margins",)),
-    "fired": (int, ("n_margins",)),
+    **_arrays("scanned scanned_rates", SCAN_POINTS + WIDTH - 1, "n"),
+    # ledger: now, as a trial, correction of its polynomial, a probe; errors, what they are held against, the largest so
+    # far, rates at a state that differs by its tolerance; at the stages; rates there and, last, at the start
+    **_arrays("q q_trial q_correction q_probe q_miss q_scale q_largest q_nudged", "n_ledger"),
+    **_arrays("q_stage", 7, "n_ledger"),
+    **_arrays("rates", 8, "n_ledger"),
+    # guards: value now, at the two points before, at the start of the step and elsewhere; largest so far; slope
+    **_arrays("margin margin_before margin_earlier margin_first margin_probe margin_largest margin_slope", "n_margins"),
+    # side of zero on which each was last seen, at the start of the step and at the point before; ends of the interval
+    # in which it reaches zero; which have fired
+    **_arrays("side side_first side_last low high", "n_margins"),
+    **_arrays("fired", "n_margins", kind=int),
 }
 """Arrays that a trajectory writes to: type and shape."""
 
