@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from types import SimpleNamespace as Some
 
+import numba
 import numpy as np
 import pytest
 
@@ -35,33 +36,31 @@ def test_the_same_bits(bare, name, monkeypatch):
     simulation = surfacechem.load(name)
     run = replace(simulation.case.run, rtol=1e-7, atol=None)
     usual = simulation.model.solve(run).result
-    calls = []
-
-    def counted(*arguments):
-        calls.append(len(arguments))
-        bare(*arguments)
-
-    monkeypatch.setattr(stepper, "run_batch", lambda: counted)
+    monkeypatch.setattr(stepper, "run_batch", lambda: bare)
     again = simulation.model.solve(run).result
-    assert calls
     assert again.counters == usual.counters
     np.testing.assert_array_equal(again.outputs, usual.outputs)
     np.testing.assert_array_equal(again.ledger_outputs, usual.ledger_outputs)
 
 
+def test_numba_compiles_on_in_a_process_that_has_loaded_the_code(bare):
+    doubled = numba.njit(lambda x: 2.0 * x)(np.ones(3))
+    assert doubled.tolist() == [2.0, 2.0, 2.0]
+
+
 def test_a_brief_command_does_without_the_compiler(bare, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", COMMAND, str(tmp_path / "run.nc")],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", COMMAND, str(tmp_path / "run.nc")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     assert done.stdout.split() == ["False"]
 
 
-def test_where_no_code_is_kept_there_is_none(tmp_path):
-    assert objectcode.load(tmp_path) is None
+@pytest.mark.parametrize("content", [None, b"", b"damaged", b"kernel\ncode"])
+def test_what_is_no_code_is_not_loaded(tmp_path, content):
+    (tmp_path / "folder").mkdir(mode=0o755)
+    if content is not None:
+        (tmp_path / "folder" / objectcode.FILE).write_bytes(content)
+    assert objectcode.load(tmp_path / "folder") is None
 
 
 def no_code():

@@ -22,17 +22,6 @@ def test_a_block_within_another_counts_once(monkeypatch):
     assert PREPARING.seconds - before == 7.0
 
 
-def test_the_code_of_jumps_counts_as_compiled_and_not_as_run(monkeypatch):
-    model = surfacechem.load("debonding").model
-    run = surfacechem.load("debonding").case.run
-    spent = model.compile_seconds
-    first = model.solve(run)
-    assert first.jumps
-    assert model.compile_seconds > spent
-    monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)  # nothing is compiled again
-    assert model.solve(run).jumps
-
-
 RESTING = """
 T_0: 300 K
 bodies: {lower: {temperature: T, C: 1 J/m^2/K, stiffness: 2e12 Pa/m}, upper: {temperature: T, C: 1 J/m^2/K}}
@@ -43,21 +32,18 @@ run: {until: 1 s}
 """
 
 
-def test_the_code_that_finds_gaps_at_rest_is_compiled_once_and_counts_as_compiled(monkeypatch):
-    case = load_text(RESTING)
+@pytest.mark.parametrize("name", ["debonding", "bouncing-plate", "at rest"])
+def test_the_code_of_jumps_and_of_gaps_at_rest_is_compiled_once_and_counts_as_compiled(name, monkeypatch):
+    case = load_text(RESTING) if name == "at rest" else surfacechem.load(name).case
     model = Model(case.system())
     spent = model.compile_seconds
     first = model.solve(case.run)
-    assert not first.jumps
+    assert bool(first.jumps) == (name != "at rest")
     assert model.compile_seconds > spent
     monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)  # nothing is compiled again
-    softer = model.solve(case.run, {"interface.potential.normal-stiffness.E_n": 1e11})
-    # The overlap k w / (k + E_n).
-    assert softer.everywhere["g_n"][-1] == pytest.approx(-1e-8 * 2e12 / 2.1e12, rel=1e-9)
-
-
-def test_a_second_run_with_rebounds_compiles_nothing(monkeypatch):
-    simulation = surfacechem.load("bouncing-plate")
-    first = simulation.model.solve(simulation.case.run)
-    monkeypatch.setattr("surfacechem.compile.program.symengine.Lambdify", None)
-    assert len(simulation.model.solve(simulation.case.run).jumps) == len(first.jumps) > 1
+    if name == "at rest":
+        softer = model.solve(case.run, {"interface.potential.normal-stiffness.E_n": 1e11})
+        # The overlap k w / (k + E_n).
+        assert softer.everywhere["g_n"][-1] == pytest.approx(-1e-8 * 2e12 / 2.1e12, rel=1e-9)
+    else:
+        assert len(model.solve(case.run).jumps) == len(first.jumps)
