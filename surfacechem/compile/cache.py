@@ -166,11 +166,8 @@ def _warn(folder: Path, problem: str) -> None:
     )
 
 
-@contextmanager
-def _compiling(parts: Collection[str]) -> Iterator[None]:
-    """Numba as it compiles a kernel in half the time; all is put back afterwards, as it is global and belongs to the
-    caller's own functions.
-    """
+def _changes(parts: Collection[str]) -> list[tuple[Any, str, Any]]:
+    """Whose attributes are what while Numba compiles a kernel of these parts, in half the usual time."""
     import numba
     from numba.core import llvm_bindings
     from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
@@ -219,7 +216,7 @@ def _compiling(parts: Collection[str]) -> Iterator[None]:
     def same(self: Any, other: Any) -> bool:
         return isinstance(other, flags) and bool(self._values == other._values or self.values() == other.values())
 
-    changes: list[tuple[Any, str, Any]] = [
+    return [
         (library, "_optimize_final_module", optimise_whole),
         (library, "_finalize_final_module", finalise_whole),
         (codegen, "set_env", set_environment_of_whole),
@@ -229,6 +226,14 @@ def _compiling(parts: Collection[str]) -> Iterator[None]:
         # Vectorising short loops slows them down.
         (numba.config, "LOOP_VECTORIZE", 0),
     ]
+
+
+@contextmanager
+def _compiling(parts: Collection[str]) -> Iterator[None]:
+    """Numba with its changes, which are put back afterwards: they are global and belong to the caller's own functions,
+    too.
+    """
+    changes = _changes(parts)
     usual = [getattr(owner, name) for owner, name, _ in changes]
     collecting = gc.isenabled()
     try:
