@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from scenes import varying
+from scenes import bodies, together, varying
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from tables_mechanics import Solved, solve
+from solved import Solved, closed, solve
 
 from surfacechem.contracts.terms import Load
 from surfacechem.errors import InputError
-from surfacechem.laws.bulk import Quadratic
 from surfacechem.laws.contact import TangentialStiffness
 from surfacechem.laws.factors import Linear
 from surfacechem.laws.friction import (
@@ -25,31 +24,18 @@ from surfacechem.laws.friction import (
 )
 from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
-from surfacechem.scene import Body, Interface, Mounting, Scene, Stage
+from surfacechem.scene import Mounting, Scene, Stage
 from surfacechem.solve.run import Model
 
-BODIES = Body("lower", "T", Quadratic(C=50.0)), Body("upper", "T", Quadratic(C=50.0))
 FREE, SPRING = Mounting(m=5.0), Mounting(k=1e8, m=10.0)
 
 
 def scene(frictions, mount=FREE, initial=None, transverse=None, potentials=(), programme=(), **loading) -> Scene:
     """A slider on one plate; numbers under ``loading`` are held."""
     histories = {x: load if isinstance(load, Load) else Hold(level=float(load)) for x, load in loading.items()}
-    interface = Interface("T", potentials, frictions)
-    start = {"T": 300.0} | (initial or {})
     mounts = {"tangential": mount, "transverse": transverse}
-    return Scene(BODIES, interface, (), histories, None, 300.0, start, programme=programme, **mounts)
-
-
-def run(scene: Scene, times, **changes) -> Solved:
-    solved = solve(Model(assemble(scene)), times, changes or None)
-    assert solved.status == "finished", solved.reason
-    assert solved.energy_error < 1e-9
-    return solved
-
-
-def events(solved: Solved) -> list[str]:
-    return [jump.edge.name for jump in solved.jumps]
+    pair = bodies("T", "T", C_1=50.0, C_2=50.0)
+    return together(potentials, frictions, histories, initial, pair=pair, programme=programme, **mounts)
 
 
 def moments(solved: Solved) -> list[float]:
@@ -60,6 +46,9 @@ def moments(solved: Solved) -> list[float]:
 
 def close(found, exact, tolerance=1e-10):
     assert np.max(np.abs(found - exact)) <= tolerance * np.max(np.abs(exact))
+
+
+CIRCLE = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
 
 
 def circling(t):
@@ -79,7 +68,7 @@ def test_a_slide_across_a_dead_load_curves_into_it(kappa):
     m, v, F, p, mu = 5.0, 2.0, 3e3, 3e4, kappa / 10
     stop = m * v / F * kappa / (kappa**2 - 1)
     times = np.linspace(0, 1.2 * stop, 25)
-    solved = run(scene([Coulomb(mu=mu)], initial={"v_2": v}, p=p, F_t=F), times)
+    solved = closed(scene([Coulomb(mu=mu)], initial={"v_2": v}, p=p, F_t=F), times)
     sliding = times < 0.95 * stop
     alpha = np.arctan2(solved["v_2"], solved["v"])[sliding]
     close(solved["v_2"][sliding], v * np.tan(alpha / 2) ** kappa, 1e-10)
@@ -103,11 +92,11 @@ FRICTIONS = [
 @pytest.mark.parametrize("mount", [SPRING, Mounting(k=1e8, m=10.0, c_b=100.0, c_g=100.0)], ids=["free", "damped"])
 def test_stick_slip_along_a_line_is_that_of_one_component(frictions, mount):
     times = np.linspace(0, 1.1, 21)
-    one = run(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3)), times)
+    one = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3)), times)
     assert len(one.jumps) > 1
     for angle in (0.0, 0.7, math.pi):
         c, s = math.cos(angle), math.sin(angle)
-        both = run(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3 * c), w_t2=Ramp(rate=1e-3 * s)), times)
+        both = closed(scene(frictions, mount, p=1e5, w_t=Ramp(rate=1e-3 * c), w_t2=Ramp(rate=1e-3 * s)), times)
         close(both["u_t"] * c + both["u_t2"] * s, one["u_t"], 1e-9)
         assert np.max(np.abs(both["u_t"] * s - both["u_t2"] * c)) < 1e-12 * one["u_t"].max()
         close(both["E_total"], one["E_total"], 1e-9)
@@ -127,7 +116,7 @@ def test_isotropic_sliding_does_not_know_the_axes(mount):
         for axis, (x, y) in (("t", along), ("t2", across)):
             loads[f"w_{axis}"] = Harmonic(amplitude=2e-3 * x, frequency=1.0)
             loads[f"F_{axis}"] = Harmonic(amplitude=1.5e5 * y, frequency=1.3)
-        return run(scene([Coulomb(mu=0.4, mu_s=0.6)], mount, p=1e5, **loads), times)
+        return closed(scene([Coulomb(mu=0.4, mu_s=0.6)], mount, p=1e5, **loads), times)
 
     straight, turned = pulled((1, 0), (0, 1)), pulled((c, -s), (s, c))
     assert len(straight.jumps) > 1
@@ -146,8 +135,8 @@ def test_sticking_gives_way_on_the_ellipse():
     law, (k, x, y) = AnisotropicCoulomb(mu_1=0.2, mu_2=0.5), (1e8, 1e-3, 2e-3)
     onset = 1e5 / (k * math.hypot(x / 0.2, y / 0.5))
     times = [0.0, onset * (1 - 1e-6), onset * (1 + 1e-4)]
-    solved = run(scene([law], SPRING, p=1e5, w_t=Ramp(rate=x), w_t2=Ramp(rate=y)), times)
-    assert events(solved) == ["slip"]
+    solved = closed(scene([law], SPRING, p=1e5, w_t=Ramp(rate=x), w_t2=Ramp(rate=y)), times)
+    assert solved.events == ["slip"]
     assert solved.jumps[0].t == pytest.approx(onset, rel=1e-13)
     assert solved["v"][1] == solved["v_2"][1] == solved["u_t2"][1] == 0
     assert solved["t_t"][1] == pytest.approx(k * x * times[1], rel=1e-13)
@@ -180,10 +169,9 @@ def test_dragging_in_a_circle(law, mu):
     n, (w_i, w_dot) = np.array([0.9, 0.4]) / math.hypot(0.9, 0.4), circling(0.0)
     u, v = w_i - 1e5 * np.asarray(mu) * n / 1e8, n * np.linalg.norm(w_dot)
     mount, start = Mounting(k=1e8, m=10.0, c_b=1e4), {"u_t": u[0], "u_t2": u[1], "v": v[0], "v_2": v[1]}
-    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
     times = np.linspace(0, 0.2, 21)
-    solved = run(scene([law], mount, start, p=1e5, **w), times)
-    assert not events(solved)
+    solved = closed(scene([law], mount, start, p=1e5, **CIRCLE), times)
+    assert not solved.events
     state = [*u, *v]
     rates = cartesian(mu, 10.0, 1e8, 1e4, circling)
     found = solve_ivp(rates, (0, 0.2), state, "Radau", t_eval=times, rtol=1e-12, atol=1e-15).y
@@ -196,7 +184,7 @@ def test_a_block_on_a_conveyor_comes_to_rest_on_it():
     m, k, mu, p, belt = 2.0, 1e4, 0.3, 1e3, 0.5
     times = np.linspace(0, 0.15, 151)
     far = {"w_t": Ramp(rate=-belt), "w_t2": 0.0}
-    solved = run(scene([Coulomb(mu=mu)], Mounting(k=k, m=m), {"v": -belt, "v_2": 0.4}, p=p, **far), times)
+    solved = closed(scene([Coulomb(mu=mu)], Mounting(k=k, m=m), {"v": -belt, "v_2": 0.4}, p=p, **far), times)
 
     def ground(t):
         return np.array([-belt * t, 0.0]), np.array([-belt, 0.0])
@@ -210,7 +198,7 @@ def test_a_block_on_a_conveyor_comes_to_rest_on_it():
     start = [0.0, 0.0, -belt, 0.4]
     found = solve_ivp(rates, (0, 0.15), start, "DOP853", rtol=1e-12, atol=1e-14, events=slow, dense_output=True)
     stop = solved.jumps[0].t
-    assert events(solved)[0] == "stop"
+    assert solved.events[0] == "stop"
     pull = np.linalg.norm(k * (ground(stop)[0] - found.y[:2, -1]))
     assert stop == pytest.approx(found.t[-1] + 1e-7 * m / (mu * p - pull), rel=1e-6)
     sliding = times < 0.98 * stop
@@ -223,9 +211,8 @@ def test_a_block_on_a_conveyor_comes_to_rest_on_it():
 
 def test_creep_in_a_circle_follows_the_pull():
     k, c, mu, p = 1e8, 1e6, 0.3, 1e5
-    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
     times = np.linspace(0, 1, 21)
-    solved = run(scene([Coulomb(mu=mu)], Mounting(k=k, c_g=c), p=p, **w), times)
+    solved = closed(scene([Coulomb(mu=mu)], Mounting(k=k, c_g=c), p=p, **CIRCLE), times)
 
     def rates(t, u):
         pull = k * (circling(t)[0] - u)
@@ -241,9 +228,9 @@ def test_what_bears_nothing_across_slides_there():
     """A block on rails: friction along, none across, where the spring swings it for good."""
     law = AnisotropicCoulomb(mu_1=0.3, mu_2=0.0)
     times, omega = np.linspace(0, 0.01, 51), math.sqrt(1e8 / 10)
-    solved = run(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=1e-4, w_t2=0.0), times)
+    solved = closed(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=1e-4, w_t2=0.0), times)
     assert solved["u_t"][-1] > 0  # what slides across is not held along
-    free = run(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=0.0, w_t2=0.0), times)
+    free = closed(scene([law], SPRING, {"v_2": 0.1}, p=1e5, w_t=0.0, w_t2=0.0), times)
     close(free["u_t2"], 0.1 / omega * np.sin(omega * times), 1e-8)
     assert np.all(free["u_t"] == 0)
 
@@ -256,7 +243,7 @@ def test_two_oscillators_of_one_mass():
     m, g, times = 10.0, 1e-6, np.linspace(0, 0.1, 31)
     along, across = Mounting(k=1e6, m=m, c_g=200.0), Mounting(k=3e6, c_g=50.0)
     law = AnisotropicViscous(eta_1=1e-4, eta_2=3e-4)
-    solved = run(scene([law], along, {"v": 1.0, "u_t2": 2e-3}, across, g_n=g, w_t=0.0, w_t2=0.0), times)
+    solved = closed(scene([law], along, {"v": 1.0, "u_t2": 2e-3}, across, g_n=g, w_t=0.0, w_t2=0.0), times)
     for u, k, c, u_i, v_i in (("u_t", 1e6, 300.0, 0.0, 1.0), ("u_t2", 3e6, 350.0, 2e-3, 0.0)):
         decay = c / (2 * m)
         omega = math.sqrt(k / m - decay**2)
@@ -272,9 +259,9 @@ def test_two_oscillators_of_one_mass():
 def test_a_programme_turns_the_pull():
     stages = (Stage("along", {"w_t": 1e-3}, duration=0.3), Stage("across", {"w_t2": 1e-3}, event="slip"))
     stages += (Stage("rest", {}),)
-    solved = run(scene([Coulomb(mu=0.4, mu_s=0.6)], SPRING, p=1e5, programme=stages), [0.0, 0.4, 2.0])
+    solved = closed(scene([Coulomb(mu=0.4, mu_s=0.6)], SPRING, p=1e5, programme=stages), [0.0, 0.4, 2.0])
     onset = 0.3 + math.sqrt(0.6**2 - 0.3**2)
-    assert events(solved) == ["end of along", "slip", "stop"]
+    assert solved.events == ["end of along", "slip", "stop"]
     assert solved.jumps[1].t == pytest.approx(onset, rel=1e-12)
     # It springs along the pull, at 60 degrees to the first stage, until the spring pulls as much less as it did more.
     assert (solved["t_t"][2], solved["t_t2"][2]) == pytest.approx((1e4, math.sqrt(3) * 1e4), rel=1e-9)
@@ -282,8 +269,8 @@ def test_a_programme_turns_the_pull():
 
 
 def test_initial_velocities_can_be_changed():
-    model = Model(assemble(scene([Coulomb(mu=0.25)], initial={"v": 1.0}, p=3e4)))
-    assert "initial.v_2" not in model.system.changeable  # one direction only
+    one = assemble(scene([Coulomb(mu=0.25)], initial={"v": 1.0}, p=3e4))
+    assert "initial.v_2" not in one.changeable  # one direction only
     model = Model(assemble(scene([Coulomb(mu=0.25)], initial={"v": 1.0, "v_2": 1.0}, p=3e4)))
     solved = solve(model, [0.0, 1e-4, 2e-3], {"initial.v": -1.2, "initial.v_2": 1.6})
     assert (solved["v"][0], solved["v_2"][0]) == pytest.approx((-1.2, 1.6), rel=1e-15)
@@ -301,7 +288,7 @@ def test_initial_velocities_can_be_changed():
 )
 def test_friction_opposes_a_prescribed_velocity(law, along, across):
     given = {"g_n": 1e-2} if "viscous" in law.name() else {"p": 1e2}
-    found, name = run(scene([law], None, v=3.0, v_2=-4.0, **given), [0.0, 1.0]), law.name().replace("-", "_")
+    found, name = closed(scene([law], None, v=3.0, v_2=-4.0, **given), [0.0, 1.0]), law.name().replace("-", "_")
     assert (found[f"t_{name}"][0], found[f"t_2_{name}"][0]) == pytest.approx((along, -across), rel=1e-14)
     assert found[f"D_{name}"][-1] == pytest.approx(3.0 * along + 4.0 * across, rel=1e-14)
 
@@ -312,10 +299,9 @@ def test_dampers_beside_friction_that_knows_directions(c, c_2):
     k, L, damping = np.array([K, 3 * K]), np.array([0.2, 0.5]) * P, np.array([c, c_2])
     times = np.linspace(0, 1, 21)
     mounts = Mounting(k=K, c_g=c), Mounting(k=3 * K, c_g=c_2)
-    w = {"w_t": Harmonic(amplitude=2e-3, frequency=1.0), "w_t2": Harmonic(amplitude=1.5e-3, frequency=1.0, phase=1.0)}
     u = circling(0.0)[0] - 0.999 * L * np.array([0.6, 0.8]) / k
     rough = [AnisotropicCoulomb(mu_1=0.2, mu_2=0.5)]
-    solved = run(scene(rough, mounts[0], {"u_t": u[0], "u_t2": u[1]}, mounts[1], p=P, **w), times)
+    solved = closed(scene(rough, mounts[0], {"u_t": u[0], "u_t2": u[1]}, mounts[1], p=P, **CIRCLE), times)
 
     def rates(t, state):
         pull = k * (circling(t)[0] - state)
@@ -329,7 +315,7 @@ def test_dampers_beside_friction_that_knows_directions(c, c_2):
         return pull / (L + damping * s) * s
 
     begun = solved.jumps[0].t
-    assert events(solved)[0] == "slip"
+    assert solved.events[0] == "slip"
     sliding = times > begun
     found = solve_ivp(rates, (begun, 1), u, "Radau", t_eval=times[sliding], rtol=1e-10, atol=1e-16).y
     close(solved["u_t"][sliding], found[0], 1e-7)
@@ -385,7 +371,7 @@ def test_films_relax_at_their_own_rates():
         (AnisotropicViscous(eta_1=0.5, eta_2=0.2), (0.5, 0.2)),
         (Viscous(eta=0.4), (0.4, 0.4)),
     ):
-        solved = run(scene([law], Mounting(k=k), g_n=g, w_t=1e-3, w_t2=-2e-3), times)
+        solved = closed(scene([law], Mounting(k=k), g_n=g, w_t=1e-3, w_t2=-2e-3), times)
         close(solved["u_t"], 1e-3 * (1 - np.exp(-k * g / along * times)))
         close(solved["u_t2"], -2e-3 * (1 - np.exp(-k * g / across * times)))
         close(solved["t_t2"], k * (-2e-3 - solved["u_t2"]), 1e-9)
