@@ -47,7 +47,7 @@ def path(a, b, h):
 def perfect_contact(potentials, reactions=(), phi=0.0, T=300.0, C_1=1.0, C_2=1.0, energy=Quadratic, T_0=300.0, **rest):
     """Both bodies and the interface at one temperature."""
     interface = Interface("T", potentials, reactions=reactions, sites=SITES, frictions=rest.pop("frictions", ()))
-    initial = {"T": T} | ({"phi": phi} if reactions else {})
+    initial = {"T": T} | ({"phi": phi} if reactions else {}) | rest.pop("initial", {})
     return Scene(bodies("T", "T", energy, C_1, C_2), interface, T_0=T_0, initial=initial, **rest)
 
 

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scenes import SITES, path, perfect_contact, varying
+from scenes import SITES, bodies, path, perfect_contact, together, varying
 from solved import Solved, solve
 
 from surfacechem.laws.bonding import BondEnergy
@@ -62,14 +62,8 @@ def debonding(elastic: bool, violation: str = "warn") -> Model:
     """A far field that reaches the strength at t = 1 s."""
     potentials = [BondEnergy(K_0=1.0), *([BondedContact(E_n=1e12)] if elastic else [])]
     limits = [TensileStrength(t_max=1.0, violation=violation)]
-    scene = Scene(
-        (Body("lower", "T", Quadratic(C=1.0)), Body("upper", "T", Quadratic(C=1.0))),
-        Interface("T", potentials, sites=SITES, limits=limits),
-        loading={"w_n": Ramp(rate=1.0)},
-        T_0=300.0,
-        initial={"T": 300.0, "phi": 1.0},
-        normal=Mounting(k=1.0),
-    )
+    given = {"loading": {"w_n": Ramp(rate=1.0)}, "initial": {"phi": 1.0}, "limits": limits}
+    scene = together(potentials, **given, pair=bodies("T", "T", C_1=1.0, C_2=1.0), normal=Mounting(k=1.0))
     return Model(assemble(scene))
 
 
@@ -96,18 +90,8 @@ ZONE = {"t_max": 1e6, "g_0": 1e-8, "E_n": 1e16}
 
 
 def zone(mounting: Mounting, w_n, energy=Quadratic, C: float = 1e-4, T: float = 300.0, programme=(), **more) -> Model:
-    scene = perfect_contact(
-        [ExponentialCohesiveZone(**ZONE)],
-        energy=energy,
-        C_1=C,
-        C_2=C,
-        T=T,
-        loading={"w_n": w_n},
-        normal=mounting,
-        programme=programme,
-        **more,
-    )
-    return Model(assemble(Scene(**scene.__dict__ | {"initial": {"T": T, "g_n": 0.0}})))
+    more |= {"loading": {"w_n": w_n}, "initial": {"g_n": 0.0}, "normal": mounting, "programme": programme}
+    return Model(assemble(perfect_contact([ExponentialCohesiveZone(**ZONE)], energy=energy, C_1=C, C_2=C, T=T, **more)))
 
 
 def cycles(top: float, count: int) -> Table:
@@ -119,13 +103,8 @@ def pull_off(q: dict) -> tuple[Solved, list[float]]:
     """Opening and closing, quasi-static, between reservoirs; a ramp for each fold. Returns w at the jumps."""
     top, low = 1.05 * q["w_off"], 0.5 * min(q["w_on"], q["w_off"])
     history = Table(times=[0.0, 1.0, 2.0, 3.0], values=[0.0, top, min(2.0 * q["w_on"], top), low])
-    scene = Scene(
-        COLD_BODIES,
-        Interface(None, [ExponentialCohesiveZone(**ZONE)]),
-        loading={"w_n": history},
-        initial={"g_n": 0.0},
-        normal=Mounting(k=q["k_eff"]),
-    )
+    interface, mount = Interface(None, [ExponentialCohesiveZone(**ZONE)]), Mounting(k=q["k_eff"])
+    scene = Scene(COLD_BODIES, interface, loading={"w_n": history}, initial={"g_n": 0.0}, normal=mount)
     solved = solve(Model(assemble(scene)), np.linspace(0.0, 3.0, 31))
     return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.of("snap")]
 
@@ -153,35 +132,22 @@ def isentropic() -> Solved:
     """Cohesion whose strength falls with temperature is opened in a second, without heat."""
     p, exact = parameters("h_isentropic_cohesive_cooling"), columns("h_isentropic_cohesive_cooling")
     potential = ExponentialCohesiveZone(t_max=varying(p["t0"], Power(exponent=-1.0)), g_0=p["g0"], E_n=1e16)
-    scene = perfect_contact(
-        [potential],
-        T=p["T_i"],
-        T_0=p["T0"],
-        C_1=p["C_tot"] / 2,
-        C_2=p["C_tot"] / 2,
-        loading={"g_n": Ramp(rate=exact["g"][-1])},
-    )
+    C, loading = p["C_tot"] / 2, {"g_n": Ramp(rate=exact["g"][-1])}
+    scene = perfect_contact([potential], T=p["T_i"], T_0=p["T0"], C_1=C, C_2=C, loading=loading)
     return solve(Model(assemble(scene)), exact["g"] / exact["g"][-1])
 
 
 def damage() -> Solved:
     """Bonds that carry tension follow their equilibrium: they relax in 1e-10 of the time in which the gap opens."""
     p, exact = parameters("h_damage_equilibrium"), columns("h_damage_equilibrium")
-    scene = Scene(
-        COLD_BODIES,
-        Interface(
-            Hold(level=300.0),
-            [BondStiffness(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])],
-            reactions=[LinearAffinity(c_r=1e10 * SITES.density / p["K"])],
-            sites=SITES,
-        ),
-        loading={"g_n": Ramp(rate=exact["g"][-1])},
-        T_0=300.0,
-        initial={"phi": 1.0},
-    )
+    potentials = [BondStiffness(E_b=p["E"], E_n=p["E"]), BondEnergy(K_0=p["K"])]
+    relaxes = LinearAffinity(c_r=1e10 * SITES.density / p["K"])
+    interface = Interface(Hold(level=300.0), potentials, (), [relaxes], SITES)
+    scene = Scene(COLD_BODIES, interface, (), {"g_n": Ramp(rate=exact["g"][-1])}, None, 300.0, {"phi": 1.0})
     return solve(Model(assemble(scene)), exact["g"] / exact["g"][-1])
 
 
+CONSTANT = {"pair": bodies("T", "T", Constant, 1.0, 1.0)}
 LONG_RANGE = {"flat": LennardJonesFlatFlat, "sphere": LennardJonesSpherePlane, "derjaguin": LennardJonesDerjaguin}
 
 
@@ -191,13 +157,8 @@ def long_range(kind: str, gaps: np.ndarray) -> Solved:
     sites = {"n_1": p["n1"], "n_2": p["n2"], "psi_0": p["psi0"], "g_0": p["g0"]}
     size = {} if kind == "flat" else {"R": p["R"], "area": 1e-16}
     times = [float(t) for t in range(len(gaps))]
-    scene = Scene(
-        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
-        Interface("T", [LONG_RANGE[kind](**sites, **size)]),
-        loading={"g_n": Table(times=times, values=[float(g) for g in gaps])},
-        T_0=300.0,
-        initial={"T": 300.0},
-    )
+    gap = Table(times=times, values=[float(g) for g in gaps])
+    scene = together([LONG_RANGE[kind](**sites, **size)], loading={"g_n": gap}, **CONSTANT)
     return solve(Model(assemble(scene)), times)
 
 
@@ -208,14 +169,8 @@ def snap(q: dict) -> tuple[Solved, list[float]]:
     far, near = 1.2 * q["w_snap_in"], 0.8 * q["w_snap_in"]
     apart = 1.2 * max(q["w_pull_off"], q["w_snap_in"])
     history = Table(times=[0.0, 1.0, 2.0], values=[far, near, apart])
-    scene = Scene(
-        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
-        Interface("T", [LennardJonesFlatFlat(**sites)]),
-        loading={"w_n": history},
-        T_0=300.0,
-        initial={"T": 300.0, "g_n": far},
-        normal=Mounting(k=q["k_eff"]),
-    )
+    given = {"loading": {"w_n": history}, "initial": {"g_n": far}, "normal": Mounting(k=q["k_eff"])}
+    scene = together([LennardJonesFlatFlat(**sites)], **given, **CONSTANT)
     solved = solve(Model(assemble(scene)), np.linspace(0.0, 2.0, 21))
     return solved, [float(np.interp(jump.t, history.times, history.values)) for jump in solved.of("snap")]
 
@@ -223,15 +178,8 @@ def snap(q: dict) -> tuple[Solved, list[float]]:
 @cache
 def penalty() -> Model:
     p = parameters("x09_penalty_limit")
-    scene = Scene(
-        (Body("lower", "T", Constant(C=1.0)), Body("upper", "T", Constant(C=1.0))),
-        Interface("T", [NormalStiffness(E_n=1.0)]),
-        loading={"w_n": Ramp(rate=p["w"])},
-        T_0=300.0,
-        initial={"T": 300.0},
-        normal=Mounting(k=p["k_eff"]),
-    )
-    return Model(assemble(scene))
+    given = {"loading": {"w_n": Ramp(rate=p["w"])}, "normal": Mounting(k=p["k_eff"])}
+    return Model(assemble(together([NormalStiffness(E_n=1.0)], **given, **CONSTANT)))
 
 
 def light_interface(C_c: float) -> Scene:
@@ -250,14 +198,8 @@ def light_interface(C_c: float) -> Scene:
 @cache
 def film() -> Model:
     p = parameters("x05_closing_film")
-    scene = perfect_contact(
-        [],
-        frictions=[Viscous(eta=p["eta"])],
-        C_1=p["C_tot"] / 2,
-        C_2=p["C_tot"] / 2,
-        T=p["T0"],
-        loading={"v": Hold(level=p["v"]), "g_n": Ramp(start=p["g_i"], rate=-p["a"])},
-    )
+    C, loading = p["C_tot"] / 2, {"v": Hold(level=p["v"]), "g_n": Ramp(start=p["g_i"], rate=-p["a"])}
+    scene = perfect_contact([], frictions=[Viscous(eta=p["eta"])], C_1=C, C_2=C, T=p["T0"], loading=loading)
     return Model(assemble(scene))
 
 
@@ -266,30 +208,23 @@ def film() -> Model:
 
 def coulomb_stop() -> Solved:
     p = parameters("g_coulomb_stop")
-    scene = perfect_contact(
-        [],
-        frictions=[Coulomb(mu=p["mu"])],
-        C_1=p["C_tot"] / 2,
-        C_2=p["C_tot"] / 2,
-        loading={"p": Hold(level=p["p"])},
-        tangential=Mounting(m=p["m"]),
-    )
-    scene = Scene(**scene.__dict__ | {"initial": {"T": p["T0"], "v": p["v0"]}})
+    C, given = p["C_tot"] / 2, {"loading": {"p": Hold(level=p["p"])}, "initial": {"v": p["v0"]}}
+    frictions, mount = [Coulomb(mu=p["mu"])], Mounting(m=p["m"])
+    scene = perfect_contact([], frictions=frictions, C_1=C, C_2=C, T=p["T0"], tangential=mount, **given)
     return solve(Model(assemble(scene)), columns("g_coulomb_stop")["t"])
+
+
+def _dragged(p) -> dict:
+    """Pressure and drive of a mass on a spring."""
+    loading = {"p": Hold(level=p["p"]), "w_t": Ramp(rate=p["V"])}
+    return {"loading": loading, "tangential": Mounting(m=p["m"], k=p["k"])}
 
 
 @cache
 def slider() -> Model:
     p = parameters("g_stickslip_motion")
-    scene = perfect_contact(
-        [],
-        frictions=[Coulomb(mu=p["mu_k"], mu_s=p["mu_s"])],
-        C_1=500.0,
-        C_2=500.0,
-        loading={"p": Hold(level=p["p"]), "w_t": Ramp(rate=p["V"])},
-        tangential=Mounting(m=p["m"], k=p["k"]),
-    )
-    return Model(assemble(scene))
+    friction = Coulomb(mu=p["mu_k"], mu_s=p["mu_s"])
+    return Model(assemble(perfect_contact([], frictions=[friction], C_1=500.0, C_2=500.0, **_dragged(p))))
 
 
 @cache
@@ -297,17 +232,6 @@ def rebonding_slider() -> Model:
     """Bonds form while the interface sticks, without heat, and break as it slides."""
     p = parameters("g_stickslip_rebonding_transient")
     forms = Arrhenius(A=varying(1 / p["tau"], Linear(of="sticking", about=1.0, slope=1.0)), E_a=0.0)
-    scene = Scene(
-        COLD_BODIES,
-        Interface(
-            Hold(level=300.0),
-            frictions=[BondedCoulomb(mu=p["mu_k"], mu_b=p["mu_b"], mu_ub=p["mu_ub"])],
-            reactions=[forms],
-            sites=SITES,
-        ),
-        loading={"p": Hold(level=p["p"]), "w_t": Ramp(rate=p["V"])},
-        T_0=300.0,
-        initial={"phi": 0.0},
-        tangential=Mounting(m=p["m"], k=p["k"]),
-    )
-    return Model(assemble(scene))
+    friction = BondedCoulomb(mu=p["mu_k"], mu_b=p["mu_b"], mu_ub=p["mu_ub"])
+    interface = Interface(Hold(level=300.0), (), [friction], [forms], SITES)
+    return Model(assemble(Scene(COLD_BODIES, interface, T_0=300.0, initial={"phi": 0.0}, **_dragged(p))))
