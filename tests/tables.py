@@ -49,15 +49,8 @@ def sliding(name: str) -> Table:
         law, loading = Coulomb(mu=p["mu"]), {"p": Hold(level=p["p"]), "v": Hold(level=p["v"])}
     else:
         law, loading = Viscous(eta=p["eta"]), {"g_n": Hold(level=p["g_n"]), "v": Hold(level=p["v"])}
-    scene = perfect_contact(
-        [InterfaceCapacity(C_c=p["Cc"])],
-        frictions=[law],
-        C_1=p["C1"],
-        C_2=p["C2"],
-        T_0=p["T0"],
-        T=p["T0"],
-        loading=loading,
-    )
+    given = {"C_1": p["C1"], "C_2": p["C2"], "T_0": p["T0"], "T": p["T0"], "loading": loading}
+    scene = perfect_contact([InterfaceCapacity(C_c=p["Cc"])], frictions=[law], **given)
     names = {"T": "T", "q1": "q_1", "q2": "q_2", "S_total": "S_total"}
     exact = {names[key]: columns[key] for key in columns if key in names}
     return Table(name, scene, columns["t"], exact, floors={"S_total": 1e-2})
@@ -70,29 +63,13 @@ def bonding(name: str, tolerance: float = 1e-8) -> Table:
     frictions, loading = [], {}
     if "D" in p:
         frictions, loading = [Coulomb(mu=0.5)], {"p": Hold(level=2.0), "v": Hold(level=p["D"])}
-    scene = perfect_contact(
-        potentials,
-        [Relaxation(tau=p["tau"])],
-        p["phi_i"],
-        p["T_i"],
-        p["C1"],
-        p["C2"],
-        T_0=p["T0"],
-        frictions=frictions,
-        loading=loading,
-    )
-    names = {
-        "phi": "phi",
-        "T": "T",
-        "q1": "q_1",
-        "q2": "q_2",
-        "q_m": "q_m",
-        "U_c": "U_c",
-        "S_total": "S_total",
-        "sigma_chem": "sigma_relaxation",
-    }
+    start, sizes = (p["phi_i"], p["T_i"]), (p["C1"], p["C2"])
+    given = {"T_0": p["T0"], "frictions": frictions, "loading": loading}
+    scene = perfect_contact(potentials, [Relaxation(tau=p["tau"])], *start, *sizes, **given)
+    names = {"q1": "q_1", "q2": "q_2", "sigma_chem": "sigma_relaxation"}
+    names |= {name: name for name in ("phi", "T", "q_m", "U_c", "S_total")}
     exact = {names[key]: columns[key] for key in columns if key in names}
-    floors = {"U_c": 1e-2, "S_total": 1e-2, "q_1": 1e-2, "q_2": 1e-2, "q_m": 1e-2, "sigma_relaxation": 1e-2}
+    floors = dict.fromkeys(("U_c", "S_total", "q_1", "q_2", "q_m", "sigma_relaxation"), 1e-2)
     return Table(name, scene, columns["t"], exact, tolerance, floors)
 
 
@@ -203,32 +180,17 @@ def friction_with_loss(name: str) -> Table:
     loading = {"p": Hold(level=p["p"]), "v": Hold(level=p["v"])}
     law = Coulomb(mu=varying(p["mu0"], Power(exponent=-1.0)))
     C = p["C_tot"] / 2
-    scene = perfect_contact(
-        [],
-        T=p["T0"],
-        T_0=p["T0"],
-        C_1=C,
-        C_2=C,
-        frictions=[law],
-        loading=loading,
-        heat=[path("lower", "surroundings", p["H"])],
-        surroundings=Hold(level=p["T_a"]),
-    )
+    outside = {"heat": [path("lower", "surroundings", p["H"])], "surroundings": Hold(level=p["T_a"])}
+    given = {"T": p["T0"], "T_0": p["T0"], "C_1": C, "C_2": C, "loading": loading}
+    scene = perfect_contact([], frictions=[law], **given, **outside)
     return Table(name, scene, columns["t"], {"T": columns["T"]})
 
 
 def adiabatic(name: str, reaction: Arrhenius) -> Table:
     p, columns = read(name)
     C = 2.0
-    scene = perfect_contact(
-        [LinearEnthalpy(H_r=C * p["dT_ad"])],
-        [reaction],
-        T=p["T_i"],
-        T_0=p["T_i"],
-        C_1=C / 2,
-        C_2=C / 2,
-        energy=Constant,
-    )
+    given = {"T": p["T_i"], "T_0": p["T_i"], "C_1": C / 2, "C_2": C / 2, "energy": Constant}
+    scene = perfect_contact([LinearEnthalpy(H_r=C * p["dT_ad"])], [reaction], **given)
     return Table(name, scene, columns["t"], {"T": columns["T"], "phi": columns["phi"]})
 
 

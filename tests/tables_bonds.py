@@ -67,16 +67,9 @@ def kamal(name: str) -> Table:
     p, columns = read(name)
     law = KamalSourour(A_1=p["A1"], E_1=p["E1"], A_2=p["A2"], E_2=p["E2"], m=p["m"], n=p["n"])
     C = 2.0
-    scene = perfect_contact(
-        [LinearEnthalpy(H_r=C * p["dT_ad"])],
-        [law],
-        p["alpha_i"],
-        p["T_i"],
-        C / 2,
-        C / 2,
-        T_0=p["T_i"],
-        energy=Constant if name.endswith("const_capacity") else Quadratic,
-    )
+    start, energy = (p["alpha_i"], p["T_i"]), Constant if name.endswith("const_capacity") else Quadratic
+    given = {"C_1": C / 2, "C_2": C / 2, "T_0": p["T_i"], "energy": energy}
+    scene = perfect_contact([LinearEnthalpy(H_r=C * p["dT_ad"])], [law], *start, **given)
     return Table(name, scene, columns["t"], {"phi": columns["alpha"], "T": columns["T"]})
 
 
@@ -91,18 +84,9 @@ def lattice_gas(row: int) -> Table:
 
 def ignited(name: str) -> Table:
     p, columns = read(name)
-    scene = perfect_contact(
-        [],
-        [Arrhenius(A=p["k0"], E_a=p["Ea"])],
-        0.0,
-        p["T_i"],
-        p["C_tot"] / 2,
-        p["C_tot"] / 2,
-        T_0=p["T_i"],
-        energy=Constant,
-        frictions=[Coulomb(mu=0.5)],
-        loading={"p": Hold(level=2.0), "v": Hold(level=p["D"])},
-    )
+    C, rubbing = p["C_tot"] / 2, {"p": Hold(level=2.0), "v": Hold(level=p["D"])}
+    given = {"T_0": p["T_i"], "energy": Constant, "frictions": [Coulomb(mu=0.5)], "loading": rubbing}
+    scene = perfect_contact([], [Arrhenius(A=p["k0"], E_a=p["Ea"])], 0.0, p["T_i"], C, C, **given)
     return Table(name, scene, columns["t"], {"phi": columns["phi"], "T": columns["T"]})
 
 
