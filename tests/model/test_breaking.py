@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import SITES, bodies, varying
+from solved import closed
 
 from surfacechem.errors import InputError
 from surfacechem.laws.cohesive import TensileStrength
@@ -16,7 +17,6 @@ from surfacechem.model.assemble import assemble
 from surfacechem.quantities import GAS_CONSTANT
 from surfacechem.results.audit import audit
 from surfacechem.scene import Interface, Mounting, Scene
-from surfacechem.solve.run import Model, Run
 
 K = 1e12
 """Stiffness of the bodies [Pa/m]."""
@@ -61,23 +61,15 @@ def two_bonds(tmp_path) -> Path:
 
 def scene(path, bonds, coverages, loading, frictions=(), limits=(), potentials=(), **mounts) -> Scene:
     mechanism = load_mechanism(path, bonds=bonds)
-    interface = Interface(
-        "T",
-        [*mechanism.potentials, *potentials],
-        frictions,
-        mechanism.reactions,
-        mechanism.sites,
-        variables=mechanism.variables,
-        bonds=mechanism.bonds,
-        limits=limits,
-    )
+    reading = ([*mechanism.potentials, *potentials], frictions, mechanism.reactions, mechanism.sites)
+    given = {"variables": mechanism.variables, "bonds": mechanism.bonds, "limits": limits}
+    interface = Interface("T", *reading, **given)
     initial = {"T": 300.0} | mechanism.coverages(coverages)
     return Scene(bodies("T", "T", C_1=0.5, C_2=0.5), interface, loading=loading, T_0=300.0, initial=initial, **mounts)
 
 
-def solve(scene, until=2.0):
-    trajectory = Model(assemble(scene)).solve(Run(times=np.linspace(0.0, until, 21)))
-    assert audit(trajectory).energy_error < 1e-9
+def solve(scene):
+    trajectory = closed(scene, 2.0, outputs=21)
     assert audit(trajectory).site_error < 1e-10
     return trajectory
 
@@ -89,8 +81,7 @@ def pulled(path, coverages, **options):
 
 
 def coverages(trajectory, point):
-    names = [state.name for state in trajectory.model.system.states]
-    return dict(zip(names, getattr(trajectory.jumps[0], point).y.tolist(), strict=True))
+    return {name: trajectory.state(trajectory.jumps[0], name, point) for name in trajectory.states}
 
 
 def test_a_strength_breaks_every_bond_into_free_sites(two_bonds):

@@ -194,16 +194,9 @@ def run(k_n, k_t, w_n, w_t, friction="", extra="", finishes=True, **zone):
     given = ", ".join(f"{name}: {value!r}" for name, value in ({"Phi_n": 1, "g_0": 1e-6, "g_t0": 2e-6} | zone).items())
     potential = f"xu-needleman: {{{given}}}{extra}"
     T, initial = ("T", "T: 300") if friction else ("300", "")
-    case = CASE.format(
-        potential=potential,
-        friction=friction,
-        k_n=k_n,
-        k_t=k_t,
-        w_n=history(w_n),
-        w_t=history(w_t),
-        T=T,
-        initial=initial,
-    )
+    loads = {"w_n": history(w_n), "w_t": history(w_t)}
+    given = {"potential": potential, "friction": friction, "k_n": k_n, "k_t": k_t, "T": T, "initial": initial}
+    case = CASE.format(**given, **loads)
     data = Simulation(load_text(case)).run(error="balances").dataset
     assert (data.attrs["status"] == "finished") == finishes, data.attrs["reason"]
     assert data.attrs["energy_error"] < 1e-9

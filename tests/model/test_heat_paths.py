@@ -154,13 +154,8 @@ def test_mean_influx_is_of_two_bodies_with_temperatures_of_their_own():
     mean = Conductance(between=("lower", "surroundings"), h=1.0, closure="mean")
     with pytest.raises(InputError, match="`closure: mean` belongs to a path between the two bodies"):
         assemble(replace(through_medium([mean]), surroundings=Hold(level=300.0)))
-    shared = Scene(
-        bodies("T", "T"),
-        Interface("T_c", [InterfaceCapacity(C_c=3.0)]),
-        [Conductance(between=ENDS, h=1.0, closure="mean")],
-        T_0=300.0,
-        initial={"T": 300.0, "T_c": 310.0},
-    )
+    mean, interface = Conductance(between=ENDS, h=1.0, closure="mean"), Interface("T_c", [InterfaceCapacity(C_c=3.0)])
+    shared = Scene(bodies("T", "T"), interface, [mean], {}, None, 300.0, {"T": 300.0, "T_c": 310.0})
     with pytest.raises(InputError, match="two bodies with temperatures of their own"):
         assemble(shared)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import solved
-from scenes import bodies, together
+from scenes import together
 
 from surfacechem.format import load_text
 from surfacechem.laws.cohesive import ExponentialCohesiveZone
@@ -14,7 +14,7 @@ from surfacechem.laws.loading import Harmonic, Hold, Ramp
 from surfacechem.model.assemble import assemble
 from surfacechem.results.audit import audit
 from surfacechem.runs.simulation import Simulation
-from surfacechem.scene import Interface, Mounting, Scene
+from surfacechem.scene import Mounting
 from surfacechem.solve.diagnose import paces
 from surfacechem.solve.run import Model
 
@@ -99,14 +99,8 @@ def test_a_light_damper_passes_a_fold(c_g):
 
 @pytest.mark.parametrize(("c_b", "c_g"), [(3e2, 5e2), (4e2, 4e2), (8e2, 0.0), (0.0, 8e2)])
 def test_dampers_of_the_bodies_and_of_the_gap_relax_together(c_b, c_g):
-    scene = Scene(
-        bodies("T", "T"),
-        Interface("T", [ZONE]),
-        loading={"w_n": Ramp(rate=1e-8)},
-        T_0=300.0,
-        initial={"T": 300.0, "g_n": 0.0},
-        normal=Mounting(k=1e13, c_b=c_b, c_g=c_g),
-    )
+    mount = Mounting(k=1e13, c_b=c_b, c_g=c_g)
+    scene = together([ZONE], (), {"w_n": Ramp(rate=1e-8)}, {"g_n": 0.0}, normal=mount)
     model = Model(assemble(scene))
     ((pace, time),) = paces(model.system, model.values())
     assert pace.text == "relaxation of the normal gap"
