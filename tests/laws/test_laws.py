@@ -115,23 +115,14 @@ def test_friction_never_drives(law):
             assert instance.traction(**{name: own.get(name, value) for name, value in values.items()}) * v >= 0
 
 
-def limited() -> list[type[Friction]]:
-    return [law for law in laws(Friction).values() if hasattr(law, "limit")]
-
-
-@pytest.mark.parametrize("law", limited(), ids=lambda law: law.name())
+@pytest.mark.parametrize("law", [law for law in laws(Friction).values() if hasattr(law, "limit")])
 def test_sticking_bears_a_traction_at_rest(law):
     for seed in range(SAMPLES):
         instance = example(law, seed)
         draw = random.Random(seed)
         values = {name: draw.uniform(0.1, 0.9) for name in reads(instance.limit)}
-        assert "v" not in values
-        assert set(values) <= READABLE
-        number = instance.limit(**values)
-        assert number >= 0
-        symbols = {name: symengine.Symbol(name) for name in values}
-        symbolic = instance.limit(**symbols).subs({symbols[name]: value for name, value in values.items()})
-        assert float(symbolic) == pytest.approx(number, rel=1e-12)
+        assert set(values) <= READABLE - {"v"}
+        assert instance.limit(**values) >= 0
 
 
 @pytest.mark.parametrize("law", laws(RateLaw).values(), ids=lambda law: law.name())

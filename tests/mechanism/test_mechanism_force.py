@@ -1,4 +1,4 @@
-"""Mechanisms under force: rates and equilibrium constants by hand, and pairs that keep detailed balance or do not."""
+"""Mechanisms under force: pairs of reactions that keep detailed balance, and pairs that do not."""
 
 import math
 
@@ -33,7 +33,7 @@ species:
   bond: {stiffness: 5 pN/nm, rest-length: 10 nm}
 reactions:
 """.replace("19.14475...", repr(8.31446261815324 * math.log(K_0)))
-OFF, ON, BOTH = "bond(s) => free(s)", "free(s) => bond(s)", "bond(s) <=> free(s)"
+OFF, ON = "bond(s) => free(s)", "free(s) => bond(s)"
 CASE = """\
 title: Bonds pulled apart
 bodies:
@@ -59,7 +59,6 @@ PAIRS = {
         reaction(ON, K_0, "Dembo-formation", stiffness="5 pN/nm", transition_stiffness="2 pN/nm"),
     ),
     "attachment": (reaction(OFF, 1.0), reaction(ON, K_0, "gap-attachment", stiffness="5 pN/nm", rest_length="10 nm")),
-    "reversible": (reaction(BOTH, 1.0, "Bell", x_beta="0.4 nm"),),
 }
 
 

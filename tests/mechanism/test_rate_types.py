@@ -101,6 +101,8 @@ def test_a_mechanism_says_what_a_case_says(tmp_path, equation, kind, more, law, 
     point |= dict.fromkeys(("n_theta_free", "n_theta_bond"), SITES)
     state = {"phi": phi, "n_c": SITES, "f": f, "T_c": T, "g_n": g_n}
     expected = law.rate(**{name: state[name] for name in state if name in law.rate.__code__.co_varnames})
+    assert lowered.peaks == pytest.approx(law.peaks)
+    assert lowered.ranges.keys() == law.ranges.keys()
     sign = 1 if equation.startswith("free") else -1
     assert sign * call(lowered.rate, point) == pytest.approx(expected, rel=1e-13)
     if 0 < abs(expected) < 1e100:  # beyond, a rate grows no more as its logarithm does
