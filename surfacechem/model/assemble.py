@@ -56,14 +56,22 @@ ORDER = (
     "fold",
     "load_steps",
     "envelope",
-    "bound",
 )
 """Components that build on those before them, or are printed behind them; all others follow by name."""
+
+
+def _bonds(scene: Scene) -> object:
+    """Whether there are bonds, or anything says how many."""
+    interface = scene.interface
+    driven = "phi" in scene.loading or any("phi" in stage.rates for stage in scene.programme)
+    return driven or interface.sites or interface.variables or interface.reactions
+
 
 ASKED_FOR: dict[str, Callable[[Scene], object]] = {
     "conduction": lambda scene: any(body.conduction for body in scene.bodies),
     "programme": lambda scene: scene.programme,
     "medium": lambda scene: scene.interface.medium,
+    **dict.fromkeys(("chemistry", "pairs", "bound", "envelope"), _bonds),
 }
 """Components that are not imported where the scene has no part that asks for them."""
 

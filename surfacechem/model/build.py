@@ -92,7 +92,7 @@ class Build:
     energy: Energy = NO_ENERGY
     heals: Mapping[Expression, Expression] = field(default_factory=dict)
     """New values of modes that a rigid contact has as it closes again."""
-    rates: Mapping[Any, Expression] = field(default_factory=dict)
+    rates: dict[Any, Expression] = field(default_factory=dict)
     """Time derivatives of what the interface's free energy depends on beside temperature."""
     inflow: dict[str, list[Expression]] = field(default_factory=dict)
     """Heat and mechanical power that flow into each node [W/m^2]."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import symengine
 
@@ -61,34 +60,24 @@ def take(build: Build, record: Record) -> None:
         _account(build, record)
 
 
-def _surface_rates(build: Build) -> dict[Any, Expression]:
-    """Time derivatives of what the interface's free energy depends on beside temperature."""
-    rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
-    for name in (*GEOMETRY, "phi"):
-        x = symengine.Symbol(name)
-        if x not in rates and depends(build.psi, x):
-            moved = build.motion.gap_rates.get(name)
-            rates[x] = build.rate_of(name) if moved is None else moved
-    return rates
-
-
-def _surface_work(build: Build) -> Iterator[Power]:
-    """Work that tractions do on the interface: from outside where the gap is prescribed, else from the bodies."""
-    for name in GEOMETRY:
-        x = symengine.Symbol(name)
-        power = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
-        if power != 0:
-            stretches = name == "J_c"
-            label = "W_J" if stretches else f"W_{name}"
-            text = "work done in stretching the surface" if stretches else f"work done on the gap {name}"
-            yield Power(WORK, MECHANICS if name in build.motion.gap_rates else OUTSIDE, INTERFACE, power, label, text)
-
-
 def flows(build: Build) -> None:
     """What flows into each node, from all powers and the work of tractions; what is dissipated gets its accounts."""
-    build.rates = _surface_rates(build)
-    for power in _surface_work(build):
-        take(build, power)
+    build.rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
+    for name in (*GEOMETRY, "phi"):
+        x = symengine.Symbol(name)
+        if x not in build.rates and depends(build.psi, x):
+            moved = build.motion.gap_rates.get(name)
+            build.rates[x] = build.rate_of(name) if moved is None else moved
+    # Tractions do work on the interface: from outside where the gap is prescribed, else from the bodies.
+    for name in GEOMETRY:
+        x = symengine.Symbol(name)
+        work = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
+        if work != 0:
+            source = MECHANICS if name in build.motion.gap_rates else OUTSIDE
+            label, text = f"W_{name}", f"work done on the gap {name}"
+            if name == "J_c":
+                label, text = "W_J", "work done in stretching the surface"
+            take(build, Power(WORK, source, INTERFACE, work, label, text))
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)
