@@ -104,7 +104,6 @@ def _close(build: Build) -> None:
     """What must hold for the whole, and what of it takes part in events."""
     build.varying_margins()
     _refuse_idle_initial_values(build)
-    build.sinks = ledger.sinks(build)
     if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
@@ -117,7 +116,7 @@ def _close(build: Build) -> None:
 
 def _system(build: Build) -> System:
     """All that was stated, as one frozen graph."""
-    far_fields = build.motion.far_fields
+    far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -147,7 +146,7 @@ def _system(build: Build) -> System:
         registers=tuple(build.registers),
         edges=tuple(build.edges),
         equilibria=tuple(build.equilibria),
-        sinks=build.sinks,
+        sinks=sinks,
         follows={str(x): value for x, value in build.motion.follows.items()},
         given={f"W_{axis}": far.F * far.gap for axis, far in far_fields.items() if far.F != 0},
         pulls={f"W_{axis}": (far.k, far.w, far.F, far.gap) for axis, far in far_fields.items() if far.works},

@@ -14,7 +14,7 @@ from surfacechem.contracts.terms import Friction, Law, Load, Spec, optional
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, derivative
 from surfacechem.model import balances
-from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register, Sink
+from surfacechem.model.automaton import Constraint, Edge, Equilibrium, Mode, Register
 from surfacechem.model.balances import Node, Power, Rows
 from surfacechem.model.parts import NO_ENERGY, NO_NODES, Bond, Energy, HeatPath, Thermal
 from surfacechem.model.system import (
@@ -103,7 +103,6 @@ class Build:
     rows: Rows = field(default_factory=Rows)
     ledger: list[Account] = field(default_factory=list)
     margins: list[Margin] = field(default_factory=list)
-    bound_frictions: dict[Friction, Friction] = field(default_factory=dict)
     powers: list[Power] = field(default_factory=list)
     """All that passes energy on, from which the ledger and the balances of energy follow."""
     loads: dict[str, Load] = field(default_factory=dict)
@@ -115,8 +114,6 @@ class Build:
     notes: list[Note] = field(default_factory=list)
     """What is watched along a run, and told where it matters; no equation depends on it."""
     warnings: list[str] = field(default_factory=list)
-    sinks: Mapping[str, tuple[Sink, ...]] = field(default_factory=dict)
-    """Who takes the heat of jumps."""
     used_names: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -190,14 +187,7 @@ class Build:
 
     def bound(self, law: Friction) -> Friction:
         """A friction law with its parameters as symbols, made once."""
-        if law not in self.bound_frictions:
-            path = f"interface.friction.{law.name()}"
-            self.bound_frictions[law] = self.variables.bind(law, path)
-        return self.bound_frictions[law]
-
-    def label(self, law: Law) -> str:
-        """A short unique name of a law for its quantities."""
-        return self.unique(law.label)
+        return self.variables.shared(law, f"interface.friction.{law.name()}")
 
     def unique(self, base: str) -> str:
         """The name, with a number where it is taken."""
@@ -205,14 +195,11 @@ class Build:
         self.used_names.add(name)
         return name
 
-    def history(self, name: str, load: Load) -> Expression:
-        """A prescribed history as an expression of time; its breakpoints will end a step."""
-        self.loads[name] = load
-        return self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t)
-
     def prescribe(self, quantity: Quantity, load: Load) -> Expression:
-        """Make a prescribed variable a named quantity."""
-        return self.name(quantity, self.history(quantity.name, load))
+        """Make a prescribed history a named quantity; its breakpoints will end a step."""
+        name = quantity.name
+        self.loads[name] = load
+        return self.name(quantity, self.variables.bind(load, f"loading.{name}", unit=unit_of(name)).value(self.t))
 
     def slope_of(self, name: str) -> Expression:
         """Time derivative of a prescribed variable between its jumps."""
@@ -334,16 +321,6 @@ class Build:
         """Ranges of variables that a run watches for a law."""
         for name, (low, high) in law.ranges.items():
             self.notes.append(Range(str(self.variables.get(name, law)), low, high, law.title))
-
-    def refuse_never_positive(self, law: Law, own: Mapping[str, Expression]) -> None:
-        """A law that divides by what is zero, whatever the state, is none for this scene."""
-        for name in law.positive:
-            value = symengine.sympify(own[name] if name in own else self.variables.get(name, law))
-            if value.is_Number and not value > 0:
-                raise InputError(
-                    f"{law.name()} holds for {name} > 0 only; with the laws of this scene {name} is always {value}.",
-                    law.place,
-                )
 
     def law_margins(self, law: Law, own: Mapping[str, Expression], met: Collection[str] = ()) -> None:
         """What must stay positive for a law to hold, but for the bounds that are ``met`` by what it is given."""

@@ -73,11 +73,11 @@ def flows(build: Build) -> None:
         x = symengine.Symbol(name)
         work = balances.power(build.psi, x, build.rates[x]) if x in build.rates else 0
         if work != 0:
-            source = MECHANICS if name in build.motion.gap_rates else OUTSIDE
+            origin = MECHANICS if name in build.motion.gap_rates else OUTSIDE
             label, text = f"W_{name}", f"work done on the gap {name}"
             if name == "J_c":
                 label, text = "W_J", "work done in stretching the surface"
-            take(build, Power(WORK, source, INTERFACE, work, label, text))
+            take(build, Power(WORK, origin, INTERFACE, work, label, text))
     for power in build.powers:
         if power.kind == DISSIPATION:
             _account(build, power)

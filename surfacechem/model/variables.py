@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import symengine
 
@@ -104,7 +104,7 @@ class Variables:
         """Parameters whose factors may carry them out of their range: law, name, range and expression."""
         self._makers: dict[str, Callable[[], Expression] | Expression] = {}
         self._symbols: dict[str, Expression] = {}
-        self._bound: dict[Law, Law] = {}
+        self._bound: dict[Any, Any] = {}
 
     def define(self, name: str, make: Callable[[], Expression] | Expression, role: str, by: str) -> None:
         """Give a name its role and its expression, or the way to make it; a second role is an error."""
@@ -166,7 +166,7 @@ class Variables:
         ``path`` is where a law that was built in Python would stand in a case file, ``unit`` what "[x]" stands for.
         """
         law = law if law.place else replace(law, place=Place(path=path))
-        law = law.with_parts(self._shared)
+        law = law.with_parts(self.shared)
         values: dict[str, Expression] = {}
         for name, spec in law.specs():
             values[name] = self._parameter(law, name, law.refine(name, spec).resolved(unit), suffix)
@@ -176,11 +176,12 @@ class Variables:
                 values[name] = self.parameters.add(name, f"{law.path}.{name}", spec, 0.0, law, name)
         return law.bind(values)
 
-    def _shared(self, law: Law, path: str, suffix: str) -> Law:
-        """A law that several others hold, bound once."""
+    def shared(self, law: L, path: str, suffix: str = "") -> L:
+        """A law that several ask for, bound once."""
         if law not in self._bound:
             self._bound[law] = self.bind(law, path, suffix)
-        return self._bound[law]
+        found: L = self._bound[law]
+        return found
 
     def _parameter(self, law: Law, name: str, spec: Spec, suffix: str) -> Expression:
         """The symbol of a parameter as the formula sees it: where the surface stretches, not always what is given."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import symengine
 
 from surfacechem.contracts.terms import RateLaw
+from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, exponents, where
 from surfacechem.model.balances import DISSIPATION, HEAT, INTERFACE, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
@@ -59,7 +60,7 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
         mu[name] = build.name(quantity, M, output=single)
     kinetics = {}
     for law in build.interface.reactions:
-        kinetics[build.label(law)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
+        kinetics[build.unique(law.label)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
         build.law_ranges(law)
     pairs = opposed(kinetics)
     load = dead_load(build, kinetics, pairs)
@@ -159,7 +160,13 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     if "phi" in build.bonding:
         bond = build.bonding["phi"]
         own["dmu_dphi"] = derivative(derivative(build.psi, bond.symbol), bond.symbol) / bond.density
-    build.refuse_never_positive(law, own)
+    for name in law.positive:  # a law that divides by what is zero, whatever the state, is none for this scene
+        value = symengine.sympify(own[name] if name in own else build.variables.get(name, law))
+        if value.is_Number and not value > 0:
+            raise InputError(
+                f"{law.name()} holds for {name} > 0 only; with the laws of this scene {name} is always {value}.",
+                law.place,
+            )
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     if found := exponents(rate):

@@ -25,7 +25,7 @@ def laws(build: Build) -> Iterator[Power]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     rubs, total = build.energy.rubs, symengine.Integer(0)
     for law in build.interface.frictions:
-        label = build.label(law)
+        label = build.unique(law.label)
         bound = build.bound(law)
         memory(build, law, bound)
         met = pressed(build, law)
