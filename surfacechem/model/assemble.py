@@ -26,7 +26,6 @@ from surfacechem.model.system import (
     Pair,
     Profile,
     Range,
-    Role,
     System,
 )
 from surfacechem.scene import Scene
@@ -117,6 +116,8 @@ def _close(build: Build) -> None:
 def _system(build: Build) -> System:
     """All that was stated, as one frozen graph."""
     far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
+    there = {role.variable for role in build.variables.roles if build.variables.was_read(role.variable)}
+    there |= {item.name for item in build.named}
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -126,7 +127,8 @@ def _system(build: Build) -> System:
         rows={state.name: build.rows[state.name] for state in build.states},
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
-        roles=tuple(role for role in build.variables.roles if _is_there(build, role)),
+        # A derived variable that nobody reads is not there.
+        roles=tuple(item for item in build.variables.roles if item.role != "derived" or item.variable in there),
         ranges=build.noted(Range),
         capped=build.noted(Capped),
         pairs=build.noted(Pair),
@@ -154,12 +156,6 @@ def _system(build: Build) -> System:
         outside=_outside(build),
         origin=partial(assemble, build.scene),
     )
-
-
-def _is_there(build: Build, role: Role) -> bool:
-    """Whether a derived variable was derived: one that nobody reads is not there."""
-    name = role.variable
-    return role.role != "derived" or build.variables.was_read(name) or build.is_named(name)
 
 
 def _outside(build: Build) -> Outside | None:

@@ -35,10 +35,6 @@ class Passage:
     rate: Expression
     channels: Mapping[str, Expression] = field(default_factory=dict)
 
-    def into(self, place: str) -> Expression:
-        """What it brings to a place, negative where it leaves it."""
-        return self.rate * ((self.target == place) - (self.source == place))
-
 
 def passages(build: Build) -> Iterator[Passage]:
     """Where the powers of a scene arrive."""
@@ -218,7 +214,7 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
         if sharing != [INTERFACE]:
             return None, None
         moved = balances.energy_rate(build.psi, node.T, node.T_dot, build.rates, {})
-        into_interface = (flow.into(INTERFACE) for flow in flows)
+        into_interface = (flow.rate * ((flow.target == INTERFACE) - (flow.source == INTERFACE)) for flow in flows)
         flux = flux + symengine.Add(*into_interface) - moved
     elif body.name in node.energies:
         recovered = balances.energy_rate(node.energies[body.name], node.T, node.T_dot, {}, {}) - elsewhere
