@@ -20,7 +20,7 @@ from surfacechem.errors import InputError
 from surfacechem.references.base import Array, Parameters, Quantities, Reference, SceneView, read
 
 if TYPE_CHECKING:
-    from surfacechem.scene import Scene
+    from surfacechem.scene import Body, Scene
 
 Complex: TypeAlias = NDArray[Any]
 """Complex values."""
@@ -182,11 +182,16 @@ def _beside_conduction(scene: Scene) -> Iterator[str]:
         if path.name() != "conductance" or set(path.between) != bodies or not constant:
             yield f"the heat path {path.name()} is no constant one between the bodies"
     for body in scene.bodies:
-        energy, conduction = body.energy, body.conduction
-        if energy is not None and (energy.name() != "constant" or isinstance(getattr(energy, "C", None), Varying)):
-            yield f"the heat capacity of {body.name} varies"
-        if conduction is not None and isinstance(conduction.conductivity, Varying):
-            yield f"the conductivity of {body.name} varies"
-        loads = [body.temperature, conduction.far if conduction else None]
-        if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
-            yield f"a temperature of {body.name} varies"
+        yield from _varying(body)
+
+
+def _varying(body: Body) -> Iterator[str]:
+    """The contents of a body that are not constant, in words."""
+    energy, conduction = body.energy, body.conduction
+    if energy is not None and (energy.name() != "constant" or isinstance(getattr(energy, "C", None), Varying)):
+        yield f"the heat capacity of {body.name} varies"
+    if conduction is not None and isinstance(conduction.conductivity, Varying):
+        yield f"the conductivity of {body.name} varies"
+    loads = [body.temperature, conduction.far if conduction else None]
+    if any(isinstance(load, Load) and load.name() != "hold" for load in loads):
+        yield f"a temperature of {body.name} varies"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from surfacechem.compile.program import compile_function
 from surfacechem.contracts.terms import Law, Varying
+from surfacechem.expressions import Expression
 from surfacechem.model.automaton import INTERFACE
 from surfacechem.model.checks import conductance_warnings
 from surfacechem.model.system import System
@@ -96,9 +97,11 @@ def rates(start: Start) -> NDArray[np.complex128]:
 
 def groups(model: Model, scene: Scene, values: Mapping[str, float], start: Start | None, end: float) -> list[Group]:
     """The numbers of a scene, as far as its parameters and its consistent initial state tell them."""
-    found = [*_of_laws(scene, values)]
+    found = [*_bond_energy(scene), *_activation(scene, values)]
     if start is not None:
-        found += _of_start(model.system, scene, start, end)
+        found += _affinity(model.system, scene, start)
+        found += _heat_paths(model.system, scene, start, end)
+        found += _dissipation(model.system, start, end)
         found += [Group(*row[:2], "1", row[2]) for body in lumpings(model.system, start, end) for row in body.rows()]
         found += _time_scales(start, end)
         for pace, t in paces(model.system, values):
@@ -111,8 +114,8 @@ def number(value: float | Varying) -> float:
     return value.value if isinstance(value, Varying) else float(value)
 
 
-def _of_laws(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
-    """Energy of bonds against heat content, and activation energies against the temperature at the start."""
+def _bond_energy(scene: Scene) -> Iterator[Group]:
+    """Energy of bonds against heat content."""
     C, T_0 = capacity_with_interface(scene), scene.T_0
     bonds = [law for law in scene.interface.potentials if law.name() == "bond-energy"]
     if C and T_0 and bonds:
@@ -127,6 +130,10 @@ def _of_laws(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
             verdict = "valid" if part < 1 else "NOT valid"
             text = f"K_2 / (T_0 C); kappa_2 (phi_i - phi_eq)^2 = {part:.6g} must be below 1: {verdict}"
             yield Group("kappa_2", kappa_2, "1", text)
+
+
+def _activation(scene: Scene, values: Mapping[str, float]) -> Iterator[Group]:
+    """Activation energies against the temperature at the start."""
     temperatures = [values[name] for name in ("initial.T_c", "initial.T", "initial.T_1") if name in values]
     for reaction in scene.interface.reactions:
         energy = number(getattr(reaction, "E_a", 0.0))
@@ -143,23 +150,30 @@ def capacity_with_interface(scene: Scene) -> float:
     return sum(number(getattr(law, name, 0.0)) for law, name in stores)
 
 
-def _of_start(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
-    """Affinity at the start, and heat paths and dissipation over the whole run against what the bodies hold."""
-    interface, stored = scene.interface, np.diag(start.M)
+def _affinity(system: System, scene: Scene, start: Start) -> Iterator[Group]:
     states = dict(zip(system.state_columns, start.y.tolist(), strict=True))
-    node = interface.temperature if isinstance(interface.temperature, str) else "T_c"
+    node = scene.interface.temperature if isinstance(scene.interface.temperature, str) else "T_c"
     T = states.get(node, start.outputs.get(node))
     if T is not None and start.outputs.get("mu"):
         yield Group("mu / (k_B T_c)", start.outputs["mu"] / (BOLTZMANN * T), "1", "affinity per bond at the start")
-    capacities = {s.name: c for s, c in zip(system.states, stored, strict=True) if s.is_temperature}
+
+
+def _heat_paths(system: System, scene: Scene, start: Start, end: float) -> Iterator[Group]:
+    """Heat paths against capacities, over the whole run."""
+    capacities = {s.name: c for s, c in zip(system.states, np.diag(start.M), strict=True) if s.is_temperature}
     for profile in system.profiles:
         capacities[profile.surface] = sum(capacities.get(name, 0.0) for name in (profile.surface, *profile.states))
-    nodes = {body.name: body.temperature for body in scene.bodies} | {"interface": interface.temperature}
+    nodes = {body.name: body.temperature for body in scene.bodies} | {"interface": scene.interface.temperature}
     for law in scene.heat:
         ends = [capacities.get(str(nodes.get(name)), 0.0) for name in law.between]
         if hasattr(law, "h") and any(c > 0 for c in ends):
             text = f"heat exchange {law.between[0]} - {law.between[1]} over the run against the smaller capacity"
             yield Group("h t / C", number(law.h) * end / min(c for c in ends if c > 0), "1", text)
+
+
+def _dissipation(system: System, start: Start, end: float) -> Iterator[Group]:
+    """Dissipation over the whole run against heat content."""
+    stored = np.diag(start.M)
     heat = sum(value for name, value in start.outputs.items() if name.startswith("D_"))
     content = float(stored @ np.where((stored > 0) & (start.y > 1), start.y, 0.0))
     if heat and content > 0 and any(state.is_temperature for state in system.states):
@@ -180,21 +194,31 @@ def _time_scales(start: Start, end: float) -> Iterator[Group]:
 
 def warnings(system: System) -> list[str]:
     """What is given but has no effect, beside what the assembly found."""
-    formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
-    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.conductors]]
-    formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
-    # Shares of the heat of jumps: what slides or snaps makes all of its heat in the interface, none in supports.
-    jumps = [item for item in system.edges if (item.equilibrates or item.reset) and not item.measure]
-    supported = any(item.heat == "joint" for item in jumps)
-    makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
-    formulas += [sink.share for sinks in makers for sink in sinks]
-    read = {symbol for row in [*system.residual(), *map(system.expand, formulas)] for symbol in row.free_symbols}
+    rows = [*system.residual(), *map(system.expand, _evaluated(system))]
+    read = {symbol for row in rows for symbol in row.free_symbols}
     idle = [
         f"{p.path} = {p.at(0.0):g} has no effect on the equations."
         for p in system.parameters
         if p.symbol not in read and not p.internal and not p.path.startswith("initial.")
     ]
     return [*system.warnings, *conductance_warnings(system), *idle]
+
+
+def _evaluated(system: System) -> list[Expression]:
+    """What a run evaluates beside the equations."""
+    formulas = [*[a.rate for a in system.ledger], *[m.masked for m in system.margins]]
+    formulas += [*[i.expression for i in system.outputs], *[c.resistance for c in system.conductors]]
+    formulas += [x for item in system.edges for x in (item.masked, *item.modes.values(), *item.reset.values())]
+    return [*formulas, *_heat_shares(system)]
+
+
+def _heat_shares(system: System) -> list[Expression]:
+    """Shares of the heat of jumps."""
+    # What slides or snaps makes all of its heat in the interface, none in supports.
+    jumps = [item for item in system.edges if (item.equilibrates or item.reset) and not item.measure]
+    supported = any(item.heat == "joint" for item in jumps)
+    makers = [sinks for maker, sinks in system.sinks.items() if jumps and (supported or maker == INTERFACE)]
+    return [sink.share for sinks in makers for sink in sinks]
 
 
 def start_warnings(model: Model, problem: Problem, start: Start | None, end: float) -> list[str]:
