@@ -110,33 +110,24 @@ class Program:
         return self.filler(inputs) if self.filler else inputs
 
     @cached_property
-    def addresses(self) -> NDArray[np.int64]:
-        """Code and user data of residual, jacobian, ledger and margins; zero where absent."""
+    def tables(self) -> tuple[NDArray[Any], ...]:
+        """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
+        of chains); a row (code, user data, function, place in its result) for residual, jacobian, ledger and
+        margins, zero where absent, and then for their further pieces; which states are algebraic; a row (first, end,
+        anchor) for each chain; the group of each quadrature, -1 where it is in none.
+        """
+        core = self.chains[0].first if self.chains else self.n
+        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
         functions = (self.residual, self.jacobian, self.ledger, self.margins)
-        rows = [(f.address, f.user, which, 0) if f else (0, 0, which, 0) for which, f in enumerate(functions)]
+        code = [(f.address, f.user, which, 0) if f else (0, 0, which, 0) for which, f in enumerate(functions)]
         for which, f in enumerate(functions):
             place = f.n_out if f else 0
             for part in f.rest if f else ():
-                rows.append((part.address, part.user, which, place))
+                code.append((part.address, part.user, which, place))
                 place += part.n_out
-        return np.array(rows, dtype=np.int64)
-
-    @cached_property
-    def sizes(self) -> NDArray[np.int64]:
-        """Numbers of states, accounts, margins, inputs; of states of the core, of chains, and of states in them."""
-        core = self.chains[0].first if self.chains else self.n
-        sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
-        return np.array(sizes, dtype=np.int64)
-
-    @cached_property
-    def chain_table(self) -> NDArray[np.int64]:
-        """A row (first, end, anchor) for each chain; anchor -1 where it hangs on nothing."""
-        return np.array([(c.first, c.end, c.anchor) for c in self.chains], dtype=np.int64).reshape(-1, 3)
-
-    @cached_property
-    def ledger_groups(self) -> NDArray[np.int64]:
-        """Group of each quadrature, -1 where it is in none."""
-        return np.array(self.groups or (-1,) * self.n_ledger, dtype=np.int64)
+        chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
+        groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
+        return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, groups
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """dG/dy and dG/dydot as matrices [..., equation, variable]."""

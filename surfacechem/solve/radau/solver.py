@@ -50,18 +50,17 @@ def _contiguous(values: ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 
-def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: int) -> Any:
+def _batch(problem: Problem, runs: Sequence[Array], room: tuple[int, int] | None = None) -> Any:
     """Runs that share with a problem all but their y0, parameters, spacing, max_steps, peaks, segments and times,
-    which are given in this order with the run as first axis; with room for so many steps and events of each.
+    which are given in this order with the run as first axis; with room for so many steps and events of each, or as many
+    as are usual.
     """
     program, times = problem.program, runs[-1]
+    usual = STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
+    step_rows, event_rows = usual if room is None else room
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
-        program.sizes,
-        program.addresses,
-        program.algebraic_mask,
-        program.chain_table,
-        program.ledger_groups,
+        *program.tables,
         min(problem.rtol, LONGEST_STEP),
         _contiguous(problem.atol),
         _kinds(problem.margins, problem.in_play),
@@ -75,19 +74,13 @@ def _batch(problem: Problem, runs: Sequence[Array], step_rows: int, event_rows: 
     )
 
 
-def _shared(rows: Sequence[Array]) -> Array:
-    """A row for all problems where theirs are alike, else those of each."""
-    alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
-    return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
-
-
-def _run_one(problem: Problem, step_rows: int, event_rows: int) -> Any:
+def _run_one(problem: Problem, room: tuple[int, int] | None = None) -> Any:
     """A batch of one, run; the compiled loop looks at the stop flag before every step."""
     y0, parameters, segments, times = (
         _contiguous(values)[None] for values in (problem.y0, problem.parameters, problem.segments, problem.times)
     )
     columns = y0, parameters, np.array((problem.spacing,)), np.array((problem.max_steps,)), _peaks(problem)[None]
-    batch = _batch(problem, (*columns, segments, times), step_rows, event_rows)
+    batch = _batch(problem, (*columns, segments, times), room)
     if problem.max_seconds is None:
         stepper.run(batch, 0, 1)
         return batch
@@ -116,7 +109,7 @@ class Radau(Solver):
         stepper.compile_stepper()
 
     def solve(self, problem: Problem) -> Result:
-        return _whole(problem, _run_one(problem, *_usual_rows(problem)), 0)
+        return _whole(problem, _run_one(problem), 0)
 
     def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
         """Results of problems of one model and one tolerance, each the same as that of :meth:`solve`, whatever the
@@ -126,7 +119,9 @@ class Radau(Solver):
             return [self.solve(problems[0])]
         alike: dict[tuple[Any, ...], list[int]] = {}
         for i, problem in enumerate(problems):
-            alike.setdefault(_shape(problem), []).append(i)
+            # What problems of one batch have in common, beside the model and its margins.
+            shape = len(problem.segments), len(problem.times), problem.atol.tobytes(), problem.rtol
+            alike.setdefault((*shape, problem.in_play, problem.goes_on), []).append(i)
         most = min(CHUNK, -(-len(problems) // threads))
         chunks = [group[k : k + most] for group in alike.values() for k in range(0, len(group), most)]
         with ThreadPoolExecutor(threads) as pool:
@@ -140,20 +135,19 @@ class Radau(Solver):
         return [found[i] for i in range(len(problems))]
 
 
-def _shape(problem: Problem) -> tuple[Any, ...]:
-    """What problems of one batch have in common, beside the model and its margins."""
-    common = problem.in_play, problem.goes_on, problem.rtol, problem.atol.tobytes()
-    return len(problem.segments), len(problem.times), *common
-
-
 def _solved(problems: Sequence[Problem]) -> list[Result]:
-    """Results of problems of one model and of one shape."""
+    """Results of problems of one model, and of one shape."""
+
+    def shared(rows: Sequence[Array]) -> Array:
+        """A row for all problems where theirs are alike, else those of each."""
+        alike = all(np.array_equal(values, rows[0]) for values in rows[1:])
+        return _contiguous(rows[0])[None] if alike else np.array(rows, dtype=float)
+
     own = [(each.y0, each.parameters, each.spacing, _peaks(each)) for each in problems]
     y0, parameters, spacing, peaks = (np.array(values, float) for values in zip(*own, strict=True))
     max_steps = np.array([each.max_steps for each in problems])
-    segments, times = (_shared([getattr(problem, name) for problem in problems]) for name in ("segments", "times"))
-    columns = y0, parameters, spacing, max_steps, peaks, segments, times
-    batch = _batch(problems[0], columns, *_usual_rows(problems[0]))
+    segments, times = shared([each.segments for each in problems]), shared([each.times for each in problems])
+    batch = _batch(problems[0], (y0, parameters, spacing, max_steps, peaks, segments, times))
     stepper.run(batch, 0, len(problems))
     return [_whole(problem, batch, i) for i, problem in enumerate(problems)]
 
@@ -166,12 +160,7 @@ def _whole(problem: Problem, batch: Any, i: int) -> Result:
         needed, records = int(batch.counts[i, EVENTS]), int(batch.counts[i, RECORDS]) if problem.record_steps else 0
         if needed <= batch.events.shape[1] and records <= batch.records.shape[1]:
             return _result(problem, batch, i)
-        batch, i = _run_one(problem, records, needed), 0
-
-
-def _usual_rows(problem: Problem) -> tuple[int, int]:
-    """Steps and events for which there is room at first."""
-    return STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
+        batch, i = _run_one(problem, (records, needed)), 0
 
 
 def _result(problem: Problem, batch: Any, i: int) -> Result:
@@ -194,14 +183,14 @@ def _result(problem: Problem, batch: Any, i: int) -> Result:
         times=problem.times if outputs == len(problem.times) else problem.times[:outputs],
         outputs=values[:, :n],
         ledger_outputs=values[:, n:],
-        events=_events(events, n) if counts[EVENTS] else _no_events(n, program.n_ledger),
+        events=(
+            Events(*_points(events[:, 1:], n), index=events[:, 0].astype(np.int64))
+            if counts[EVENTS]
+            else _no_events(n, program.n_ledger)
+        ),
         counters=Counters(*counts[RECORDS + 1 : STOP]),
         steps=Points(*_points(steps, n)) if problem.record_steps else None,
     )
-
-
-def _events(found: Array, n: int) -> Events:
-    return Events(*_points(found[:, 1:], n), index=found[:, 0].astype(np.int64))
 
 
 @cache
@@ -248,7 +237,7 @@ def solve_many(
     fixed = table[0] if len(table) else np.zeros((len(breaks) - 1, program.n_parameters))
     shared = Problem(program, first, outputs, breaks, fixed, rtol, weights, kinds, max_steps)
     limits = np.array((np.inf,)), np.array((max_steps,)), _peaks(shared)[None]
-    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), 0, 0)
+    batch = _batch(shared, (states, table, *limits, breaks[None], outputs[None]), (0, 0))
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda i: stepper.run(batch, i, min(i + CHUNK, len(states))), range(0, len(states), CHUNK)))
     return BatchResult(
@@ -277,7 +266,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     """
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
-        program.sizes, program.addresses, program.algebraic_mask, program.chain_table, program.ledger_groups,
+        *program.tables,
         1.0, np.ones(program.n), _kinds(()), 0,
         ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
