@@ -200,13 +200,10 @@ def quotient(unit: str, per: str) -> str:
         for side, factors in zip((sign, -sign), text.split("/"), strict=False):
             for base, _, power in (factor.partition("^") for factor in factors.strip("()").split() if factor != "1"):
                 powers[base] = powers.get(base, 0) + side * int(power or 1)
-    top, bottom = ([_power(b, abs(p)) for b, p in powers.items() if p * sign > 0] for sign in (1, -1))
+    written = {base: base if abs(power) == 1 else f"{base}^{abs(power)}" for base, power in powers.items()}
+    top, bottom = ([written[base] for base, power in powers.items() if power * sign > 0] for sign in (1, -1))
     below = f"({' '.join(bottom)})" if len(bottom) > 1 else "".join(bottom)
     return "/".join([" ".join(top) or "1", *([below] if below else [])])
-
-
-def _power(base: str, power: int) -> str:
-    return base if power == 1 else f"{base}^{power}"
 
 
 def needed(unit: str) -> str:

@@ -270,15 +270,16 @@ class Check:
     def _reaction(self, entry: Any) -> None:
         """A reaction that is lowered."""
         title, error = f"reaction {entry.get('equation')}", self.source.error
-        self._keys(entry, {*REACTION}.union(*map(_own, kinds().values())), title)
+        own = {kind: {*law.keys, *law.own_keys()} for kind, law in kinds().items()}
+        self._keys(entry, {*REACTION}.union(*own.values()), title)
         self._units(entry)
         if "equation" not in entry:
             raise error("a reaction has no `equation`.", entry)
         # First whether any type has the keys, then whether this one has: the guess is among all.
         law = self._rate_type(entry, title)
         for key in entry:
-            if key not in {*REACTION, *_own(law)}:
-                having = ", ".join(sorted(kind for kind, other in kinds().items() if key in _own(other)))
+            if key not in {*REACTION, *own[law.kind]}:
+                having = ", ".join(sorted(kind for kind, known in own.items() if key in known))
                 raise error(f"{title}: '{key}' is no key of {law.kind}; it belongs to {having}.", entry, key)
         known = self._equation(entry, self.names, title)
         for key, inner in law.keys.items():
@@ -418,8 +419,3 @@ class Check:
                 )
             if problem:
                 raise self.source.error(f"{title}: {key}: {problem}", node, key)
-
-
-def _own(law: type[InterfaceArrhenius]) -> set[str]:
-    """Keys that a reaction has because of its rate type."""
-    return {*law.keys, *law.own_keys()}

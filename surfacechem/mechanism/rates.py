@@ -201,16 +201,12 @@ class InterfaceArrhenius(MechanismReaction):
 
     def _formula(self, evaluate: Callable[[Mapping[str, Expression]], Expression]) -> Formula:
         # The affinity reads the gap that stretches what changes, and the coverages around it.
-        changing = self._changing() if self.reversible else []
+        changing = [item for item in self.species if self.reversible and self.change.get(item.variable)]
         # A formula reads no more than it needs: what nobody reads is not in the equations.
         gap = ("g_n",) if any(item.spring for item in changing) else ()
         own = (name for item in self.species for name in (item.variable, item.concentration))
         around = (x.variable for item in changing for x in item.interactions)
         return Formula(("T_c", *gap, *own, *around, *self.own_reads()), evaluate)
-
-    def _changing(self) -> list[Species]:
-        """The species that the reaction makes or uses up."""
-        return [item for item in self.species if self.change.get(item.variable)]
 
     def _forward(self, values: Mapping[str, Expression]) -> Expression:
         return self.coefficient(values, 0) * self._amounts(values, self.orders, -1)
@@ -242,13 +238,16 @@ class InterfaceArrhenius(MechanismReaction):
         Interactions count where ``coverages`` are given.
         """
         total: Expression = 0
-        for item in self._changing():
+        for item in self.species:
+            nu = self.change.get(item.variable)
+            if not nu:
+                continue
             value = item.gibbs(T)
             if item.spring is not None:
                 value += item.spring.energy(g_n) / BOLTZMANN
             for interaction in item.interactions if coverages else ():
                 value += interaction.gibbs(T, coverages[interaction.variable]) / GAS_CONSTANT
-            total += plain(self.change[item.variable]) * value
+            total += plain(nu) * value
         return total / T
 
     def _amounts(self, values: Mapping[str, Expression], orders: Mapping[str, float], way: int) -> Expression:
