@@ -331,7 +331,10 @@ class Build:
             self.margins.append(replace(margin, remedy=STARTS.get(name, "") if sought else "", domain=True))
         for name in (bound for bound in law.nonnegative if bound not in met):
             value, least = self._read(law, name, own), law.least.get(name, 0)
-            slack = NOTHING + self._rounding(value) + DIGITS * absolute(least)
+            # The last digits of the terms of a sum change it by so much.
+            whole = self.expanded(value)
+            rounding = sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
+            slack = NOTHING + DIGITS * rounding + DIGITS * absolute(least)
             reason = f"{name} fell below {least if least != 0 else 'zero'}, {ends}"
             self.margins.append(Margin(f"{name} >= {least}", value - least + slack, reason))
         self._narrow_places(law, own, met)
@@ -402,11 +405,6 @@ class Build:
             spec = Spec("1", f"fraction of heat into {end}", at_least=0, at_most=1)
             self.variables.define(path, lambda: self.constant(name, path, spec, value), "constant", path)
         return self.variables.get(path, "the interface", "interface")
-
-    def _rounding(self, value: Expression) -> Expression:
-        """By how much the last digits of its terms change a sum."""
-        whole = self.expanded(value)
-        return DIGITS * sum((absolute(term) for term in whole.args), symengine.Integer(0)) if whole.is_Add else 0
 
     def is_named(self, name: str) -> bool:
         """Whether a named quantity has this name."""

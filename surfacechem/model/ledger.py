@@ -195,7 +195,8 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
     Two bodies that share a prescribed temperature leave open which of them the heat goes into.
     """
     node = build.thermal.node_of[body.name]
-    sharing = build.thermal.sharing(body.name)
+    members = build.thermal.members.items()
+    sharing = [other for other, name in members if name == node.name and other != body.name]
     near = {INTERFACE, *(other.name for other in build.scene.bodies)}
     channels: dict[str, Expression] = {}
     elsewhere = symengine.Integer(0)

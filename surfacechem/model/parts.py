@@ -75,10 +75,6 @@ class Thermal:
             {node.name: node for slab in self.slabs.values() for node in slab.behind} | dict(self.nodes) | self.node_of
         )
 
-    def sharing(self, member: str) -> list[str]:
-        """The other members that have the same temperature."""
-        return [other for other, name in self.members.items() if name == self.members[member] and other != member]
-
     def owners(self, node: Node) -> str:
         """The members that have a node, in words."""
         return " and ".join(member for member, name in self.members.items() if name == node.name)
