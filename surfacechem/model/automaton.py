@@ -126,6 +126,11 @@ class Edge:
     """Modes in which it is in play."""
 
     @property
+    def is_impact(self) -> bool:
+        """Whether it takes no time in which pressures are infinite, so that it can follow itself ever faster."""
+        return self.returns is not None
+
+    @property
     def masked(self) -> Expression:
         """The guard while it is in play, else 1, as one expression to be read or printed."""
         return masked(self.guard, self.when)

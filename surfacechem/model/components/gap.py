@@ -13,7 +13,7 @@ from surfacechem.expressions import Expression, derivative
 from surfacechem.model.automaton import Constraint, Equilibrium
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
-from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, read_by_potentials
+from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, law_reads
 from surfacechem.model.constraints.threshold import bonds_left
 from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact, impacts
 from surfacechem.model.system import Margin, State
@@ -31,7 +31,7 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
     mount = held(build, "n")
     if mount is None:
         return
-    meets = not read_by_potentials(build, "g_n")
+    meets = not any(law_reads(law, "g_n") for law in build.interface.potentials)
     if meets and mount.quasi_static:
         # An interface that no potential lets open: closed it carries any traction, open it carries none.
         if not mount.law.k:

@@ -113,11 +113,6 @@ def driven(build: Build, name: str) -> bool:
     return name in build.scene.loading or any(name in stage.rates for stage in build.scene.programme)
 
 
-def read_by_potentials(build: Build, name: str) -> bool:
-    """Whether the free energy of the interface depends on a variable."""
-    return any(law_reads(law, name) for law in build.interface.potentials)
-
-
 def law_reads(law: Law, name: str) -> bool:
     """Whether a law depends on a variable, by itself or by a factor."""
     values = (getattr(law, parameter) for parameter, _ in law.specs())

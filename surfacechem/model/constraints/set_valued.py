@@ -18,7 +18,7 @@ in Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import symengine
 
@@ -109,14 +109,12 @@ def breaks_bonds(build: Build) -> dict[Expression, Expression]:
     return {} if law is None else broken(build, law)
 
 
-def friction_impulse(
-    build: Build, impulse: Expression
-) -> tuple[list[Register], dict[Expression, Expression], list[Edge]]:
-    """What the ``impulse`` of the pressure [Pa s] takes from sliding that has a mass: register, its value, the edge."""
+def friction_impulse(build: Build, impulse: Expression) -> Iterator[Constraint]:
+    """The law for impulses: what the ``impulse`` of the pressure [Pa s] in an impact takes from sliding with a mass."""
     laws = [law for law in build.interface.frictions if law_reads(law, "p")]
     sliding = [slip for slip in build.motion.slips if slip.slides_inertially]
     if not (laws and sliding):
-        return [], {}, []
+        return
     v, exerted = symengine.Symbol("speed" if len(sliding) == 2 else "v"), EXERTED.symbol
     ratio = build.energy.rubs * symengine.Add(*(_impulse_ratio(build, law, v) for law in laws))
     loss = ratio * exerted / far_field(build, sliding[0].mount).m
@@ -124,7 +122,9 @@ def friction_impulse(
     left = {v: where(loss < absolute(v), v - loss * sign(v), NONE)}
     due, reason = where(exerted > 0, -1, 1), "friction answers the impact"
     rub = Edge("rub", due, reason, {exerted: NONE, **stops}, left, heat="local")
-    return [EXERTED], {exerted: where(absolute(v) > 0, impulse, NONE)}, [rub]
+    pressed = {exerted: where(absolute(v) > 0, impulse, NONE)}
+    # Before the bodies rest: friction answers each impact on its own.
+    yield Constraint((), (EXERTED,), (rub,), at_once=True, beside=lambda edge: pressed if edge.is_impact else {})
 
 
 def _impulse_ratio(build: Build, law: Friction, v: Expression) -> Expression:

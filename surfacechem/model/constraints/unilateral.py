@@ -110,21 +110,20 @@ def impacts(build: Build) -> Iterator[Constraint]:
     far = far_field(build, mount)
     speed, pressing = absolute(V), -far.force(NONE, NONE) / far.m
     rests, remembered = _rests(build, far, speed, pressing)
-    impulse, answers, rubs = friction_impulse(build, (1 + far.e) * far.m * speed)
+    yield from friction_impulse(build, (1 + far.e) * far.m * speed)
     hits = Edge(
         "impact",
         G,
         "the bodies hit each other",
-        {LANDED.symbol: rests, **remembered, **answers},
+        {LANDED.symbol: rests, **remembered},
         {**shut, V: where(rests > 0, NONE, far.e * speed)},
         returns=where(pressing > 0, 2 * V / pressing, NONE),
         when=apart,
     )
     calm, reason = {LANDED.symbol: NONE, **build.heals}, "the bodies rest on each other"
     rest = Edge("rest", -ONE, reason, calm, equilibrates=True, when={LANDED.symbol: (1,)})
-    registers = (LANDED, *([FASTEST] if remembered else []), *impulse)
     # What follows at the same moment comes before what would slide as long as the contact is open.
-    yield Constraint(registers=registers, edges=(hits, *rubs, rest), at_once=True)
+    yield Constraint((), (LANDED, FASTEST) if remembered else (LANDED,), (hits, rest), at_once=True)
 
 
 def _rests(

@@ -55,8 +55,8 @@ class Formulation:
     """Whether some friction has a limit below which nothing slides."""
     rate_dependent: bool
     """Whether what resists sliding depends on its velocity."""
-    in_equilibrium: bool
-    """Whether a gap of it moves at once where the tractions change."""
+    dead_load: bool
+    """Whether a given traction alone moves it: what sticks stays where it is, and nothing holds what slides."""
     slides: bool
     """Whether anything says how the interface slides; an elastic one follows the displacement otherwise."""
 
@@ -70,6 +70,14 @@ class Formulation:
         return self.inertial and not self.elastic
 
     @property
+    def in_equilibrium(self) -> bool:
+        """Whether a gap of it moves at once where the tractions change."""
+        quasi_static = self.mount is not None and self.mount.quasi_static
+        if self.elastic:
+            return quasi_static or not self.rate_dependent
+        return quasi_static and not self.rate_dependent and not self.dead_load
+
+    @property
     def own_velocity(self) -> str:
         """The velocity of the displacement, which is that of sliding unless the interface is elastic."""
         return "v_t" if self.elastic else self.d.velocity
@@ -81,7 +89,19 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     elastic = bool(in_series(build)) and not driven(build, "g_t")
     across = held_across(build, mount) if mount is not None else None
     if mount is not None and across is not None:
-        _refuse_half(build, elastic)
+        if elastic:
+            raise InputError(
+                "the interface moves in two directions, but the elastic gap g_t of its potential has one. Leave out "
+                "what moves it across (`transverse`, w_t2, F_t2, v_2 or a law with two directions), or the potential "
+                "of g_t.",
+                PLACE,
+            )
+        if given := {"v", "v_2"} & build.scene.loading.keys():
+            raise InputError(
+                f"{min(given)} is prescribed, but a mounting moves the interface along it. Prescribe `v` and `v_2` "
+                "under `loading`, or let the mounting give both.",
+                PLACE,
+            )
         return _formulation(build, ALONG, mount, elastic), _formulation(build, ACROSS, across, elastic)
     if build.scene.transverse is not None:
         message = "a mounting across stands beside one along: give `tangential`, too."
@@ -91,37 +111,15 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
     return (_formulation(build, ALONG, mount, elastic),)
 
 
-def _refuse_half(build: Build, elastic: bool) -> None:
-    """Motion in two directions where something holds in one only."""
-    if elastic:
-        raise InputError(
-            "the interface moves in two directions, but the elastic gap g_t of its potential has one. Leave out what "
-            "moves it across (`transverse`, w_t2, F_t2, v_2 or a law with two directions), or the potential of g_t.",
-            PLACE,
-        )
-    for name in ("v", "v_2"):
-        if name in build.scene.loading:
-            raise InputError(
-                f"{name} is prescribed, but a mounting moves the interface along it. Prescribe `v` and `v_2` under "
-                "`loading`, or let the mounting give both.",
-                PLACE,
-            )
-
-
 def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) -> Formulation:
     laws = build.interface.frictions
     formulas = [law.transverse if d is ACROSS and law.transverse is not None else law.statement for law in laws]
     rate_dependent = any({"v", "v_2"} & {*reads(formula)} for formula in formulas)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
-    at_once = mount is None or mount.quasi_static
-    if elastic:
-        in_equilibrium = not rate_dependent or (mount is not None and at_once)
-    else:
-        # A dead load alone is no balance: what sticks does not move under it, and nothing holds what slides.
-        held_back = mount is None or mount.law.k > 0 or bool(in_parallel(build))
-        in_equilibrium = at_once and held_back and not rate_dependent
-    return Formulation(d, mount, elastic, sticks, rate_dependent, in_equilibrium, bool(laws) or not elastic)
+    alone = not elastic and not rate_dependent and mount is not None and mount.quasi_static
+    dead_load = alone and not (mount.law.k or in_parallel(build))  # type: ignore[union-attr]
+    return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
 
 
 def _sheared(build: Build) -> list[Potential]:

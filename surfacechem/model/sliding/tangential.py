@@ -191,7 +191,7 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint | Eq
     if kind.elastic:
         in_proportion = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
     name_traction(build, d, slides, t_a + carried, t_a + held)
-    if not kind.sticks or "sticks" in (margin.name for margin in build.margins):
+    if not kind.sticks or kind.dead_load:
         return
     stops, still, slack = [], v, NONE
     if kind.slides_inertially:
@@ -235,8 +235,7 @@ def _balance(
         v = symengine.Symbol(kind.d.velocity)
         build.rows.kinematics(name, v)
         return (yield from _sliding_row(build, kind, slides, far.force(u, v) - t_a - carried - far.c_g * v))
-    elif far.k == 0 and not depends(t_a, u):
-        # Under a dead load alone an interface that sticks does not move, and nothing holds one that slides.
+    elif kind.dead_load:
         build.rows.kinematics(name, NONE)
         limit = build.motion.stick_limits.get("t")
         if limit is None:
