@@ -34,32 +34,22 @@ velocity, and the row stays regular.
 """
 
 
-def law_of_traction(build: Build, *, inertial: bool) -> Friction | None:
-    """The law whose traction stands for the velocity, if there is one.
-
-    Without inertia the balance may need the velocity itself, where parameters vary with it.
-    """
-
-    def varies_with_velocity(law: Friction) -> bool:
-        factors = (factor for value in _varying(law).values() for factor in value.factors)
-        return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
-
-    laws = [law for law in build.interface.frictions if law.velocity is not None]
-    return next((law for law in laws if inertial or not varies_with_velocity(law)), None)
-
-
-def _varying(law: Friction) -> dict[str, Varying]:
-    values = {name: getattr(law, name) for name, _ in law.specs()}
-    return {name: value for name, value in values.items() if isinstance(value, Varying)}
-
-
-def evolve_drive(build: Build, law: Friction, *, inertial: bool) -> Expression:
-    """The state that stands for the velocity; what reads the velocity itself gets it from there.
+def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
+    """The state that stands for the velocity, where the traction of a law can; what reads the velocity gets it there.
 
     A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
+    Without one the balance may need the velocity itself, where they vary with it.
     """
+    laws = [law for law in build.interface.frictions if law.velocity is not None]
+    if not inertial:
+        factors = {law: [factor for value in _varying(law).values() for factor in value.factors] for law in laws}
+        laws = [law for law in laws if not any("v" in (x.of, *reads(x.factor)) for x in factors[law])]
+    if not laws:
+        return None
+    law = laws[0]
     bound = build.bound(law)
-    if inertial and (varying := _varying(law)):
+    varying = _varying(law)
+    if inertial and varying:
         symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
         bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
     if not (inertial and varying):
@@ -86,6 +76,11 @@ def evolve_drive(build: Build, law: Friction, *, inertial: bool) -> Expression:
     symbol = evolve(build, DRIVE, by, algebraic=not inertial, scale=scale, given=given)
     build.variables.define("v", velocity, "derived", f"{law.path}, from its traction")
     return symbol
+
+
+def _varying(law: Friction) -> dict[str, Varying]:
+    values = {name: getattr(law, name) for name, _ in law.specs()}
+    return {name: value for name, value in values.items() if isinstance(value, Varying)}
 
 
 def stands_for_velocity(build: Build) -> bool:

@@ -43,7 +43,6 @@ from surfacechem.quantities import VARIABLES
 from surfacechem.tolerances import STILL
 
 WORDS = {-1.0: "slides backward", 0.0: "sticks", 1.0: "slides forward"}
-SINGLE_BALANCE = "balance of the tangential tractions"
 
 
 def variables(build: Build) -> Iterator[Constraint]:
@@ -117,11 +116,9 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
             build.variables.get("u_t", "the elastic gap")
             rates["u_t"] = build.rate_of("u_t")
     if kind.rate_dependent and not kind.slides_inertially:
-        law = rate_and_state.law_of_traction(build, inertial=False) if alone else None
-        if law is not None:
-            build.motion.slides_by[v] = rate_and_state.evolve_drive(build, law, inertial=False)
-        else:
-            build.motion.slides_by[v] = evolve(build, v, SINGLE_BALANCE, algebraic=True)
+        drive = rate_and_state.evolve_drive(build, inertial=False) if alone else None
+        by = "balance of the tangential tractions"
+        build.motion.slides_by[v] = evolve(build, v, by, algebraic=True) if drive is None else drive
         if not kind.elastic:
             rates[u] = symengine.Symbol(v)
     elif not kind.slides_inertially:
@@ -146,11 +143,9 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
     rates[name] = symengine.Symbol(f"d{name}_dt")
     if kind.inertial:
         rates[name] = symengine.Symbol(v)
-        law = rate_and_state.law_of_traction(build, inertial=True) if v == "v" and alone else None
-        if law is None:
+        drive = rate_and_state.evolve_drive(build, inertial=True) if v == "v" and alone else None
+        if drive is None:
             evolve(build, v, place)
-        else:
-            rate_and_state.evolve_drive(build, law, inertial=True)
     elif kind.elastic and mount.damped:
 
         def yielding() -> Expression:
