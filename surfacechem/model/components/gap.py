@@ -59,13 +59,16 @@ def variables(build: Build) -> Iterator[Constraint | Margin | State]:
             first = build.constant("g_n_i", "initial.g_n", spec, initial, internal=False)
             yield Margin("g_n >= 0", first + TOUCHING, OVERLAP, remedy=SOFT, path="initial.g_n")
             _carry(build, closed.reaction)
-    # Only a mass that meets a rigid contact rebounds by a coefficient.
     if mount.law.e and not (mount.inertial and build.mode("closed") is not None):
-        why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
-        if mount.inertial and not meets:
-            why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
-        message = f"the coefficient of restitution e would change nothing: {why}. Leave it out."
-        raise InputError(message, mount.law.place)
+        _refuse_restitution(mount, meets)
+
+
+def _refuse_restitution(mount: Held, meets: bool) -> None:
+    """Only a mass that meets a rigid contact rebounds by a coefficient."""
+    why = "a law of the scene ends as the gap closes" if mount.inertial else "nothing with a mass hits anything"
+    if mount.inertial and not meets:
+        why = "the potential of the gap bears the bodies, and its stiffness and the dampers say how they rebound"
+    raise InputError(f"the coefficient of restitution e would change nothing: {why}. Leave it out.", mount.law.place)
 
 
 def _moving(build: Build, mount: Held) -> Iterator[State]:

@@ -68,14 +68,15 @@ def variables(build: Build) -> Iterator[Bond]:
         # What it amounts to where it is one: N_x per reference area, n_x per current area.
         build.variables.define(f"N_{name}", symengine.sympify(amount), "constant", by)
         build.variables.define(f"n_{name}", partial(_per_current_area, build, amount), "derived", by)
-
-    def phi() -> Expression:
-        N_c = build.variables.get("N_c", "the bonding state", "interface")
-        bonds = (build.bonding[name] for name in build.interface.bonds)
-        return sum(bond.symbol * bond.density for bond in bonds) / N_c
-
     if build.interface.bonds:
-        build.variables.define("phi", phi, "derived", "coverages of bonds")
+        build.variables.define("phi", partial(_bonded_part, build), "derived", "coverages of bonds")
+
+
+def _bonded_part(build: Build) -> Expression:
+    """All bonds over the bonding sites."""
+    N_c = build.variables.get("N_c", "the bonding state", "interface")
+    bonds = (build.bonding[name] for name in build.interface.bonds)
+    return sum(bond.symbol * bond.density for bond in bonds) / N_c
 
 
 def _prescribed(build: Build, name: str, load: Load) -> Expression:
@@ -169,25 +170,30 @@ def energies(build: Build) -> Iterator[Constraint | Energy | Margin | Thermal]:
         )
     _tractions(build, psi)
     if depends(psi, GAP):
-        # A potential that may pull bodies that touch says what part of it the contact bears.
-        borne = [
-            stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion)
-            for law, b in bounds.items()
-        ]
-        sides = {} if build.mode("side") is None else BY_SIDE
-
-        def contact() -> Expression:
-            """Sum of what each potential presses, per current area."""
-            pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
-            return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
-
-        build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
+        _contact_pressure(build, stored, bounds)
         _warn_of_net_pressure(build)
     elif build.variables.has("p"):
         build.variables.define("p_contact", lambda: build.variables.get("p", "the contact"), "derived", "p")
     yield replace(energy, psi=psi)
     if build.interface.temperature is not None:
         yield build.thermal.with_energy(INTERFACE, psi)
+
+
+def _contact_pressure(
+    build: Build, stored: Mapping[Potential, Expression], bounds: Mapping[Potential, Potential]
+) -> None:
+    """A potential that may pull bodies that touch says what part of it the contact bears."""
+    borne = [
+        stored[law] if b.repulsion is None else _per_reference_area(build, b, b.repulsion) for law, b in bounds.items()
+    ]
+    sides = {} if build.mode("side") is None else BY_SIDE
+
+    def contact() -> Expression:
+        """Sum of what each potential presses, per current area."""
+        pressed = (positive(-derivative(symengine.sympify(F).xreplace(sides), GAP)) for F in borne)
+        return build.name(VARIABLES["p_contact"], symengine.Add(*pressed) / build.stretch)
+
+    build.variables.define("p_contact", contact, "derived", "the repulsive part of the potentials")
 
 
 def _energies(

@@ -75,29 +75,17 @@ def _during(i: int) -> Expression:
 def stages(build: Build) -> Iterator[Constraint]:
     """The edge at the end of each stage: after a time, at a value of a variable, or along an edge of the interface."""
     begun, edges = BEGUN.symbol, []
-    waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event]
+    waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
+    known = [edge.name for edge in build.edges]
     for _, item in waiting:
-        known = [edge.name for edge in build.edges]
         if not any(name.startswith(item.event) for name in known):
             message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
             raise InputError(message, item.place)
     for i, item in enumerate(build.scene.programme):
-        path = f"programme.{item.name}"
-        if item.duration is not None:
-            spec = Spec("s", f"length of the stage {item.name}", above=0)
-            guard = begun + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
-        elif item.variable and not item.event:
-            x, name, unit = _variable(build, item), item.variable, "Pa"
-            if name not in TRACTIONS:
-                unit = unit_of(name)
-            spec = Spec(unit, f"end of the stage {item.name}")
-            path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"
-            end = build.parameters.add(f"{name}_end" if name in TRACTIONS else name, path, spec, item.value)
-            guard = end - x if item.rising else x - end
-        else:
-            continue
-        modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
-        edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
+        if item.duration is not None or (item.variable and not item.event):
+            modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
+            guard = _left(build, item)
+            edges.append(Edge(f"end of {item.name}", guard, reason, modes, passes=True, when={STAGE: (i,)}))
 
     def advancing(edge: Edge) -> dict[Expression, Expression]:
         """What a stage waits for moves the programme on by itself."""
@@ -109,6 +97,19 @@ def stages(build: Build) -> Iterator[Constraint]:
         return modes
 
     yield Constraint(registers=(BEGUN,), edges=tuple(edges), beside=advancing)
+
+
+def _left(build: Build, item: Stage) -> Expression:
+    """What is left of a stage: of its time, or of the way of a variable to its value."""
+    path = f"programme.{item.name}"
+    if item.duration is not None:
+        spec = Spec("s", f"length of the stage {item.name}", above=0)
+        return BEGUN.symbol + build.parameters.add("length", f"{path}.for", spec, item.duration) - build.t
+    x, name, traction = _variable(build, item), item.variable, item.variable in TRACTIONS
+    spec = Spec("Pa" if traction else unit_of(name), f"end of the stage {item.name}")
+    path = f"{path}.until.{name}{'' if item.rising else '.falls-to'}"
+    end = build.parameters.add(f"{name}_end" if traction else name, path, spec, item.value)
+    return end - x if item.rising else x - end
 
 
 def _variable(build: Build, item: Stage) -> Expression:

@@ -38,11 +38,7 @@ BOUNDS = (
 
 def bound(build: Build, rate: Expression) -> Constraint:
     """The bounds of the bonding state, which ``rate`` would change."""
-    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
-    # What an envelope bounds ends there by itself, and some laws keep the bonding state in its range by their form.
-    laws = [law for law in build.interface.reactions if law.envelope is None]
-    kept = all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
-    if top is None or kept or LOGARITHM in build.scene.initial:
+    if not _may_leave_the_range(build):
         return Constraint()
     outward = {side: side * _rate_at(build, rate, at, inside, name) for side, at, inside, name, *_ in BOUNDS}
     bounds = [bound for bound in BOUNDS if outward[bound[0]] != 0]
@@ -66,6 +62,15 @@ def bound(build: Build, rate: Expression) -> Constraint:
         return {held: symengine.Integer(0)} if PHI in edge.reset and held not in edge.modes else {}
 
     return Constraint((mode,), edges=tuple(edges), active=1 - held**2, beside=breaking)
+
+
+def _may_leave_the_range(build: Build) -> bool:
+    """Whether any law but those of an envelope does not keep the bonding state in its range by its form."""
+    top = next((item.value for item in build.parameters.items if item.path == "phi_max"), None)
+    if top is None or LOGARITHM in build.scene.initial:
+        return False
+    laws = [law for law in build.interface.reactions if law.envelope is None]
+    return not all(law.keeps_range and (top == 1.0 or "n_2" in reads(law.statement)) for law in laws)
 
 
 def _rate_at(build: Build, rate: Expression, at: Expression, inside: Expression, name: str) -> Expression:

@@ -20,6 +20,7 @@ import symengine
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, absolute, depends, derivative, where
 from surfacechem.model.automaton import FOLD, Constraint, Edge, Equilibrium, Fold
+from surfacechem.model.balances import Node
 from surfacechem.model.build import Build
 
 Rise = Mapping[Any, Expression]
@@ -35,15 +36,8 @@ def jumps(build: Build) -> Iterator[Constraint]:
         return
     residuals = [build.expanded(gap.residual) for gap in gaps]
     rises = [_rises(build, gap, residuals) for gap in gaps]
-    A, relative = [], []
-    for i, (gap, residual) in enumerate(zip(gaps, residuals, strict=True)):
-        # Fall of the traction that drives this gap as each one opens; one where the gap is held.
-        row = [-_along(residual, other, rise) for other, rise in zip(gaps, rises, strict=True)]
-        if gap.active != 1:
-            row = [gap.active * x + (1 - gap.active) * int(i == j) for j, x in enumerate(row)]
-        size = gap.active * _size(build, gap, row[i]) + 1 - gap.active
-        A.append(row)
-        relative.append(tuple(x / size for x in row))
+    A = _tangent(gaps, residuals, rises)
+    relative = _relative(build, A)
     tangent, whole = determinant(relative), determinant(A)
     moved = {symengine.Symbol(x) for gap in gaps for x in (gap.state, *gap.along)}.union(*rises)
     if all(gap.state != "g_n" for gap in gaps) and not tangent.free_symbols & moved:
@@ -58,9 +52,26 @@ def jumps(build: Build) -> Iterator[Constraint]:
         "the quasi-static equilibrium of the gap was lost (mechanical fold)",
         equilibrates=True,
         heat="snap",
-        fold=Fold(tangent, falling, tuple(relative), warming),
+        fold=Fold(tangent, falling, relative, warming),
     )
     yield Constraint(edges=(snap,))
+
+
+def _tangent(gaps: Sequence[Equilibrium], residuals: Sequence[Expression], rises: Sequence[Rise]) -> Matrix:
+    """Fall of the traction that drives one gap as another one opens; one where the gap is held."""
+    A = []
+    for i, (gap, residual) in enumerate(zip(gaps, residuals, strict=True)):
+        row = [-_along(residual, other, rise) for other, rise in zip(gaps, rises, strict=True)]
+        if gap.active != 1:
+            row = [gap.active * x + (1 - gap.active) * int(i == j) for j, x in enumerate(row)]
+        A.append(row)
+    return A
+
+
+def _relative(build: Build, A: Matrix) -> tuple[tuple[Expression, ...], ...]:
+    """The stiffness of each gap in parts of what it is compared with, where it is not held."""
+    sizes = [gap.active * _size(build, gap, A[i][i]) + 1 - gap.active for i, gap in enumerate(build.equilibria)]
+    return tuple(tuple(entry / size for entry in row) for row, size in zip(A, sizes, strict=True))
 
 
 def _along(expression: Expression, gap: Equilibrium, rise: Rise) -> Expression:
@@ -76,14 +87,7 @@ def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> R
     It is what the energy balances say of motion that is faster than any flow of heat.
     """
     free = build.thermal.free
-    felt = [node for node in free if any(depends(residual, node.T) for residual in residuals)]
-    for node in felt:
-        if node.capacity() == 0:
-            raise InputError(
-                f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the "
-                "interface one, or mount the bodies with a damper or a mass.",
-                Place(path="interface.temperature"),
-            )
+    felt = _felt(build, residuals)
     motion = {symengine.Symbol(f"d{x}_dt"): w for x, w in ((gap.state, symengine.Integer(1)), *gap.along.items())}
     rest = {state.dot: symengine.Integer(0) for state in build.states}
     rows = {node.name: build.expanded(build.energy_row(node)) for node in free}
@@ -100,6 +104,19 @@ def _rises(build: Build, gap: Equilibrium, residuals: Sequence[Expression]) -> R
         if heat != 0:
             rises[node.T] = heat / node.capacity()
     return rises
+
+
+def _felt(build: Build, residuals: Sequence[Expression]) -> list[Node]:
+    """The nodes whose temperatures the balances of tractions depend on."""
+    felt = [node for node in build.thermal.free if any(depends(residual, node.T) for residual in residuals)]
+    for node in felt:
+        if node.capacity() == 0:
+            raise InputError(
+                f"the traction of a quasi-static gap varies with {node.name}, which has no capacity. Give the "
+                "interface one, or mount the bodies with a damper or a mass.",
+                Place(path="interface.temperature"),
+            )
+    return felt
 
 
 def _size(build: Build, gap: Equilibrium, own: Expression) -> Expression:

@@ -18,7 +18,7 @@ in Brogliato (2016), Nonsmooth Mechanics, doi 10.1007/978-3-319-28664-8.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import symengine
 
@@ -42,65 +42,33 @@ PRESSURES = 1e50, 1e100
 SOFTEN = "Let a potential bear the bodies, such as `penalty`."
 
 
-def along_a_line(
-    needed: Expression,
-    limit: Expression,
+def set_valued(
+    bears: Mapping[int, Expression],
     back: Mapping[int, Expression],
-    breaks: Mapping[Expression, Expression],
-    stops: Sequence[Expression],
-    *,
-    equilibrates: bool,
-) -> Constraint:
-    """Edges of one direction: ``needed`` is what sticking has to bear, ``back`` is zero where sliding either way stops.
-
-    Sliding ``breaks`` bonds as it begins. ``stops`` are the states that are zero where it ends, the velocity where it
-    has inertia. Gaps that are quasi-static find their equilibrium, and others follow the bonds that break and their
-    heat.
-    """
-    # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
-    bears = where(limit > 0, limit, 0)
-    begin = [
-        Edge(
-            f"slip {word}",
-            bears - s * needed,
-            f"sticking gives way and the interface slides {word}",
-            {SLIP: symengine.Integer(s)},
-            breaks,
-            equilibrates=equilibrates or bool(breaks),
-            heat="local",
-            strict=True,
-            when={SLIP: (0,)},
-        )
-        for s, word in ((1, "forward"), (-1, "backward"))
-    ]
-    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
-    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else NONE
-    reset = dict.fromkeys(stops, NONE)
-    end = [
-        Edge("stop", guard, "sliding comes to a stop", {SLIP: onward}, reset, strict=True, when={SLIP: (s,)})
-        for s, guard in back.items()
-    ]
-    return Constraint(edges=(*begin, *end))
-
-
-def in_the_plane(
-    beyond: Expression,
     aim: Mapping[Expression, Expression],
-    turn: Expression,
-    still: Expression,
-    breaks: Mapping[Expression, Expression],
-    stops: Sequence[Expression],
+    onward: Mapping[Expression, Expression],
+    begin: Mapping[Expression, Expression],
+    end: Mapping[Expression, Expression],
+    *,
+    equilibrates: bool = False,
 ) -> Constraint:
-    """Edges of two directions: ``beyond`` is what sticking bears beyond the pull, ``aim`` the direction of slip."""
-    modes, reason = {SLIP: ONE, **aim}, "sticking gives way and the interface slides"
-    reset = {**breaks, turn: NONE}
-    begins = Edge("slip", beyond, reason, modes, reset, heat="local", strict=True, when={SLIP: (0,)})
-    # What has inertia slides on where sticking does not bear what pulls.
-    onward = {SLIP: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
-    modes, reset = onward if stops else {SLIP: NONE}, {turn: NONE, **dict.fromkeys(stops, NONE)}
-    reason, when = "sliding comes to a stop", {SLIP: (1,)}
-    stop = Edge("stop", still, reason, modes, reset, heat="local", strict=True, when=when)
-    return Constraint(edges=(begins, stop))
+    """Edges between sticking and sliding, both ways along a line or in whatever direction of the plane.
+
+    By the mode of slip, ``bears`` is what sticking bears beyond what it has to, ``back`` what is zero where sliding
+    stops. As it begins the registers of its direction are those of ``aim``, and the states ``begin`` change; as it
+    stops the states ``end`` do, and the modes are those of ``onward``: it may go on where sticking does not bear what
+    pulls. Gaps that are quasi-static find their equilibrium.
+    """
+    edges = []
+    for s, guard in bears.items():
+        word = {1: " forward", -1: " backward"}[s] if len(bears) > 1 else ""
+        reason, modes = f"sticking gives way and the interface slides{word}", {SLIP: symengine.Integer(s), **aim}
+        begins = Edge(f"slip{word}", guard, reason, modes, begin, equilibrates, "local", strict=True, when={SLIP: (0,)})
+        edges.append(begins)
+    for s, guard in back.items():
+        reason = "sliding comes to a stop"
+        edges.append(Edge("stop", guard, reason, onward, end, heat="local", strict=True, when={SLIP: (s,)}))
+    return Constraint(edges=tuple(edges))
 
 
 def breaks_bonds(build: Build) -> dict[Expression, Expression]:

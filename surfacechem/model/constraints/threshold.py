@@ -133,8 +133,8 @@ def broken(build: Build, law: Law, named: str = "") -> dict[Expression, Expressi
         texts = {item.name: item.long_name.removeprefix("coverage of ") for item in build.interface.variables}
         species = {texts[bond]: bond for bond in bonds} | {bond: bond for bond in bonds}
         if named not in species:
-            known = [name for name in species if name not in bonds]
-            raise InputError(f"{law.name()}: no bond is called '{named}'.{suggestion(named, known)}", law.place)
+            known = suggestion(named, [*species][: len(bonds)])
+            raise InputError(f"{law.name()}: no bond is called '{named}'.{known}", law.place)
         lost = [species[named]]
     changes: dict[str, Expression] = {}
     for name in lost:

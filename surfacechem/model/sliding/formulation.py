@@ -113,13 +113,18 @@ def formulations(build: Build) -> tuple[Formulation, ...]:
 
 def _formulation(build: Build, d: Direction, mount: Held | None, elastic: bool) -> Formulation:
     laws = build.interface.frictions
-    formulas = [law.transverse if d is ACROSS and law.transverse is not None else law.statement for law in laws]
-    rate_dependent = any({"v", "v_2"} & {*reads(formula)} for formula in formulas)
+    rate_dependent = any(_feels_velocity(law, d) for law in laws)
     rate_dependent = rate_dependent or (not elastic and mount is not None and mount.damped)
     sticks = any(law.has_limit for law in laws)
     alone = not elastic and not rate_dependent and mount is not None and mount.quasi_static
     dead_load = alone and not (mount.law.k or in_parallel(build))  # type: ignore[union-attr]
     return Formulation(d, mount, elastic, sticks, rate_dependent, dead_load, bool(laws) or not elastic)
+
+
+def _feels_velocity(law: Friction, d: Direction) -> bool:
+    """Whether a law resists sliding along a direction by the velocity."""
+    formula = law.transverse if d is ACROSS and law.transverse is not None else law.statement
+    return bool({"v", "v_2"} & {*reads(formula)})
 
 
 def _sheared(build: Build) -> list[Potential]:
@@ -204,13 +209,7 @@ def resistance(
     if len(both) == 1:
         formula = bound.driven if law is build.motion.creeping else bound.statement
         return {ALONG: build.variables.call(bound, formula, own)}
-    if law.internal:
-        raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
-    for name, _ in law.specs():
-        value = getattr(law, name)
-        # One component of the velocity would know the axes.
-        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
-            raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
+    _refuse_one_component(law)
     if law.transverse is not None:
         formulas = {ALONG: bound.traction, ACROSS: bound.transverse}
         return {d: build.variables.call(bound, formula, own) for d, formula in formulas.items()}
@@ -229,6 +228,16 @@ def resistance(
             law.place,
         )
     return {d: slope * build.variables.get(d.velocity, law) for d in both}
+
+
+def _refuse_one_component(law: Friction) -> None:
+    """A law of one component of the velocity would know the axes."""
+    if law.internal:
+        raise InputError(f"{law.name()} remembers sliding along one direction, and this scene has two.", law.place)
+    for name, _ in law.specs():
+        value = getattr(law, name)
+        if isinstance(value, Varying) and any(factor.of in REST for factor in value.factors):
+            raise InputError(f"{name} varies with one component of the velocity, and this scene has two.", law.place)
 
 
 def resist(build: Build, d: Direction, traction: Expression) -> None:

@@ -33,7 +33,7 @@ from surfacechem.model.automaton import Constraint, Mode, Register
 from surfacechem.model.balances import Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
-from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, in_the_plane
+from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding.formulation import NONE, PLACE, UNSTABLE, Formulation, evolve, name_traction
 from surfacechem.model.system import STABLE, Given, Margin
 from surfacechem.quantities import VARIABLES
@@ -151,9 +151,12 @@ def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power | Const
     size, pace = norm(*pull), norm(*drive)
     led = [where(pace > 0, x / where(pace > 0, pace, 1), began) for began, x in zip(BEGAN, drive, strict=True)]
     aimed = [where(size > 0, x / where(size > 0, size, 1), other) for x, other in zip(pull, led, strict=True)]
-    stops = (SPEED,) if kinds[0].inertial else ()
-    aim = dict(zip(BEGAN, aimed, strict=True))
-    yield in_the_plane(largest - size, aim, TURNED, still, breaks_bonds(build), stops)
+    aim, beyond = dict(zip(BEGAN, aimed, strict=True)), largest - size
+    onward, end = {SLIP: NONE}, {TURNED: NONE}
+    if kinds[0].inertial:  # it slides on where sticking does not bear what pulls
+        onward = {SLIP: where(beyond < 0, 1, 0)} | {b: where(beyond < 0, x, b) for b, x in aim.items()}
+        end = {TURNED: NONE, SPEED: NONE}
+    yield set_valued({1: beyond}, {1: still}, aim, onward, {**breaks_bonds(build), TURNED: NONE}, end)
 
 
 def _inertial(build: Build, sides: Sequence[Side], largest: Expression) -> Expression:

@@ -40,15 +40,10 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     A mass feels the rate of the velocity, for which parameters that vary count as they are without their factors.
     Without one the balance may need the velocity itself, where they vary with it.
     """
-    laws = [law for law in build.interface.frictions if law.velocity is not None]
-    if not inertial:
-        factors = {law: [factor for value in _varying(law).values() for factor in value.factors] for law in laws}
-        laws = [law for law in laws if not any("v" in (x.of, *reads(x.factor)) for x in factors[law])]
-    if not laws:
+    law = _law(build, inertial)
+    if law is None:
         return None
-    law = laws[0]
-    bound = build.bound(law)
-    varying = _varying(law)
+    bound, varying = build.bound(law), _varying(law)
     if inertial and varying:
         symbols = {parameter.path: parameter.symbol for parameter in build.parameters.items}
         bound = bound.bind({name: symbols[f"{bound.path}.{name}"] for name in varying})
@@ -63,12 +58,7 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     def at_start(values: Mapping[str, float]) -> float:
         """The drive at the velocity given, where the search for a balance begins."""
         drive = build.variables.call(law, bound.drive, {**own, "v": values["initial.v"]})
-        numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
-        numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
-        try:
-            return float(build.expanded(drive).subs({**numbers, build.t: 0.0}))
-        except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
-            return 0.0
+        return _number_at_start(build, drive, values)
 
     given = Given(VARIABLES["v"], build.scene.initial.get("v", 0.0), at_start)
     by = "mechanics.tangential" if inertial else "balance of the tangential tractions"
@@ -78,9 +68,28 @@ def evolve_drive(build: Build, *, inertial: bool) -> Expression | None:
     return symbol
 
 
+def _law(build: Build, inertial: bool) -> Friction | None:
+    laws = (law for law in build.interface.frictions if law.velocity is not None)
+    return next((law for law in laws if inertial or not _varies_with_velocity(law)), None)
+
+
+def _number_at_start(build: Build, expression: Expression, values: Mapping[str, float]) -> float:
+    numbers = {parameter.symbol: values[parameter.path] for parameter in build.parameters.items}
+    numbers |= {state.symbol: state.from_given(values) for state in build.states if state.name != DRIVE}
+    try:
+        return float(build.expanded(expression).subs({**numbers, build.t: 0.0}))
+    except RuntimeError:  # no real number, as of a negative pressure: it is only where the search begins
+        return 0.0
+
+
 def _varying(law: Friction) -> dict[str, Varying]:
     values = {name: getattr(law, name) for name, _ in law.specs()}
     return {name: value for name, value in values.items() if isinstance(value, Varying)}
+
+
+def _varies_with_velocity(law: Friction) -> bool:
+    factors = (factor for value in _varying(law).values() for factor in value.factors)
+    return any("v" in (factor.of, *reads(factor.factor)) for factor in factors)
 
 
 def stands_for_velocity(build: Build) -> bool:

@@ -21,7 +21,7 @@ from surfacechem.model.automaton import Constraint, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
 from surfacechem.model.build import Build
 from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
-from surfacechem.model.constraints.set_valued import SLIP, along_a_line, breaks_bonds
+from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding import plane, rate_and_state
 from surfacechem.model.sliding.formulation import (
     NONE,
@@ -122,17 +122,18 @@ def _states(build: Build, kind: Formulation) -> Iterator[Constraint]:
         if not kind.elastic:
             rates[u] = symengine.Symbol(v)
     elif not kind.slides_inertially:
+        build.variables.define(v, partial(_sliding_velocity, build, kind), "derived", "what does not stick")
 
-        def sliding() -> Expression:
-            """Of what does not stick."""
-            if not kind.slides:
-                return NONE
-            if build.variables.has("v_t"):
-                build.variables.get("v_t", "sliding")
-            rate = rates[u] - rates["g_t"] if kind.elastic else rates[u]
-            return build.name(VARIABLES[v], build.constraint("slip").active * rate)
 
-        build.variables.define(v, sliding, "derived", "what does not stick")
+def _sliding_velocity(build: Build, kind: Formulation) -> Expression:
+    """What the displacement moves faster than an elastic gap gives way, where it does not stick."""
+    if not kind.slides:
+        return NONE
+    if build.variables.has("v_t"):
+        build.variables.get("v_t", "sliding")
+    rates, u = build.motion.gap_rates, kind.d.displacement
+    rate = rates[u] - rates["g_t"] if kind.elastic else rates[u]
+    return build.name(VARIABLES[kind.d.velocity], build.constraint("slip").active * rate)
 
 
 def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
@@ -186,8 +187,14 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint | Eq
     if kind.elastic:
         in_proportion = yield from _elastic_rows(build, kind, slides, t_f, needed, v)
     name_traction(build, d, slides, t_a + carried, t_a + held)
-    if not kind.sticks or kind.dead_load:
-        return
+    if kind.sticks and not kind.dead_load:
+        yield _friction(build, kind, needed, t_f, v, in_proportion)
+
+
+def _friction(
+    build: Build, kind: Formulation, needed: Expression, t_f: Expression, v: Expression, in_proportion: bool
+) -> Constraint:
+    """The set-valued law: what sticking bears and has to bear, and what is zero where sliding stops."""
     stops, still, slack = [], v, NONE
     if kind.slides_inertially:
         still = symengine.Symbol(_velocity_state(build, kind))
@@ -196,13 +203,20 @@ def _motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint | Eq
         # Where tractions give a velocity in proportion it is their balance at rest that is zero where sliding stops:
         # what is left of this as sliding begins is rounding, which must not stop it.
         still = build.expanded(needed - t_f).subs({v: 0})
-        size = absolute(needed) if kind.elastic or far is None else far.size(u)
+        far = build.motion.far_fields.get(kind.d.axis)
+        size = absolute(needed) if kind.elastic or far is None else far.size(far.gap)
         beside = absolute(derivative(build.psi, symengine.Symbol("u_t")))
         slack = STILL * (size + absolute(t_f) + beside)
     back = {s: build.expanded(s * still + slack).subs({SLIP: s}) for s in (1, -1)}
-    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else rubs)
-    equilibrates = not (kind.slides_inertially or kind.rate_dependent)
-    yield along_a_line(needed, limit, back, breaks_bonds(build), stops, equilibrates=equilibrates)
+    limit = build.motion.stick_limits["t"] * (1 if kind.elastic else build.energy.rubs)
+    # Beyond touch the law of a contact may go on to negative pressure; nothing gives way there that is not pulled.
+    bears = {s: where(limit > 0, limit, 0) - s * needed for s in (1, -1)}
+    # Without inertia the traction is at its limit as sliding stops, and rounding must not start it again.
+    onward = where(absolute(needed) <= limit, 0, sign(needed)) if stops else NONE
+    breaks, end = breaks_bonds(build), dict.fromkeys(stops, NONE)
+    # What moves at once finds its equilibrium; all else follows the bonds that break, and their heat.
+    equilibrates = bool(breaks) or not (kind.slides_inertially or kind.rate_dependent)
+    return set_valued(bears, back, {}, {SLIP: onward}, breaks, end, equilibrates=equilibrates)
 
 
 def _velocity_state(build: Build, kind: Formulation) -> str:
