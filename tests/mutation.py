@@ -36,7 +36,7 @@ OF_BALANCES = [
     ["balances"],
     ["zoo", "constraints", "heat_paths", "jumps", "pairs", "rate_and_state", "chemistry"],
     ["tables", "tables_bonds", "tables_mechanics"],
-    ["start", "hybrid", "extremes", "bad_input", "references_mechanics", "references_limits", "case"],
+    ["start", "hybrid", "findings", "bad_input", "references_mechanics", "references_limits", "case"],
     ["rupture", "conduction"],
     ["fold", "breaking", "bound", "pulled", "media", "instant", "reactor", "evaluated"],
     ["unilateral", "plane", "load_path", "neighbours"],
