@@ -72,6 +72,7 @@ def _signals_raised() -> Iterator[None]:
     What the process was told to ignore, as by nohup, it ignores; a handler that is not Python's stays, since it could
     not be put back.
     """
+    # Python handles signals in its main thread only.
     in_main = threading.current_thread() is threading.main_thread()
     wanted = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP") if in_main]
     usual = {number: signal.getsignal(number) for number in wanted if number}
@@ -154,6 +155,7 @@ def chosen(simulation: Simulation, solver: str | None, rtol: float | None, accur
     run = replace(run, solver=solver or run.solver)
     if rtol is None:
         return run
+    # The choice of a solver needs an accuracy to choose for.
     return replace(run, solver=OWN if run.solver == AUTO else run.solver, rtol=rtol, accuracy=None)
 
 
@@ -169,7 +171,7 @@ def wait_for(work: Callable[[], R]) -> R:
     try:
         future = pool.submit(work)
         while not future.done():
-            wait([future], 0.5)
+            wait([future], 0.5)  # without a limit, no signal would be answered in between
         return future.result()
     finally:
         pool.shutdown(wait=False)
@@ -193,6 +195,7 @@ def refuse_unwritable(*targets: Path) -> None:
     from surfacechem.results.netcdf import replacing
 
     for target in targets:
+        # As a dataset is written, but for its content.
         with suppress(_TriedError), replacing(target):
             raise _TriedError
 

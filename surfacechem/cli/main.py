@@ -96,7 +96,7 @@ def run(
         raise InputError("is the case itself; give another file to write to.", Place(str(target)))
     refuse_unwritable(dataset_path(target))
     solution = solved(lambda: simulation.run(run=settings, error=error), quiet, brief=True)
-    solution.write(target)
+    solution.write(target)  # also of a run that failed: what it reached tells why
     if not quiet:
         typer.echo(run_summary(solution, target))
     for warning in solution.warnings if quiet else ():
@@ -181,6 +181,7 @@ def equations(
 
     read = cases.load(case, changes or ())
     title = read.title
+    # Thousands of equations of cells read alike.
     if spatial.divided(read.scene):
         read, title = replace(read, scene=spatial.few(read.scene)), f"{title}, written out for {spatial.FEW} cells"
     typer.echo(getattr(printing, form)(read.system(), title), nl=False)
@@ -251,6 +252,7 @@ def plot(
     from surfacechem.results.netcdf import SUFFIXES
     from surfacechem.runs.simulation import load
 
+    # By its suffix, as a dataset that is missing must not be taken for the name of a case.
     is_file = source.endswith(SUFFIXES)
     if is_file and changes:
         raise InputError("a dataset is plotted as it is; give a case to change values of.", Place(path="--set"))
@@ -346,6 +348,7 @@ def _conduct(run: Callable[[], Study], target: Path, quiet: bool) -> None:
 
     files = targets(target).values()
     refuse_unwritable(*files)
+    # Files and pipes keep free of progress.
     if sys.stderr.isatty() and not quiet:
         import logging
 
@@ -378,4 +381,5 @@ def _tolerances(text: str) -> list[float]:
     if not 0 < last <= first:
         raise InputError(f"'{text}' is no range of tolerances, for example 1e-4..1e-12.", place)
     count = min(round(math.log10(first / last)), MOST_DECADES)
+    # Twelve digits, so that a decade is 1e-5 and not 9.999999999999999e-06.
     return [float(f"{first * 10.0**-k:.12g}") for k in range(count + 1)]

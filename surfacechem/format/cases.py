@@ -87,6 +87,7 @@ def load_text(
         before, tree = tree, changes.apply(tree, overrides)
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
+    # With the text of its tables a case can be read again without their files.
     whole = csvtable.embedded(tree, str(base))
     if whole != tree:
         tree, text = whole, document.dump(whole)

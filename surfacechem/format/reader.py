@@ -87,11 +87,13 @@ def read_document(tree: Tree, base: str = ".", mechanism_text: str | None = None
     for name, body in bodies.items():
         if not re.fullmatch(BODY_NAME, name) or name in TAKEN:
             raise body.error(f"'{name}' cannot name a body: use letters, digits, - and _, and none of {TAKEN}.")
+    # A temperature that several owners name is shared: they are in perfect contact.
     owners = [body.mapping().get("temperature") for body in bodies.values()]
     temperatures = _temperature_names([*owners, interface.get("temperature")])
     context = Context({**UNITS, **dict.fromkeys(temperatures, "K")}, temperatures, tuple(bodies))
     mechanism = None
     if "mechanism" in interface:
+        # Which solver runs decides whether a mechanism may ask Cantera for its rates.
         run = run_of(read(RunSection, top["run"], context)) if "run" in top else Run(times=(0.0, 1.0))
         named = keys(InterfaceSection)["mechanism"].content.read(interface["mechanism"], "the mechanism", context)
         evaluate = run.solver in (solvers.AUTO, *solvers.ASKING)
@@ -332,6 +334,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     if content is None:
         path = _find(file, base, tree.value["file"] if isinstance(named, MechanismSection) else tree)
         return load(path, str(path))
+    # Cantera and the messages want a file by its own name.
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
         path.write_text(content, encoding="utf-8")
@@ -406,6 +409,7 @@ def run_of(section: RunSection) -> Run:
     solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
     if section.solver == solvers.AUTO and section.has("rtol"):
         raise section.error("the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol")
+    # An accuracy begins with a margin; where a run misses it, it is repeated at a tighter tolerance.
     usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
     return Run(
         times=_times(section),
@@ -426,6 +430,7 @@ def _times(section: RunSection) -> tuple[float, ...]:
                 raise section.error(f"the output times have two roles: give `times` or `{name}`.", name)
         if max(listed, default=0.0) == 0.0:
             raise section.error("at least one time after 0 is needed.", "times")
+        # Every run begins at zero, whether that is an output or not.
         times = tuple(listed) if listed[0] == 0.0 else (0.0, *listed)
     elif section.until is None:
         raise section.error("the run needs an end. Add `until: 1 s`, or a list of `times`.")
@@ -448,6 +453,7 @@ def _spaced(section: RunSection, end: float) -> tuple[float, ...]:
         raise section.error("logarithmic spacing needs `first`: the first output time after 0.", "spacing")
     if first > end:
         raise section.error(f"first = {first:g} is outside its range: <= {end:g}.", "first")
+    # Differences of logarithms, as the ratio of the ends may overflow; the end itself is exact.
     ratio = math.log(end) - math.log(first)
     return (0.0, *(first * math.exp(ratio * i / max(count - 2, 1)) for i in range(count - 2)), end)
 

@@ -134,21 +134,15 @@ def test_prints_the_measured_rates(call):
     assert re.search(r"R1  L\(s\) \+ P\(s\) <=> PL\(s\)  \(interface-Arrhenius, .*selectin\.yaml:\d+\)", done.stdout)
 
 
-@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
-def test_plots(call, kind, tmp_path):
-    done = call("dna-film", "-o", f"rates.{kind}")
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.endswith(f"written to rates.{kind}\n")
-    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[kind]
-    assert (tmp_path / f"rates.{kind}").read_bytes().startswith(start)
-
-
-def test_the_figure_shows_every_reaction_once():
-    figure = mechanism_report.figure(Curves(load("dna-film.yaml")), T, F)
-    rates, constants = figure.axes
+def test_the_figure_shows_every_reaction_once(call, tmp_path):
+    rates, constants = mechanism_report.figure(Curves(load("dna-film.yaml")), T, F).axes
     assert [line.get_label() for line in rates.lines] == ["R1: A(s) + B(s) <=> AB(s)", "R1, reverse"]
     assert len(constants.lines) == 1
     assert rates.get_ylabel() == "log$_{10}$ Rate per bond [1/s]"
+    done = call("dna-film", "-o", "rates.svg")
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.endswith("written to rates.svg\n")
+    assert (tmp_path / "rates.svg").read_bytes().startswith(b"<?xml")
 
 
 @pytest.mark.parametrize(
