@@ -409,7 +409,7 @@ def run_of(section: RunSection) -> Run:
     solver = section.solver or (solvers.AUTO if section.accuracy is not None else OWN)
     if section.solver == solvers.AUTO and section.has("rtol"):
         raise section.error("the tolerance has two roles: with `solver: auto` it follows from `accuracy`.", "rtol")
-    # An accuracy begins with a margin; where a run misses it, it is repeated at a tighter tolerance.
+    # An accuracy begins with a margin; `solver: auto` repeats a run that misses it, with a tighter tolerance.
     usual = DEFAULT_RTOL if section.accuracy is None else first_tolerance(section.accuracy)
     return Run(
         times=_times(section),
