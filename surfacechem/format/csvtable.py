@@ -45,15 +45,15 @@ def embedded(tree: Tree, base: str) -> Tree:
     return replace(tree, value=values)
 
 
-def is_csv(tree: Tree) -> bool:
-    """Whether a history is a table given as text."""
-    table = tree.value.get("table") if isinstance(tree.value, dict) else None
-    return table is not None and isinstance(table.value, dict) and "csv" in table.value
+def table(tree: Tree, unit: str) -> Table | None:
+    """The history of a column; times are in the column ``t``, values in the one named, or after the variable.
 
-
-def table(tree: Tree, unit: str) -> Table:
-    """The history of a column; times are in the column ``t``, values in the one named, or after the variable."""
-    fields = tree.value["table"].mapping(KEYS[1:])
+    None where the tree is no table that is given as text.
+    """
+    given = tree.value.get("table") if isinstance(tree.value, dict) else None
+    if given is None or not isinstance(given.value, dict) or "csv" not in given.value:
+        return None
+    fields = given.mapping(KEYS[1:])
     content, variable = CSVText(fields["csv"]), tree.place.path.rpartition(".")[2]
     name = fields["column"].text("column") if "column" in fields else variable
     times, values = content.column("t", "s", "t"), content.column(name, unit, variable)

@@ -283,11 +283,10 @@ class Prescribed(Content):
     def read(self, tree: Tree, name: str, context: Context) -> Load:
         """The load."""
         unit = resolved_unit(self.unit, context.x)
-        if csvtable.is_csv(tree):
-            load: Load = csvtable.table(tree, unit)
-        elif isinstance(tree.value, dict):
+        load: Load | None = csvtable.table(tree, unit)
+        if load is None and isinstance(tree.value, dict):
             load = OneLaw(Load).read(tree, name, replace(context, x=unit))
-        else:
+        elif load is None:
             try:
                 level = number(tree, Spec(unit, name), name)
             except InputError as error:
@@ -297,6 +296,7 @@ class Prescribed(Content):
                     error = InputError(f"{error.message} {hint}", tree.place)
                 raise error from None
             load = laws.find(Load, "hold")(level=level, place=tree.place)  # type: ignore[call-arg, assignment]
+        assert load is not None
         start = load.at_start() if self.above_zero else 1.0
         if not start > 0:
             raise tree.error(f"{start:g} K is not an absolute temperature above zero.")

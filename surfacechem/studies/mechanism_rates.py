@@ -52,7 +52,8 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, InterfaceArrhenius)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
-        self.species = {item.name: item for item in _species_of(mechanism)}
+        mixtures = [law for law in mechanism.potentials if isinstance(law, IdealMixture)]
+        self.species: dict[str, Species] = {item.name: item for law in mixtures for item in law.species}
         springs = {name: item.spring for name, item in self.species.items() if item.spring}
         self.pulled = next((name for name, spring in springs.items() if spring.stiffness), "")
         """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
@@ -143,10 +144,6 @@ class Curves:
         function = symengine.Lambdify([TEMPERATURE, FORCE, *self._numbers], [full], cse=True)
         points = np.stack(np.broadcast_arrays(temperatures, forces, *self._numbers.values()), axis=-1)
         return np.asarray(function(points), dtype=np.float64)[..., 0]
-
-
-def _species_of(mechanism: Mechanism) -> list[Species]:
-    return [item for law in mechanism.potentials if isinstance(law, IdealMixture) for item in law.species]
 
 
 def _symbols(law: InterfaceArrhenius) -> dict[str, Expression]:

@@ -76,8 +76,9 @@ def stages(build: Build) -> Iterator[Constraint]:
     """The edge at the end of each stage: after a time, at a value of a variable, or along an edge of the interface."""
     begun, edges = BEGUN.symbol, []
     waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
-    known = [edge.name for edge in build.edges]
-    for _, item in waiting:
+    for i, item in waiting:
+        before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
+        known = [*(edge.name for edge in build.edges), *before]
         if not any(name.startswith(item.event) for name in known):
             message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
             raise InputError(message, item.place)

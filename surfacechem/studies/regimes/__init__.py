@@ -28,6 +28,9 @@ Values: TypeAlias = Mapping[str, Array | float]
 
 R = TypeVar("R", bound=Reference)
 
+# Cases that show nothing but where solvers fail stand beside their regimes.
+FOLDER = Path(__file__).parent
+
 
 @dataclass(frozen=True)
 class Exact:
@@ -90,11 +93,6 @@ class Trial:
     """Output times [s]; the run begins at 0."""
     expected: Expectation
     changes: Mapping[str, object] = field(default_factory=dict)
-
-
-def beside(name: str) -> str:
-    """The file of a case that stands beside the regimes, since it shows nothing but where solvers fail."""
-    return str(Path(__file__).with_name(name))
 
 
 @dataclass(frozen=True)

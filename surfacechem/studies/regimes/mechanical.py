@@ -12,7 +12,7 @@ from surfacechem.references.elastic_contact import ElasticContact
 from surfacechem.references.film import ClosingFilm
 from surfacechem.references.pull_off import OverdampedPullOff
 from surfacechem.references.stick_slip import StickSlip
-from surfacechem.studies.regimes import Array, Exact, Stops, Trial, beside, regime
+from surfacechem.studies.regimes import FOLDER, Array, Exact, Stops, Trial, regime
 
 # Least stick over slip that is told from steady sliding, whose events are as close. Also the part of the width of a
 # bottleneck over which its speed is taken: enough for a condition number, which is told to a digit.
@@ -34,7 +34,7 @@ def penalty(value: float) -> Trial:
     """A contact that becomes rigid: the gap k w / (k + E_n) vanishes and its traction stays."""
     exact = ElasticContact(k=1e12, E_n=value, w_i=0.0, w_dot=-1e-8)
     changes = {"interface.potential.normal-stiffness.E_n": value}
-    return Trial(beside("contact.yaml"), [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
+    return Trial(str(FOLDER / "contact.yaml"), [0.25, 0.5, 1.0], Exact.of(exact, also=["t_n"]), changes)
 
 
 @regime(
