@@ -72,7 +72,7 @@ ASKED_FOR: dict[str, Callable[[Scene], object]] = {
     "medium": lambda scene: scene.interface.medium,
     **dict.fromkeys(("chemistry", "pairs", "bound", "envelope"), _bonds),
 }
-"""Components that are not imported where the scene has no part that asks for them."""
+"""Components that have no part in a scene, and are not imported, unless something there asks for them."""
 
 
 @cache
