@@ -35,13 +35,19 @@ def _no_rows(runs: int) -> Array:
     return np.empty((runs, 0, 0))
 
 
+@lru_cache(maxsize=64)
+def _zeros(count: int) -> Array:
+    """Zeros that nothing writes to: a run may be briefer than making them."""
+    return np.zeros(count)
+
+
 def _peaks(problem: Problem) -> Array:
     """Largest accounts and guards of what a problem continues; none where it continues nothing."""
     accounts, guards = problem.exchanged, problem.seen
-    return np.concatenate((
-        np.zeros(problem.program.n_ledger) if accounts is None else accounts,
-        np.zeros(problem.program.n_margins) if guards is None else guards,
-    ))  # fmt: skip
+    none, unseen = _zeros(problem.program.n_ledger), _zeros(problem.program.n_margins)
+    if accounts is None and guards is None:
+        return _zeros(len(none) + len(unseen))
+    return np.concatenate((none if accounts is None else accounts, unseen if guards is None else guards))
 
 
 def _contiguous(values: ArrayLike) -> Array:
