@@ -165,6 +165,7 @@ class Equilibrium:
     state: str
     residual: Expression
     """Traction that drives the gap open, less what resists [Pa]."""
+    # Not the residual's magnitude: in a ramp that counts the rounding of time, which all tractions of a moment share.
     size: Expression
     """Size of the tractions that balance [Pa]."""
     along: Mapping[str, Expression] = field(default_factory=dict)

@@ -63,7 +63,7 @@ class Moments:
 
     def soonest(self) -> float:
         """Time [s] in which a guard of the state last put would close at its present rate."""
-        now, rates = self.margins(), self.jumper.guard_rates(self.here())
+        now, rates = self.margins(), self.jumper.guard_rates(self.here().inputs())
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where((now > 0) & (rates < 0), -now / rates, np.inf)
         return float(left.min(initial=np.inf))

@@ -90,8 +90,8 @@ class Folds:
         falls, _, way = self._shape(index, point)
         return Lost(point, way, float(np.sign(falls @ way.pulls)))
 
-    def reached(self, point: Point, rtol: float) -> int | None:
-        """The fold that is so close to a point that time cannot tell them apart."""
+    def reached(self, point: Point, rtol: float) -> int:
+        """The fold that is so close to a point that time cannot tell them apart; -1 where none is."""
         for index in self.items:
             found = self.at(index, point)
             if found is None:
@@ -99,7 +99,7 @@ class Folds:
             (_, sizes), (left, _) = self.equilibria.balance(point), self.equilibria.balance(found.point)
             if np.all(np.abs(left) <= DRIFT * rtol * np.abs(sizes)):
                 return index
-        return None
+        return -1
 
     def in_time(self, index: int, point: Point, end: float) -> Point:
         """A point close to a fold at the time of the fold, where that is before the end; else as it is.

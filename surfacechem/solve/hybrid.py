@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -148,11 +147,21 @@ class Hybrid:
         if arc.status is Status.FINISHED:
             return point
         self._renewed = self._renewed + 1 if arc.result.t < BRIEF * self.problem.segments[-1] else 0
-        index = self._edge(arc, point)
-        if index is not None:
+        index, lost = -1, arc.status in LOST
+        if arc.status is Status.EVENT:
+            events, instant = arc.result.events, self.instant
+            fired = events.index[events.t == events.t[-1]]
+            instant.limits = [int(i) for i in fired if i < instant.first and self.problem.margins[i].terminal]
+            index = int(fired[-1]) - instant.first
+        elif lost:
+            index = self.jumper.folds.reached(point, self.problem.rtol)
+        if index >= 0:
             return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
-        if arc.status in LOST and (across := self._across_touch(point)) is not None:
-            return across
+        # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
+        gaps = np.array([state.name in GAPS for state in self.system.states])
+        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        if lost and closing.any():
+            return replace(point, y=np.where(closing, -point.y, point.y))
         # What time could not resolve any more goes on in a time of its own.
         if arc.status is Status.STEP_UNDERFLOW and arc.result.t > 0 and self._renewed < RENEWALS:
             return point
@@ -168,7 +177,7 @@ class Hybrid:
             return None
         times = problem.times[self._written : int(np.searchsorted(problem.times, end, side="right"))]
         local = start.parameters.copy()
-        local[self._clock] = start.t
+        local[next(j for j, p in enumerate(self.system.parameters) if p.path == START)] = start.t
         local[self.system.origins] -= start.t
         segments = instant.rebounds.pieces(start.t, end)
         problem = problem.changed(
@@ -200,27 +209,6 @@ class Hybrid:
             instant.status, instant.reason = Status.FAILED, MISSED
             return None
         return arc
-
-    def _edge(self, arc: Arc, point: Point) -> int | None:
-        """The edge at which an arc has ended, if any."""
-        if arc.status is Status.EVENT:
-            events, instant = arc.result.events, self.instant
-            fired = events.index[events.t == events.t[-1]]
-            instant.limits = [int(i) for i in fired if i < instant.first and self.problem.margins[i].terminal]
-            index = int(fired[-1]) - instant.first
-            return index if index >= 0 else None
-        return self.jumper.folds.reached(point, self.problem.rtol) if arc.status in LOST else None
-
-    def _across_touch(self, point: Point) -> Point | None:
-        """The point on the other side of a gap of zero, where stiffness may jump and Newton's method stalls."""
-        gaps = np.array([state.name in GAPS for state in self.system.states])
-        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
-        return replace(point, y=np.where(closing, -point.y, point.y)) if closing.any() else None
-
-    @cached_property
-    def _clock(self) -> int:
-        """Column of the time at which an arc starts."""
-        return next(j for j, p in enumerate(self.system.parameters) if p.path == START)
 
 
 def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Result:

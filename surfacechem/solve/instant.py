@@ -222,7 +222,7 @@ class Instant:
         closed = playing & (now < -np.maximum(DRIFT * self.rtol * sizes, small))
         near = playing & ~closed & (now <= small) & ~self.strict[self.first :]
         if near.any():
-            near &= self.jumper.guard_rates(self.consistent(point)) < 0
+            near &= self.jumper.guard_rates(self.consistent(point).inputs()) < 0
             # Rounding undoes nothing: no edge leads to modes that have been left at this very moment.
             left = [j.before.parameters[self.jumper.mode_columns] for j in self.jumps[-AT_ONCE:] if j.t == point.t]
             for j in np.flatnonzero(near).tolist():

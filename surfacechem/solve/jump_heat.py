@@ -53,10 +53,6 @@ class JumpHeat:
         values = self._columns(rows).reshape(len(rows), len(self.nodes), -1)
         return values[:, :, 0], values[:, :, 1], values[:, :, 2], values[:, :, 3:]
 
-    def of_friction(self, rows: Array) -> Array:
-        """Shares of the heat of friction, shape (rows, nodes)."""
-        return self.at(rows)[3][:, :, self.interface]
-
     def taken(self, rows: Array, made: Array, shares: Array | None) -> tuple[Array, Array, Array, Array]:
         """Temperature, energy and capacity of each node, and the heat that it takes, each of shape (rows, nodes).
 

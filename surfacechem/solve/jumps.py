@@ -165,7 +165,8 @@ class Jumper:
         return any(state.algebraic or state.dot in read for state in states)
 
     @cached_property
-    def _guard_rates(self) -> Function:
+    def guard_rates(self) -> Function:
+        """Time derivatives of the guards of the edges, at consistent inputs."""
         states, t = self.system.states, self.system.t
         guards = [self.system.expand(edge.guard) for edge in self.system.edges]
         rates = [sum((derivative(g, s.symbol) * s.dot for s in states), derivative(g, t)) for g in guards]
@@ -222,10 +223,6 @@ class Jumper:
     def modes_after(self, index: int, point: Point) -> Array:
         """The modes and registers that an edge sets."""
         return self._resets[index](point.inputs())[len(point.y) :]
-
-    def guard_rates(self, point: Point) -> Array:
-        """Time derivatives of the guards of the edges at a consistent point."""
-        return self._guard_rates(point.inputs())
 
     def is_loaded(self, before: Point, point: Point) -> bool:
         """Whether a jump of the loads does work or sets anything in motion."""
@@ -362,13 +359,14 @@ class Jumper:
     def _path_shares(self, release: Release, after: Point) -> Array | None:
         """The shares by which the heat of friction is taken along the way of loads that jump, where that matters."""
         step, edge = release.step, release.edge
-        if step is None or edge.heat == "snap" or not self._load_path.slides(after):
+        slip, path = self.equilibria.slip, self._load_path
+        if step is None or edge.heat == "snap" or slip is None or not after.parameters[slip] or not path.varies:
             return None
         made, small = float(self._made(after.inputs()[None], release)[0, -1]), self._rounding(after, release.energy)
         if not made > small:
             return None
         broken = release.energy - float(self._energy(release.start.inputs())[0]) if edge.heat == "local" else 0.0
-        return self._load_path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
+        return path.shares(step, release.start, after, broken, release.slack.rtol * made + small)
 
     def _made(self, rows: Array, release: Release) -> Array:
         """Heat that a jump to each of the rows makes [J/m^2], by who makes it, shape (rows, makers + 1).

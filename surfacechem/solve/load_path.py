@@ -181,11 +181,6 @@ class LoadPath:
 
         step.reached = _first(guard, step.reached)
 
-    def slides(self, after: Point) -> bool:
-        """Whether a jump slides, and the shares of its heat change with the loads."""
-        slip = self.equilibria.slip
-        return slip is not None and self.varies and bool(after.parameters[slip])
-
     def shares(self, step: LoadStep, start: Point, after: Point, broken: float, small: float) -> Array | None:
         """The shares of the heat of friction of a jump, shape (nodes,), but for heat that is ``small``.
 
@@ -224,7 +219,7 @@ class LoadPath:
             part = _first(resists, floor)
             row, here = at(part), after.inputs()
             here[self.moved] = row[0, self.moved]
-            return part, float(self.energy(here)[0]), self.heat.of_friction(row)[0]
+            return part, float(self.energy(here)[0]), self.heat.at(row)[3][0, :, self.heat.interface]
 
         level = after.inputs()
         level[self.moved] = start.inputs()[self.moved]

@@ -179,6 +179,12 @@ class Model:
     def __init__(self, system: System) -> None:
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
+        filler, outside = None, system.outside
+        if outside is not None:
+            paths = [parameter.path for parameter in system.parameters]
+            positions = np.array([1 + 2 * n + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
+            reads = compile_function(inputs, [system.expand(expression) for expression in outside.reads])
+            filler = Filler(reads, positions, outside.engine)
         self.system = system
         self.margins = system.moving_margins()
         """The margins that can close on the way; the rest is checked at the start only."""
@@ -190,7 +196,7 @@ class Model:
             system.local(list(system.rows.values())),
             system.local([account.rate for account in system.ledger]),
             system.local([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
-            filler=self._filler(inputs),
+            filler=filler,
             chains=[Chain(*chain) for chain in system.chains],
             groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
         )
@@ -203,16 +209,6 @@ class Model:
     def __reduce__(self) -> tuple[type[Model], tuple[System]]:
         """Machine code is not pickled but made again from the system."""
         return type(self), (self.system,)
-
-    def _filler(self, inputs: list[Any]) -> Filler | None:
-        outside = self.system.outside
-        if outside is None:
-            return None
-        first = 1 + 2 * len(self.system.states)
-        paths = [parameter.path for parameter in self.system.parameters]
-        positions = np.array([first + paths.index(path) for path in outside.engine.gives], dtype=np.int64)
-        reads = compile_function(inputs, [self.system.expand(expression) for expression in outside.reads])
-        return Filler(reads, positions, outside.engine)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Every parameter and initial value by path, with some of them changed."""
