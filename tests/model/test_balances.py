@@ -12,7 +12,7 @@ from surfacechem.laws.bulk import Constant
 from surfacechem.laws.loading import Ramp
 from surfacechem.laws.longrange import LennardJonesFlatFlat, LennardJonesSpherePlane
 from surfacechem.model.assemble import assemble
-from surfacechem.model.balances import conditioned
+from surfacechem.model.balances import Rows, conditioned
 from surfacechem.scene import Body, Interface, Scene
 
 X = symengine.Symbol("x")
@@ -62,3 +62,19 @@ def test_maxwell_relations():
 def test_what_is_no_polynomial_is_left_alone():
     for expression in (symengine.exp(X), X**9, 1 / X):
         assert conditioned(expression, {X: symengine.Integer(1)}) == expression
+
+
+def test_the_row_of_momentum_is_the_balance_or_keeps_what_is_held():
+    rows, (inertia, force, moves) = Rows(), symengine.symbols("inertia force moves")
+    rows.momentum_of("v_t", inertia, force, moves)
+    assert symengine.expand(rows["v_t"].subs({moves: 1})) == inertia - force
+    assert rows["v_t"].subs({moves: 0}) == symengine.Symbol("dv_t_dt")
+
+
+def test_the_row_of_a_logarithm_is_the_rate_per_bond():
+    """From x' = c x - k with x = exp(y): y' = c - k exp(-y)."""
+    rows, (y, dy, c, k) = Rows(), symengine.symbols("y dy_dt c k")
+    rows["x"] = symengine.exp(y) * dy - (c * symengine.exp(y) - k)
+    rows.logarithm("x", y, "y", rows["x"])
+    assert list(rows) == ["y"]
+    assert symengine.expand(rows["y"] - (dy - c + k * symengine.exp(-y))) == 0

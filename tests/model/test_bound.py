@@ -59,6 +59,8 @@ def test_bonds_are_gone_until_the_law_forms_them_again():
     trajectory = closed(damage(), 2.0, outputs=81)
     unbonded, rebond = trajectory.jumps
     assert trajectory.events == ["unbonded", "rebond"]
+    (held,) = assemble(damage()).modes
+    assert held.words[-1.0] == "held at zero"
     assert unbonded.t == pytest.approx(brentq(free, 0.3, 1.0, xtol=1e-15), rel=1e-10)
     assert rebond.t == pytest.approx(2 - math.sqrt(2 * K / E) / TOP, rel=1e-12)
     assert unbonded.released == rebond.released == 0.0

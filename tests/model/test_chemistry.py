@@ -283,3 +283,10 @@ def test_at_constant_traction_the_fall_of_the_enthalpy_is_the_heat_that_leaves(a
     t_n = data["t_n_nominal"] if area == 2 else data["t_n"]
     np.testing.assert_allclose(1e16 * data["e_c"], data["U_c"] - t_n * data["g_n"], rtol=1e-12)
     np.testing.assert_allclose(t_n, 2e4, rtol=1e-9)
+
+
+def test_the_length_of_a_reversible_bond_is_how_its_equilibrium_answers_force():
+    """Detailed balance: ln(phi / (1 - phi)) rises with the force by (x_on - x_off) / kT, ruptures over formations."""
+    law = ReversibleBell(k_off=1.0, x_off=X, x_on=X / 4)
+    assert law.length == pytest.approx(X / 4 - X, rel=1e-15)
+    assert ReversibleBell(k_off=1.0, x_off=X).length is None

@@ -12,12 +12,13 @@ from solved import closed, solve
 from surfacechem.errors import InputError
 from surfacechem.format import load_text
 from surfacechem.laws.bulk import Constant
-from surfacechem.laws.cohesive import CompliantDebonding
+from surfacechem.laws.cohesive import CompliantDebonding, ExponentialCohesiveZone
 from surfacechem.laws.contact import BondStiffness
 from surfacechem.laws.factors import Power
 from surfacechem.laws.friction import MohrCoulomb
 from surfacechem.laws.kinetics import MassAction
 from surfacechem.laws.loading import Harmonic, Ramp, Table
+from surfacechem.model.assemble import assemble
 from surfacechem.quantities import BOLTZMANN
 from surfacechem.runs.simulation import Simulation
 from surfacechem.scene import Mounting
@@ -198,6 +199,21 @@ def test_what_has_no_bonds_loses_none():
 def test_more_bonds_than_the_gap_leaves_are_refused():
     with pytest.raises(InputError, match="at the start there are more bonds than the gap leaves"):
         given_gap([0, 3], [2e-6, 2e-6], phi=0.5)
+
+
+def test_a_run_may_begin_on_the_envelope():
+    """Bonds bear E phi g = t_max (g_f - g) / (g_f - t_max / E) there: phi = 3 / 8 at g = 2 um; rounding is forgiven."""
+    trajectory = given_gap([0, 3], [2e-6, 2e-6], phi=0.375)
+    assert trajectory.status == "finished"
+    assert trajectory.end("phi") == pytest.approx(0.375, rel=1e-12)
+
+
+def test_what_surfaces_bear_without_bonds_is_no_strength_of_bonds():
+    """Cohesion beside the bonds leaves the strength of the bonds what their law says."""
+    debonding = CompliantDebonding(t_max=1e6, E_b=1e12, g_f=5e-6)
+    cohesion = ExponentialCohesiveZone(t_max=1e6, g_0=1e-6, E_n=1e12)
+    bonds, loading = [BondStiffness(E_b=1e12, E_n=1e12), cohesion], {"g_n": Ramp(rate=1e-6)}
+    assemble(together(bonds, (), loading, {"phi": 1.0}, [debonding]))
 
 
 @pytest.mark.parametrize("damper", [1.5e13, 1.96e13, 2.5e13])
