@@ -1,7 +1,7 @@
 """Quantities with units: ``"10 pN"`` to SI, with the dimension checked.
 
-A number is in SI units already; a text is "value unit". Pint does the conversion and is imported when the first unit is
-met.
+A number is in SI units already; a text is "value unit". The usual units are converted by a table
+(:mod:`surfacechem.contracts.si_units`); Pint does all others and the messages, and is imported when it is needed.
 
 >>> parse("1 kJ/m^2/K", "J/(m^2 K)")
 1000.0
@@ -18,6 +18,7 @@ from functools import lru_cache
 from numbers import Real
 from typing import Any
 
+from surfacechem.contracts import si_units
 from surfacechem.errors import InputError, Place, suggestion
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -25,9 +26,6 @@ _QUANTITY = re.compile(rf"({_NUMBER})\s*(.*)", re.DOTALL)
 _NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan)", re.IGNORECASE)
 
 _EXPONENT = re.compile(r"(?:\^|\*\*)\s*\(?\s*[-+]?\s*\d{1,2}(?![\d.])")
-_TOWER = re.compile(r"[\d²³⁰-⁹]\s*\)*\s*(?:\^|\*\*)|(?:\^|\*\*)\s*(?![-+(\d])")
-"""Powers of powers, such as 9^9^9, which would never end."""
-
 _LONGEST = 100
 """Characters of a quantity; longer texts are no quantities."""
 
@@ -137,6 +135,17 @@ def _short(text: str) -> str:
 
 
 def _converted(number: str, given: str, unit: str, name: str, difference: bool) -> float:
+    try:
+        if (factor := si_units.factor(given, unit)) is not None:
+            return float(Decimal(number) * factor)
+        if given == "degC" and unit == "K" and not difference:
+            return float(Decimal(number) + si_units.ZERO_CELSIUS)
+    except ArithmeticError:
+        pass  # Pint says what is too large
+    return _by_pint(number, given, unit, name, difference)
+
+
+def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) -> float:
     registry, target, shown = _registry(), _unit(unit), f"{number} {given}"
     if given in ("C", "F") and target.is_compatible_with("K"):
         kelvin = float(registry.Quantity(Decimal(number), f"deg{given}").m_as("K"))
@@ -176,10 +185,12 @@ def _unit(text: str) -> Any:
 
     bare = _EXPONENT.sub("", text)
     numbers = re.findall(r"(?<!\w)[\d.]+", bare)
-    if _TOWER.search(text) or any(number != "1" for number in numbers):
+    if si_units.TOWER.search(text) or any(number != "1" for number in numbers):
         raise InputError(f"{_short(text)} is not a unit.{_HINT}")
     try:
-        return _registry().parse_units(f"1{text}" if text.startswith("/") else text)
+        unit = _registry().parse_units(f"1{text}" if text.startswith("/") else text)
+        _ = unit.dimensionality  # logarithmic units in a quotient, such as 1/Np, fail only here
+        return unit
     except pint.UndefinedUnitError as error:
         names: Any = error.unit_names
         unknown = names if isinstance(names, str) else names[0]

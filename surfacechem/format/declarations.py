@@ -185,15 +185,21 @@ class OneOf(Content):
 
     what: str
     names: Callable[[], Iterable[str]]
+    has: Callable[[str], bool] | None = None
+    """Tells one name without all of them, where listing them takes long."""
 
     @property
     def words(self) -> str:  # type: ignore[override]
         """The names."""
         return ", ".join(f"`{name}`" for name in self.names())
 
+    def knows(self, value: object) -> bool:
+        """True for one of the names."""
+        return isinstance(value, str) and (self.has(value) if self.has else value in self.names())
+
     def read(self, tree: Tree, name: str, context: Context) -> str:
         """The name."""
-        return tree.choice(self.what, self.names())
+        return str(tree.value) if self.knows(tree.value) else tree.choice(self.what, self.names())
 
     def schema(self) -> Schema:
         """An enumeration."""
@@ -421,10 +427,10 @@ class Shapes(Content):
         shape = self.mapping if isinstance(tree.value, dict) else self.items if isinstance(tree.value, list) else None
         content = shape or self.value or self.items
         assert content is not None
-        if self.wanted and isinstance(content, OneOf):
-            names = list(content.names())
+        if self.wanted and isinstance(content, OneOf) and not content.knows(tree.value):
             # Among several names the nearest is a better hint than the shapes.
-            if tree.value not in names and (len(names) == 1 or not isinstance(tree.value, str)):
+            misspelt = isinstance(tree.value, str) and len(list(content.names())) > 1
+            if not misspelt:
                 raise tree.error(f"{self.wanted}, not {tree.shown}.")
         return content.read(tree, name, context)
 

@@ -31,6 +31,7 @@ from surfacechem.format.declarations import (
     REQUIRED,
     UNITS,
     Content,
+    Context,
     Entries,
     Key,
     Later,
@@ -350,10 +351,13 @@ class RunSection(Section):
     max_seconds: float | None = quantity("s", "longest run time", above=0, name="max-seconds")
 
 
+EXACT_SOLUTION = OneOf("exact solution", references.names, references.known)
+
+
 class ReferenceSection(Section):
     """an exact solution to compare with, with those of its parameters that the scene does not give"""
 
-    name: str = key(OneOf("exact solution", references.names), "its name", REQUIRED)
+    name: str = key(EXACT_SOLUTION, "its name", REQUIRED)
 
     @classmethod
     def more_keys(cls, tree: Tree | None) -> Mapping[str, Key]:
@@ -363,7 +367,7 @@ class ReferenceSection(Section):
         name = tree.mapping().get("name")
         if name is None:
             raise tree.error("the exact solution needs a `name`.")
-        named = name.choice("exact solution", references.names())
+        named = EXACT_SOLUTION.read(name, "name", Context())
         return {item: Key(Number(replace(spec, varies=False))) for item, spec in _parameters(named)}
 
 
@@ -374,7 +378,7 @@ def _parameters(*solutions: str) -> Iterator[tuple[str, Spec]]:
 
 # An exact solution, by name or with its parameters.
 REFERENCE = Shapes(
-    OneOf("exact solution", references.names),
+    EXACT_SOLUTION,
     Nested(ReferenceSection),
     wanted="an exact solution is given by its name, for example `reference: exothermic-bonding`, or as "
     "`{name: ..., parameters}`",

@@ -13,7 +13,7 @@ from inspect import isabstract
 from surfacechem.errors import InputError, suggestion
 from surfacechem.references.base import Reference
 
-__all__ = ["Reference", "all", "get", "names"]
+__all__ = ["Reference", "all", "get", "known", "names"]
 
 NO_SOLUTIONS = ("base", "scene_view")
 """Modules without an exact solution, beside those that begin with an underscore."""
@@ -24,23 +24,33 @@ def names() -> list[str]:
     return sorted(all())
 
 
+def known(name: str) -> bool:
+    """True if there is an exact solution of this name; imports the file of its family only."""
+    return name in _family(name)
+
+
 @cache
 def get(name: str) -> type[Reference]:
-    """The exact solution called `name`: it is in the file whose name is the longest that is part of this one.
+    """The exact solution called `name`.
 
     >>> get("sliding-constant-capacity").__name__
     'SlidingConstantCapacity'
     """
-    families = [family for family in _families() if family.replace("_", "-") in name]
-    found = _members(max(families, key=len)) if families else {}
-    if name not in found:
+    if not known(name):
         raise InputError(f"no exact solution '{name}'.{suggestion(name, names())}")
-    return found[name]
+    return _family(name)[name]
 
 
 def all() -> dict[str, type[Reference]]:
     """Every exact solution by name."""
     return {name: kind for family in _families() for name, kind in _members(family).items()}
+
+
+@cache
+def _family(name: str) -> dict[str, type[Reference]]:
+    """The exact solutions of the file whose name is the longest that is part of this one."""
+    families = [family for family in _families() if family.replace("_", "-") in name]
+    return _members(max(families, key=len)) if families else {}
 
 
 def _families() -> list[str]:

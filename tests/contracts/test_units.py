@@ -64,6 +64,7 @@ def test_si_value(value, unit, si):
         ("3 kg m^7", "1", "3 kg m^7 is a quantity in kg * m ** 7; g_n needs a pure number."),
         ("3 kBT", "J", 'no unit \'kBT\'. Write it like "J/(m^2 K)" or "1/um^2".'),
         ("3 kJo", "J", "no unit 'kJo'. Did you mean 'kJ'?"),
+        ("3 1/Np", "m", 'no unit \'delta_neper\'. Write it like "J/(m^2 K)" or "1/um^2".'),
         ("3 m)", "m", '\'m)\' is not a unit. Write it like "J/(m^2 K)" or "1/um^2".'),
         ("3 m^9^9^9^9", "m", '\'m^9^9^9^9\' is not a unit. Write it like "J/(m^2 K)" or "1/um^2".'),
         ("3 m^(9^9^9)", "m", '\'m^(9^9^9)\' is not a unit. Write it like "J/(m^2 K)" or "1/um^2".'),
