@@ -159,6 +159,8 @@ def _by_pint(number: str, given: str, unit: str, name: str, difference: bool) ->
         if _has_angle(source) and not _has_angle(target):
             raise InputError(f"{shown} counts an angle; {name} needs {needed(unit)}: cycles per second in Hz, say.")
         return _as_float(registry.Quantity(Decimal(number), source).m_as(target))
+    except TypeError:  # Pint takes no logarithms of decimals
+        raise InputError(f"{shown} is in a logarithmic unit; {name} needs {needed(unit)}.") from None
     except ArithmeticError:
         raise InputError(f"{shown} is too large or too small to convert to {unit}.") from None
 
