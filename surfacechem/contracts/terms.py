@@ -480,6 +480,11 @@ class HeatTransfer(Law):
     resistances: ClassVar[Callable[..., tuple[Expression, Expression, Expression]] | None] = None
     """Resistances of the first wall, the film and the second wall [m^2 K/W]; None where heat is not made across."""
 
+    @property
+    def is_film(self) -> bool:
+        """Whether heat that the medium makes leaves it across its own resistance."""
+        return self.closure == "medium" and self.resistances is not None
+
     def channels(self) -> Mapping[str, Callable[..., Expression]]:
         """The conductances in parallel that the whole is the sum of, by what carries the heat."""
         return {self.channel: self.statement}

@@ -101,7 +101,9 @@ def _set(tree: Tree, keys: Sequence[str], new: Tree, place: Place) -> Tree:
         return replace(tree, value={**known, first: _set(known.get(first, Tree(None, place)), rest, new, place)})
     if first not in known:
         raise InputError(f"there is no '{first}' to remove.{suggestion(first, known)}", place)
-    return replace(tree, value={name: child for name, child in known.items() if name != first})
+    kept = dict(known)
+    del kept[first]
+    return replace(tree, value=kept)
 
 
 def _entries(tree: Tree, place: Place) -> Mapping[str, Tree]:

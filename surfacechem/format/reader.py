@@ -31,6 +31,7 @@ from surfacechem.format.sections import (
     MediumSection,
     ReferenceSection,
     RunSection,
+    StageSection,
     Threshold,
 )
 from surfacechem.quantities import VARIABLES
@@ -270,27 +271,28 @@ def _stiffness(body: BodySection) -> float | None:
 
 
 def _stages(case: Document) -> tuple[Stage, ...]:
-    stages = []
-    for name, section in (item for entry in case.programme for item in entry.items()):
-        stage, until = Stage(name, section.more, place=section.tree.place), section.until
-        if section.has("for") and section.has("until"):
-            raise section.error("the stage has two ends: give `for` or `until`.", "until")
-        if not isinstance(until, Mapping):
-            stages.append(replace(stage, duration=section.duration, event=until or ""))
-            continue
-        ((variable, value),) = until.items()
-        if isinstance(value, Threshold):
-            ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
-            if len(ends) != 1:
-                raise value.error("give `rises-to` or `falls-to`.")
-            stages.append(replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None))
-        else:
-            stages.append(replace(stage, variable=variable, value=value))
+    stages = [_stage(name, section) for entry in case.programme for name, section in entry.items()]
     for stage in stages[:-1]:
         if stage.duration is None and not stage.variable and not stage.event:
             message = f"only the last stage may be without end: give {stage.name} `for` or `until`."
             raise case.error(message, "programme")
     return tuple(stages)
+
+
+def _stage(name: str, section: StageSection) -> Stage:
+    """A stage with its end: after a time, at an event, or where a variable has a value."""
+    stage, until = Stage(name, section.more, place=section.tree.place), section.until
+    if section.has("for") and section.has("until"):
+        raise section.error("the stage has two ends: give `for` or `until`.", "until")
+    if not isinstance(until, Mapping):
+        return replace(stage, duration=section.duration, event=until or "")
+    ((variable, value),) = until.items()
+    if not isinstance(value, Threshold):
+        return replace(stage, variable=variable, value=value)
+    ends = [end for end in (value.rises_to, value.falls_to) if end is not None]
+    if len(ends) != 1:
+        raise value.error("give `rises-to` or `falls-to`.")
+    return replace(stage, variable=variable, value=ends[0], rising=value.falls_to is None)
 
 
 def _initial(case: Document, mechanism: Mechanism | None) -> dict[str, float]:

@@ -12,9 +12,10 @@ from functools import cache, partial
 from importlib import import_module
 
 from surfacechem.contracts.terms import Spec
-from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.errors import InputError, Place
 from surfacechem.model import components, constraints, ledger, sliding
 from surfacechem.model.build import Build
+from surfacechem.model.checks import refuse_idle_initial_values
 from surfacechem.model.sliding.rate_and_state import stands_for_velocity
 from surfacechem.model.system import (
     START,
@@ -102,7 +103,7 @@ def assemble(scene: Scene) -> System:
 def _close(build: Build) -> None:
     """What must hold for the whole, and what of it takes part in events."""
     build.varying_margins()
-    _refuse_idle_initial_values(build)
+    refuse_idle_initial_values(build)
     if build.edges or any(state.finest for state in build.states) or stands_for_velocity(build):
         build.constant("t_start", START, Spec("s", "time at which a stretch between events starts"), 0.0, internal=True)
     own = {str(item.symbol) for item in build.parameters.items if not item.internal}
@@ -116,8 +117,6 @@ def _close(build: Build) -> None:
 def _system(build: Build) -> System:
     """All that was stated, as one frozen graph."""
     far_fields, sinks = build.motion.far_fields, ledger.sinks(build)
-    there = {role.variable for role in build.variables.roles if build.variables.was_read(role.variable)}
-    there |= {item.name for item in build.named}
     return System(
         t=build.t,
         states=tuple(build.states),
@@ -127,8 +126,7 @@ def _system(build: Build) -> System:
         rows={state.name: build.rows[state.name] for state in build.states},
         ledger=tuple(build.ledger),
         margins=tuple(build.margins),
-        # A derived variable that nobody reads is not there.
-        roles=tuple(item for item in build.variables.roles if item.role != "derived" or item.variable in there),
+        roles=build.roles,
         ranges=build.noted(Range),
         capped=build.noted(Capped),
         pairs=build.noted(Pair),
@@ -138,12 +136,8 @@ def _system(build: Build) -> System:
         conductors=build.noted(Conductor),
         conductances=build.conductances,
         regime=ledger.regime(build),
-        breakpoints=tuple(sorted({t for load in build.loads.values() for t in load.breakpoints()})),
-        cycles=tuple(
-            f"{load.path if load.place else f'loading.{name}'}.{load.cycle}"
-            for name, load in build.loads.items()
-            if load.cycle
-        ),
+        breakpoints=build.breakpoints,
+        cycles=build.cycles,
         modes=tuple(build.modes),
         registers=tuple(build.registers),
         edges=tuple(build.edges),
@@ -171,25 +165,3 @@ def _outside(build: Build) -> Outside | None:
             Place(path="interface.mechanism"),
         )
     return Outside(engine, reads)
-
-
-def _refuse_idle_initial_values(build: Build) -> None:
-    """An initial value belongs to something that evolves."""
-    states = {state.start or state.at_start[0].name for state in build.states}
-    for name in build.scene.initial:
-        if name in states:
-            continue
-        if name in build.scene.loading:
-            message = f"{name} is prescribed under `loading`, so it has no initial value; remove one of them."
-            raise InputError(message, path=f"initial.{name}")
-        if build.variables.has(name):
-            symbol = build.variables.get(name, "the initial value")
-            same = next((state.name for state in build.states if state.symbol == symbol), None)
-            message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
-            message = f"{name} is {same} in this case; give `{same}` instead." if same else message
-            raise InputError(message, path=f"initial.{name}")
-        if name in ("phi", "ln_phi"):
-            message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
-            raise InputError(message, path=f"initial.{name}")
-        known = {*states, *(slab.profile for slab in build.thermal.slabs.values())}
-        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, known)}", path=f"initial.{name}")

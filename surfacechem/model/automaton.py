@@ -57,6 +57,11 @@ class Mode:
         """Its symbol, a parameter that edges change."""
         return symengine.Symbol(self.name)
 
+    @property
+    def legend(self) -> str:
+        """Its values with their meanings."""
+        return ", ".join(f"{value:g}: {word}" for value, word in self.words.items())
+
 
 @dataclass(frozen=True)
 class Register:

@@ -28,6 +28,7 @@ from surfacechem.model.system import (
     Pair,
     Profile,
     Range,
+    Role,
     State,
 )
 from surfacechem.model.variables import Parameters, Variables, unit_of
@@ -275,6 +276,24 @@ class Build:
             edges = [replace(edge, modes={**edge.modes, **item.beside(edge)}) for edge in edges]
         return edges
 
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """Roles of the variables; a derived one that nobody reads is not there."""
+        there = {role.variable for role in self.variables.roles if self.variables.was_read(role.variable)}
+        there |= {item.name for item in self.named}
+        return tuple(role for role in self.variables.roles if role.role != "derived" or role.variable in there)
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Times [s] at which a load or its slope jumps."""
+        return tuple(sorted({t for load in self.loads.values() for t in load.breakpoints()}))
+
+    @property
+    def cycles(self) -> tuple[str, ...]:
+        """Paths of the frequencies of loads that repeat themselves."""
+        paths = {name: load.path if load.place else f"loading.{name}" for name, load in self.loads.items()}
+        return tuple(f"{paths[name]}.{load.cycle}" for name, load in self.loads.items() if load.cycle)
+
     def at_start(self, expression: Expression) -> float:
         """Value with the parameters and initial values of the scene, one for what has none; NaN where undefined."""
         values = {parameter.symbol: parameter.at(0.0) for parameter in self.parameters.items} | {self.t: 0.0}
@@ -329,7 +348,9 @@ class Build:
             sought = name in self.motion.gap_rates and name not in self.scene.initial
             margin = Margin(f"{name} > 0", self._read(law, name, own), f"{name} reached zero, {ends}", path=law.path)
             self.margins.append(replace(margin, remedy=STARTS.get(name, "") if sought else "", domain=True))
-        for name in (bound for bound in law.nonnegative if bound not in met):
+        for name in law.nonnegative:
+            if name in met:
+                continue
             value, least = self._read(law, name, own), law.least.get(name, 0)
             # The last digits of the terms of a sum change it by so much.
             whole = self.expanded(value)

@@ -12,8 +12,9 @@ from typing import Any
 
 import symengine
 
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, suggestion
 from surfacechem.expressions import Expression, depends
+from surfacechem.model.build import Build
 from surfacechem.model.system import System
 from surfacechem.tolerances import CBRT_EPS, EPS
 
@@ -70,6 +71,28 @@ def _at_touch(ends: str, h: Expression) -> Iterator[str]:
     elif highest > (1 + CBRT_EPS) * before:
         values = f"{before:.6g} W/(m^2 K) at touch, {highest:.6g} at a gap of {where:.2g} m"
         yield f"{ends} is not monotone: {values}. Gas and radiation across the closed gap exceed the contact."
+
+
+def refuse_idle_initial_values(build: Build) -> None:
+    """An initial value belongs to something that evolves."""
+    states = {state.start or state.at_start[0].name for state in build.states}
+    for name in build.scene.initial:
+        if name in states:
+            continue
+        if name in build.scene.loading:
+            message = f"{name} is prescribed under `loading`, so it has no initial value; remove one of them."
+            raise InputError(message, path=f"initial.{name}")
+        if build.variables.has(name):
+            symbol = build.variables.get(name, "the initial value")
+            same = next((state.name for state in build.states if state.symbol == symbol), None)
+            message = f"{name} has two roles: an initial value, and prescribed or constant elsewhere."
+            message = f"{name} is {same} in this case; give `{same}` instead." if same else message
+            raise InputError(message, path=f"initial.{name}")
+        if name in ("phi", "ln_phi"):
+            message = f"nothing evolves {name}. Give a law under `bonding`, or remove it."
+            raise InputError(message, path=f"initial.{name}")
+        known = {*states, *(slab.profile for slab in build.thermal.slabs.values())}
+        raise InputError(f"nothing that evolves is called '{name}'.{suggestion(name, known)}", path=f"initial.{name}")
 
 
 def check_start(system: System, values: Mapping[str, float], initial: Mapping[str, float]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import symengine
 
@@ -58,12 +59,7 @@ def take(build: Build, record: Record) -> None:
 
 def flows(build: Build) -> None:
     """What flows into each node, from all powers and the work of tractions; what is dissipated gets its accounts."""
-    build.rates = {bond.symbol: bond.dot for bond in build.bonding.values()}
-    for name in (*GEOMETRY, "phi"):
-        x = symengine.Symbol(name)
-        if x not in build.rates and depends(build.psi, x):
-            moved = build.motion.gap_rates.get(name)
-            build.rates[x] = build.rate_of(name) if moved is None else moved
+    build.rates = _rates(build)
     # Tractions do work on the interface: from outside where the gap is prescribed, else from the bodies.
     for name in GEOMETRY:
         x = symengine.Symbol(name)
@@ -87,6 +83,17 @@ def flows(build: Build) -> None:
             build.inflow.setdefault(source.name, []).append(-passage.rate)
 
 
+def _rates(build: Build) -> dict[Any, Expression]:
+    """Time derivatives of what the free energy of the interface depends on beside temperature."""
+    rates: dict[Any, Expression] = {bond.symbol: bond.dot for bond in build.bonding.values()}
+    for name in (*GEOMETRY, "phi"):
+        x = symengine.Symbol(name)
+        if x not in rates and depends(build.psi, x):
+            moved = build.motion.gap_rates.get(name)
+            rates[x] = build.rate_of(name) if moved is None else moved
+    return rates
+
+
 def _account(build: Build, power: Power) -> None:
     """State the accounts of a power: what it supplies, or what it dissipates, and the entropy that it produces."""
     label, produced = power.label, power.entropy
@@ -108,8 +115,8 @@ def _account(build: Build, power: Power) -> None:
         build.ledger.append(Account(integral, sigma, "entropy production", label))
 
 
-def totals(build: Build) -> None:
-    """Energies, entropies, the fluxes into the bodies, the heat of reaction, and the modes, as outputs."""
+def _stored(build: Build) -> dict[str, list[tuple[Node | None, Expression]]]:
+    """Free energies [J/m^2] by member, each with its node; without one where that has no temperature of its own."""
     stored: dict[str, list[tuple[Node | None, Expression]]] = {}
     inside = [node for slab in build.thermal.slabs.values() for node in slab.inner]
     for node in (*build.thermal.nodes.values(), *inside):
@@ -118,9 +125,14 @@ def totals(build: Build) -> None:
                 stored.setdefault(member, []).append((node, F))
     if build.interface.temperature is None and build.psi != 0:  # no medium, and so no temperature of its own
         stored[INTERFACE] = [(None, build.psi)]
+    return stored
+
+
+def totals(build: Build) -> None:
+    """Energies, entropies, the fluxes into the bodies, the heat of reaction, and the modes, as outputs."""
     suffixes = {INTERFACE: "c"} | {body.name: str(k) for k, body in enumerate(build.scene.bodies, start=1)}
     energies, entropies = [], []
-    for member, parts in stored.items():
+    for member, parts in _stored(build).items():
         U = _sum([balances.internal_energy(F, node.T) if node else F for node, F in parts])
         quantity = Quantity(f"U_{suffixes[member]}", "J/m^2", f"internal energy of {member}")
         energies.append(build.name(quantity, U))
@@ -135,8 +147,7 @@ def totals(build: Build) -> None:
     _fluxes(build)
     _enthalpy(build)
     for mode in build.modes:
-        words = ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
-        build.name(Quantity(mode.name, "1", f"mode ({words})"), mode.symbol)
+        build.name(Quantity(mode.name, "1", f"mode ({mode.legend})"), mode.symbol)
     if build.interface.bonds:  # coverages of a mechanism stand for the bonding state
         build.name(VARIABLES["phi"], build.variables.get("phi", "the dataset"))
 
@@ -197,15 +208,7 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
     node = build.thermal.node_of[body.name]
     members = build.thermal.members.items()
     sharing = [other for other, name in members if name == node.name and other != body.name]
-    near = {INTERFACE, *(other.name for other in build.scene.bodies)}
-    channels: dict[str, Expression] = {}
-    elsewhere = symengine.Integer(0)
-    for flow in (flow for flow in flows if body.name in (flow.source, flow.target)):
-        sign, other = (1, flow.source) if flow.target == body.name else (-1, flow.target)
-        if other not in near:
-            elsewhere += sign * flow.rate
-        for channel, heat in flow.channels.items() if other in near else ():
-            channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
+    channels, elsewhere = _heat_into(build, body, flows)
     if len(channels) > 1 and not sharing:
         for name, heat in channels.items():
             text = f"heat flux from the interface into {body.name} by {name}"
@@ -225,6 +228,21 @@ def _flux(build: Build, k: int, body: Body, flows: list[Passage]) -> tuple[Expre
     return flux, flux
 
 
+def _heat_into(build: Build, body: Body, flows: list[Passage]) -> tuple[dict[str, Expression], Expression]:
+    """Heat into a body from the interface and the other body, by what carries it, and from all other places."""
+    near = {INTERFACE, *(other.name for other in build.scene.bodies)}
+    channels: dict[str, Expression] = {}
+    elsewhere = symengine.Integer(0)
+    for flow in (flow for flow in flows if body.name in (flow.source, flow.target)):
+        sign, other = (1, flow.source) if flow.target == body.name else (-1, flow.target)
+        if other not in near:
+            elsewhere += sign * flow.rate
+            continue
+        for channel, heat in flow.channels.items():
+            channels[channel] = channels.get(channel, symengine.Integer(0)) + sign * heat
+    return channels, elsewhere
+
+
 def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
     """Who takes the heat of a jump: of the interface, and of the support of each axis; by the routes of the flow."""
     if not build.edges:
@@ -235,7 +253,7 @@ def sinks(build: Build) -> dict[str, tuple[Sink, ...]]:
         ("released", "J/m^2", "energy that jumps have turned into heat", "dissipation"),
         ("entropy_events", "J/(m^2 K)", "entropy produced by jumps", "entropy production"),
     ]
-    if any(node.prescribed for node in build.thermal.nodes.values()):
+    if build.thermal.prescribed:
         rows += [
             ("H_events", "J/m^2", "heat of jumps supplied to prescribed temperatures", "energy supply"),
             ("H_events_entropy", "J/(m^2 K)", "entropy of that heat", "entropy supply"),

@@ -69,6 +69,11 @@ class Thermal:
         return [node for node in self.nodes.values() if not node.prescribed]
 
     @cached_property
+    def prescribed(self) -> list[Node]:
+        """The nodes at the contact whose temperature is."""
+        return [node for node in self.nodes.values() if node.prescribed]
+
+    @cached_property
     def places(self) -> dict[str, Node]:
         """Nodes by the places that powers go to; a body is its contact."""
         return (

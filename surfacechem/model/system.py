@@ -389,8 +389,7 @@ class System:
     @cached_property
     def energy_has_histories(self) -> bool:
         """Whether the total energy depends on time by itself, as under a load with a history."""
-        total = next((item.expression for item in self.named if item.name == "E_total"), 0)
-        return self.t in self.expand(total).free_symbols
+        return self.t in self.definitions[symengine.Symbol("E_total")].free_symbols
 
     @cached_property
     def paths_by_symbol(self) -> dict[str, str]:

@@ -49,24 +49,28 @@ def _axes(dataset: xarray.Dataset) -> list[str]:
     return [str(name) for name in dataset["status"].dims]
 
 
+def _numbers(dataset: xarray.Dataset) -> list[str]:
+    """Names of the numbers that each run has at its end or along it."""
+    return [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
+
+
 def _panels(dataset: xarray.Dataset, variables: Sequence[str] | None) -> list[Callable[[Axes], None]]:
     """The panels of the variables, else of the load at rupture, else of what depends on the sweep."""
-    # Numbers that each run has at its end or along it.
-    known = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f" and "event" not in v.dims]
+    known = _numbers(dataset)
     for name in variables or ():
         if name not in known:
             raise InputError(f"no variable '{name}' in the sweep.{suggestion(name, known)}")
     load = next((name.removesuffix("_mode") for name in known if name.endswith("_mode")), "")
     if not variables and {f"{load}_{which}" for which in STATISTICS} <= set(known):
         return [partial(_draw_spectrum, dataset=dataset, load=load)]
-    groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset, known) or [["time_reached"]]
+    groups = [[name] for name in dict.fromkeys(variables or ())] or _dependent(dataset) or [["time_reached"]]
     return [partial(_draw_final, dataset=dataset, names=names) for names in groups]
 
 
-def _dependent(dataset: xarray.Dataset, known: Sequence[str]) -> list[list[str]]:
+def _dependent(dataset: xarray.Dataset) -> list[list[str]]:
     """Temperatures and bonds whose final values depend on what is swept; each alone where that has several axes."""
     axes, groups = _axes(dataset), []
-    along = [name for name in known if dataset[name].ndim > len(axes)]
+    along = [name for name in _numbers(dataset) if dataset[name].ndim > len(axes)]
     for _, *kind in KINDS[:2]:
         names = [name for name in of_kind(dataset, along, *kind) if varies(_final(dataset, name).ravel())]
         groups += [[name] for name in names] if len(axes) > 1 else [names] if names else []

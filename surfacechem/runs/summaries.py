@@ -11,7 +11,6 @@ from surfacechem.results.event_table import entropy_destroyed, event_counts, eve
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
-    from surfacechem.model.automaton import Mode
     from surfacechem.model.system import System
     from surfacechem.results.accuracy import Accuracy
     from surfacechem.results.audit import Audit
@@ -176,7 +175,7 @@ def check_summary(
         "Choices": choices,
         "States": _state_rows(system),
         "Roles": [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"],
-        "Modes": [(mode.name, _words(mode)) for mode in system.modes if len(mode.words) > 1],
+        "Modes": [(mode.name, mode.legend) for mode in system.modes if len(mode.words) > 1],
         "Transitions": list(dict.fromkeys((item.name, item.reason) for item in system.edges)),
         "Laws": [(law.contract, law.name()) for law in laws_of(scene)],
         "Numbers": [(g.name, f"{g.value:.4g} {g.unit if g.unit != '1' else ''}".rstrip(), g.text) for g in groups],
@@ -187,10 +186,6 @@ def check_summary(
     for heading, rows in sections.items():
         lines += [heading, *(f"  {line}" for line in columns(rows))] if rows else []
     return "\n".join(lines)
-
-
-def _words(mode: Mode) -> str:
-    return ", ".join(f"{value:g}: {word}" for value, word in mode.words.items())
 
 
 def _plan(system: System, run: Run) -> str:

@@ -114,6 +114,8 @@ class Hybrid:
         self.deadline = None if problem.max_seconds is None else time.monotonic() + problem.max_seconds
         self._steps = self._written = 0
         """Steps taken and outputs written."""
+        self._gaps = np.array([state.name in GAPS for state in system.states])
+        """Which of the states are gaps."""
         self._renewed = 0
         """Number of brief arcs in a row that time could not resolve."""
 
@@ -158,8 +160,7 @@ class Hybrid:
         if index >= 0:
             return self.instant.apply(index, self.jumper.folds.in_time(index, point, end), point)
         # At a gap of zero stiffness may jump, and Newton's method stalls: on with the point on the other side.
-        gaps = np.array([state.name in GAPS for state in self.system.states])
-        closing = gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
+        closing = self._gaps & (np.abs(point.y) < ATOM) & (point.y * point.ydot < 0)
         if lost and closing.any():
             return replace(point, y=np.where(closing, -point.y, point.y))
         # What time could not resolve any more goes on in a time of its own.
@@ -223,13 +224,7 @@ def unbegun(problem: Problem, status: Status, end: float, ledger: Array) -> Resu
 def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, ledger: Array) -> Result:
     """The arcs as one result, which ends at this time with this ledger."""
     results = [arc.result for arc in arcs]
-    last, steps = results[-1], None
-    if problem.record_steps:
-        taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
-        # The start of an arc, and what time cannot tell from it, is the event that ends the last one.
-        kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]
-        counts = [int(keep.sum()) for _, _, keep in kept]
-        steps = Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
+    last = results[-1]
     events = _rows([(arc, arc.result.events, slice(None)) for arc in arcs])
     return Result(
         problem=problem.changed(
@@ -247,10 +242,19 @@ def merged(problem: Problem, arcs: Sequence[Arc], status: Status, end: float, le
         ledger_outputs=np.concatenate([arc.booked + arc.result.ledger_outputs for arc in arcs]),
         events=Events(*events, index=np.concatenate([result.events.index for result in results])),
         counters=Counters(*map(sum, zip(*(result.counters for result in results), strict=True))),
-        steps=steps,
+        steps=_steps(arcs) if problem.record_steps else None,
         stepping=sum((result.stepping for result in results), 0.0),
         segment=np.repeat(np.arange(len(arcs)), [len(arc.times) for arc in arcs]),
     )
+
+
+def _steps(arcs: Sequence[Arc]) -> Points:
+    """The steps of all arcs, each with the number of its arc."""
+    taken = [(arc, arc.result.steps) for arc in arcs if arc.result.steps is not None]
+    # The start of an arc, and what time cannot tell from it, is the event that ends the last one.
+    kept = [(arc, some, (arc.start.t + some.t > arc.start.t) | (arc is arcs[0])) for arc, some in taken]
+    counts = [int(keep.sum()) for _, _, keep in kept]
+    return Points(*_rows(kept), segment=np.repeat(np.arange(len(counts)), counts))
 
 
 def _rows(found: Sequence[tuple[Arc, Points, slice | NDArray[np.bool_]]]) -> tuple[Array, Array, Array, Array]:

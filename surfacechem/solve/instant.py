@@ -7,6 +7,7 @@ the flow between has led. What is due is carried out edge by edge; the ledger ga
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,9 +239,14 @@ class Instant:
         closed += [i for i in self.limits if playing[i] and now[i] <= CROSSED * sizes[i]]
         if not (due and closed):
             return closed
-        # Limits that read states without a past are found anew as modes change.
+        return [i for i in closed if i not in self._found_anew]
+
+    @cached_property
+    def _found_anew(self) -> set[int]:
+        """Limits that read states without a past, which are found anew as modes change."""
         found = {state.symbol for state in self.system.states if state.algebraic}
-        return [i for i in closed if not self.system.expand(margins[i].expression).free_symbols & found]
+        read = [self.system.expand(m.expression).free_symbols for m in self.system.moving_margins()[: self.first]]
+        return {i for i, symbols in enumerate(read) if symbols & found}
 
     def apply(self, index: int, point: Point, last: Point | None = None) -> Point | None:
         """Carry out an edge and book it; None where the run ends with it."""

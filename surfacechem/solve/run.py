@@ -248,13 +248,7 @@ class Model:
             pieces.nudge(system, parameters)
         y = np.array(list(initial.values()))
         if system.equilibria:
-            settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
-            if settled is None:
-                raise InputError(
-                    "there is no gap at which the tractions are in equilibrium at the start.", path="mechanics"
-                )
-            y = settled.y
-            parameters = np.where(settled.parameters != parameters[0], settled.parameters, parameters)
+            y, parameters = self._settled(y, parameters)
         start = stable_start(system, self.program, y, parameters[0])
         if system.equilibria:  # the gaps given are where the search begins; what it finds has to be admissible, too
             first |= dict(zip([p.path for p in system.parameters], parameters[0].tolist(), strict=True))
@@ -267,16 +261,26 @@ class Model:
             parameters=parameters,
             rtol=run.rtol,
             atol=scales * (run.atol if run.atol is not None else NONE_OF_SCALE * run.rtol),
-            margins=(
-                *(Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins),
-                *(Margin.bear() if edge.strict else Margin.stop() for edge in system.edges),
-            ),
+            margins=self._guards(),
             max_steps=run.max_steps,
             max_seconds=run.max_seconds,
             record_steps=True,
             spacing=end / run.samples,
             in_play=system.in_play(parameters[0]),
         )
+
+    def _settled(self, y: Array, parameters: Array) -> tuple[Array, Array]:
+        """The states with their gaps in equilibrium, and the parameters of all segments with the modes found there."""
+        settled = self.equilibria.settle(Point(0.0, y, np.zeros_like(y), parameters[0].copy()))
+        if settled is None:
+            message = "there is no gap at which the tractions are in equilibrium at the start."
+            raise InputError(message, path="mechanics")
+        return settled.y, np.where(settled.parameters != parameters[0], settled.parameters, parameters)
+
+    def _guards(self) -> tuple[Margin, ...]:
+        """How a solver meets the zeros of limits, and behind them of the guards of edges."""
+        limits = (Margin.peak() if m.peak else Margin.stop() if m.terminal else Margin.restart() for m in self.margins)
+        return (*limits, *(Margin.bear() if edge.strict else Margin.stop() for edge in self.system.edges))
 
     def solve(self, run: Run, changes: Mapping[str, float] | None = None) -> Trajectory:
         """Run the model; the end is a status with a reason, never an exception, once the input was admissible."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from math import lcm
 from typing import Any, NamedTuple
 
@@ -52,8 +53,9 @@ class Curves:
         self.mechanism = mechanism
         self.laws = {law.label: law for law in mechanism.reactions if isinstance(law, InterfaceArrhenius)}
         self.pairs: Sequence[Opposed] = opposed(self.laws)
-        mixtures = [law for law in mechanism.potentials if isinstance(law, IdealMixture)]
-        self.species: dict[str, Species] = {item.name: item for law in mixtures for item in law.species}
+        self.species: dict[str, Species] = {
+            item.name: item for law in mechanism.potentials if isinstance(law, IdealMixture) for item in law.species
+        }
         springs = {name: item.spring for name, item in self.species.items() if item.spring}
         self.pulled = next((name for name, spring in springs.items() if spring.stiffness), "")
         """The species on which the force acts: the first elastic one, whose gap the others share; none otherwise."""
@@ -67,12 +69,6 @@ class Curves:
         self._numbers: dict[Expression, float] = {}
         for law in self.laws.values():
             self._numbers |= {symbol: float(getattr(law, name)) for name, symbol in _symbols(law).items()}
-        self._psi: Expression = 0
-        for potential in mechanism.potentials:
-            if isinstance(potential, IdealMixture):  # without interactions, so that standard states have no coverage
-                species = tuple(replace(item, interactions=()) for item in potential.species)
-                potential = potential.bind({"species": species})
-            self._psi += self._call(potential.statement)
 
     def _names(self, springs: Mapping[str, Any]) -> dict[str, Expression]:
         """What a law may read; the gap is that at which the pulled bond carries the force."""
@@ -83,6 +79,17 @@ class Curves:
         for name, spring in springs.items():
             known[f"f_{self.species[name].variable}"] = spring.stiffness * (gap - spring.rest_length)
         return known
+
+    @cached_property
+    def _psi(self) -> Expression:
+        """Free energy of the mixture [J/m^2], without interactions, so that standard states have no coverage."""
+        psi: Expression = 0
+        for potential in self.mechanism.potentials:
+            if isinstance(potential, IdealMixture):
+                species = tuple(replace(item, interactions=()) for item in potential.species)
+                potential = potential.bind({"species": species})
+            psi += self._call(potential.statement)
+        return psi
 
     @property
     def loaded(self) -> bool:

@@ -261,7 +261,7 @@ def _of_case(case: Compared) -> Iterator[PageSection]:
     marked = [i for i, point in enumerate(points) if point.outcome == "failed"]
     tables = [PageTable(HEADING, [_row(point, case) for point in points], marked=marked)]
     failures = [(points[i].solver, f"{points[i].value:.0e}", points[i].reason) for i in marked]
-    tables += [PageTable(("failed", "rtol", "why"), failures)] if failures else []
+    tables += [PageTable(("failed", "rtol", "why"), failures)] * bool(failures)
     yield PageSection(f"{case.name}: {case.subject.case.title}", lines, tables)
     rows = [
         (point.solver, f"{point.value:.0e}", name, *(f"{point.error(kind, name):.1e}" for kind in KINDS))

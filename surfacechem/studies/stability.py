@@ -155,7 +155,7 @@ def prepared(problem: Trial, rtol: float = RTOL) -> Callable[[str], Attempt]:
     try:
         model = Model(read(problem).system())
     except InputError as error:
-        refused = _judged(problem.expected, rtol, math.nan, error)
+        refused = _unfinished(problem.expected, math.nan, error)
         return lambda name: replace(refused)
     known = condition(problem, [state.name for state in model.system.states])
     times = (0.0, *problem.times) if problem.times[0] else tuple(problem.times)
@@ -174,9 +174,7 @@ def read(problem: Trial) -> Case:
 def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory | Exception) -> Attempt:
     """Outcome, digits and reason of a run, judged by the ``known`` condition of its problem."""
     if isinstance(done, Exception):
-        reason = done.message if isinstance(done, InputError) else f"{type(done).__name__}: {done}"
-        right = isinstance(expected, Refused) and expected.reason in reason
-        return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
+        return _unfinished(expected, known, done)
     outcome, digits, reason = WRONG, 0.0, done.reason
     if done.status == "stopped" and isinstance(expected, Stops):
         if expected.reason in done.reason:
@@ -191,6 +189,13 @@ def _judged(expected: Expectation, rtol: float, known: float, done: Trajectory |
     if digits < LEAST and outcome in (SOLVED, REFUSED):
         outcome = SENSITIVE if digits_left(known, rtol) < LEAST else WRONG
     return Attempt(outcome, reason, digits, known)
+
+
+def _unfinished(expected: Expectation, known: float, error: Exception) -> Attempt:
+    """What an error makes of a problem: right where its refusal was expected, for that reason."""
+    reason = error.message if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+    right = isinstance(expected, Refused) and expected.reason in reason
+    return Attempt(REFUSED if right else FAILED, reason, MOST if right else 0.0, known)
 
 
 def _largest_error(expected: Exact, done: Trajectory) -> tuple[float, str]:

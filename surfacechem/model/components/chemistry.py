@@ -52,12 +52,7 @@ class Reaction:
 
 def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
     """Chemical potentials, rates, bond balances and what the reactions dissipate."""
-    mu = {}
-    for name, bond in build.bonding.items():
-        M, single = _potential_per_area(build, name, bond.symbol) / bond.density, name == "phi"
-        text = f"chemical potential {'per bond' if single else f'of {name} per site'}"
-        quantity = Quantity("mu" if single else f"mu_{name}", "J", text, tag="e:muc")
-        mu[name] = build.name(quantity, M, output=single)
+    mu = _chemical_potentials(build)
     kinetics = {}
     for law in build.interface.reactions:
         kinetics[build.unique(law.label)] = build.variables.bind(law, f"interface.bonding.{law.name()}")
@@ -74,10 +69,9 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
     for account, power in dissipated.items():
         yield Power(DISSIPATION, INTERFACE, INTERFACE, power, account)
     yield from _from_neighbours(build, found)
-    work = [-build.stretch * item.rate * item.load for item in found if item.load != 0]
-    if work:
-        text = "work of the prescribed force on bonds"
-        yield Power(WORK, OUTSIDE, INTERFACE, symengine.Add(*work), "W_f", text)
+    work = symengine.Add(*(-build.stretch * item.rate * item.load for item in found))
+    if work != 0:
+        yield Power(WORK, OUTSIDE, INTERFACE, work, "W_f", "work of the prescribed force on bonds")
     for pair in pairs:
         yield from departure(build, pair, {name: value + load.get(name, 0) for name, value in mu.items()})
     for name, bond in build.bonding.items():
@@ -90,6 +84,17 @@ def laws(build: Build) -> Iterator[Power | Account | Caution | Pair]:
         M, rate = _potential_per_area(build, "phi", phi), build.rate_of("phi")
         if rate != 0:
             yield Power(DISSIPATION, INTERFACE, INTERFACE, -M * rate, "prescribed_bonding")
+
+
+def _chemical_potentials(build: Build) -> dict[str, Expression]:
+    """Chemical potential per bond or site [J], by bonding variable."""
+    mu = {}
+    for name, bond in build.bonding.items():
+        M, single = _potential_per_area(build, name, bond.symbol) / bond.density, name == "phi"
+        text = f"chemical potential {'per bond' if single else f'of {name} per site'}"
+        quantity = Quantity("mu" if single else f"mu_{name}", "J", text, tag="e:muc")
+        mu[name] = build.name(quantity, M, output=single)
+    return mu
 
 
 def _potential_per_area(build: Build, name: str, symbol: symengine.Symbol) -> Expression:
@@ -134,9 +139,12 @@ def _with_rates(build: Build, found: Sequence[Reaction]) -> list[Reaction]:
                 build.add(record)
         elif "phi" in item.law.stoichiometry():
             rates[item.label] *= free
-    texts = {item.label: f"net rate of {item.law.title}" for item in found}
-    quantities = {label: Quantity(f"R_{label}", "1/(m^2 s)", text, tag="e:R") for label, text in texts.items()}
-    return [replace(item, rate=build.name(quantities[item.label], rates[item.label])) for item in found]
+
+    def named(item: Reaction) -> Expression:
+        quantity = Quantity(f"R_{item.label}", "1/(m^2 s)", f"net rate of {item.law.title}", tag="e:R")
+        return build.name(quantity, rates[item.label])
+
+    return [replace(item, rate=named(item)) for item in found]
 
 
 def _across_an_open_gap(build: Build, law: RateLaw, rate: Expression) -> Iterator[Caution]:

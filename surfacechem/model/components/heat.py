@@ -28,7 +28,7 @@ from surfacechem.tolerances import NOTHING
 
 def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
     """Fluxes between nodes and external heat."""
-    films = [law for law in build.scene.heat if law.closure == "medium" and law.resistances is not None]
+    films = [law for law in build.scene.heat if law.is_film]
     # Paths between the same two ends count together, by what carries the heat.
     groups: dict[frozenset[str], tuple[tuple[str, str], dict[str, Expression]]] = {}
     for law in (law for law in build.scene.heat if law not in films):
@@ -41,6 +41,14 @@ def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
         yield from (_into_both(build, channels) if ends == BOTH else _between(build, ends, channels))
     for law in films:
         yield from _through_film(build, law)
+    yield from _external(build)
+    if build.interface.temperature is None and build.interface.loss:
+        reason = "the fractions of the interface's heat add up to more than 1"
+        yield Margin("partition <= 1", build.shares()[build.scene.bodies[1].name] + NOTHING, reason)
+
+
+def _external(build: Build) -> Iterator[Power]:
+    """Heat that a scene supplies to its bodies and its interface."""
     first, second = (body.name for body in build.scene.bodies)
     for member, Q in ((first, "Q_1"), (second, "Q_2"), (INTERFACE, "Q_c")):
         if build.variables.has(Q):
@@ -49,9 +57,6 @@ def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
             T = build.variables.get("T_c", "the external heat") if node is None else node.T
             text = f"external heat into {member}"
             yield Power(HEAT, OUTSIDE, member, heat, f"H_{Q[2:]}", text, entropy=heat / T)
-    if build.interface.temperature is None and build.interface.loss:
-        reason = "the fractions of the interface's heat add up to more than 1"
-        yield Margin("partition <= 1", build.shares()[second] + NOTHING, reason)
 
 
 def takers(build: Build) -> dict[str, Expression]:

@@ -115,7 +115,7 @@ class FluidFit:
         self.build, self.fluid = build, fluid
         self.T = build.variables.get("T_c", "the medium", "interface.medium")
         assert build.interface.medium is not None
-        starts = [build.loads[node.name].at_start() for node in build.thermal.nodes.values() if node.prescribed]
+        starts = [build.loads[node.name].at_start() for node in build.thermal.prescribed]
         starts += [T for node in build.thermal.free if (T := build.scene.initial.get(node.name)) is not None]
         self.known = [*starts, *build.interface.medium.temperatures] or [build.scene.T_0 or 300.0]
         self.start = sum(self.known) / len(self.known)

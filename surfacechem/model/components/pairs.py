@@ -124,8 +124,7 @@ def _departure(build: Build, label: str, title: str, log_ratio: Expression, affi
 
 def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed]) -> dict[str, Expression]:
     """Potential of a prescribed force per molecule [J], by bonding variable; empty where no rate feels one."""
-    shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
-    if not (driven(build, "f") or (shares and driven(build, "t_n"))):
+    if not _is_force_prescribed(build):
         idle = next((law for law in laws.values() if law.length is not None and law.log_ratio is None), None)
         if idle is not None:
             message = (
@@ -137,11 +136,7 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
     # A rate that feels the force while its reverse follows from the affinity, without the work.
     unknown = next((law for law in laws.values() if law.lacks_length), None)
     if unknown is not None:
-        load = build.scene.loading.get("f")
-        if not isinstance(load, Load) or getattr(load, "level", None) != 0.0:
-            raise _unknown_length(unknown)
-        # Held at zero it does no work, and is a number: any other force is assembled anew.
-        build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
+        _hold_at_zero(build, unknown)
         return {}
     found = lengths(laws, pairs)
     if not found:
@@ -151,11 +146,22 @@ def dead_load(build: Build, laws: Mapping[str, RateLaw], pairs: Sequence[Opposed
     return {name: derivative(potential, bond.symbol) / bond.density for name, bond in bonds.items()}
 
 
-def _unknown_length(law: RateLaw) -> InputError:
+def _is_force_prescribed(build: Build) -> bool:
+    """Whether the force per bond is given: by itself, or by a traction of which each bond bears its share."""
+    shares = any(role.variable == "f" and role.by == SHARED for role in build.variables.roles)
+    return driven(build, "f") or (shares and driven(build, "t_n"))
+
+
+def _hold_at_zero(build: Build, law: RateLaw) -> None:
+    """Keep a force of zero as a number; any other would do work on bonds that the law does not know."""
+    load = build.scene.loading.get("f")
+    if isinstance(load, Load) and getattr(load, "level", None) == 0.0:
+        build.parameters.constants[f"{load.path}.level"] = (dict(load.specs())["level"], 0.0)
+        return
     remedy = "Write it as two reactions with `=>`, each with its own distance to the transition state"
     if "x_on" in dict(law.specs()):
         remedy = "Give `x_on`, 0 m where formation does not feel the force"
-    return InputError(
+    raise InputError(
         f"{law.title} would come to the same equilibrium under any prescribed force: its rate feels the force, but "
         f"how far a bond lets the load down as it forms is not known. {remedy}.",
         law.place,

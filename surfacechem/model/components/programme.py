@@ -77,11 +77,7 @@ def stages(build: Build) -> Iterator[Constraint]:
     begun, edges = BEGUN.symbol, []
     waiting = [(i, item) for i, item in enumerate(build.scene.programme) if item.event and item.duration is None]
     for i, item in waiting:
-        before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
-        known = [*(edge.name for edge in build.edges), *before]
-        if not any(name.startswith(item.event) for name in known):
-            message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
-            raise InputError(message, item.place)
+        _refuse_unknown_event(build, i, item)
     for i, item in enumerate(build.scene.programme):
         if item.duration is not None or (item.variable and not item.event):
             modes, reason = {STAGE: symengine.Integer(i + 1), begun: build.t}, f"the stage {item.name} ends"
@@ -98,6 +94,15 @@ def stages(build: Build) -> Iterator[Constraint]:
         return modes
 
     yield Constraint(registers=(BEGUN,), edges=tuple(edges), beside=advancing)
+
+
+def _refuse_unknown_event(build: Build, i: int, item: Stage) -> None:
+    """A stage may wait for an edge of the interface, or for the end of a stage before it."""
+    before = [f"end of {stage.name}" for stage in build.scene.programme[:i] if not stage.event]
+    known = [*(edge.name for edge in build.edges), *before]
+    if not any(name.startswith(item.event) for name in known):
+        message = f"the stage {item.name} waits for '{item.event}'.{suggestion(item.event, known)}"
+        raise InputError(message, item.place)
 
 
 def _left(build: Build, item: Stage) -> Expression:

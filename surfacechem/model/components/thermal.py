@@ -99,7 +99,7 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
     # The row of the interface's node is the sum of all; where it has none that is free, that of the first.
     centre = thermal.members.get(INTERFACE, "")
     build.rows.energies(own_rows, centre if centre in own_rows else next(iter(own_rows), ""))
-    for node in (*thermal.free, *(node for node in thermal.nodes.values() if node.prescribed)):
+    for node in (*thermal.free, *thermal.prescribed):
         yield Margin(f"{node.name} > 0", node.T - NOTHING, f"the temperature {node.name} reached zero")
         if node.prescribed:
             if node.energies:

@@ -36,7 +36,7 @@ def variables(build: Build) -> None:
     """Whether the interface is bonded, for the potentials that ask; what nothing limits stays as it starts."""
 
     def bonded() -> Expression:
-        start = next((mode.start for mode in build.modes if mode.name == "closed"), None)
+        start = next((mode.start for mode in build.constraint("closed").modes), None)
         if start is None and build.variables.has("g_n"):
             # An open gap without bonds is not bonded.
             start = where(build.variables.get("g_n", "the bonds", "interface") > 0, 0, 1)

@@ -82,7 +82,7 @@ def laws(build: Build) -> Iterator[Constraint]:
     debonded = {build.variables.get("bonded", "the rigid interface"): (0,)} if limits else {}
     if not limits or any(law.release == "local" for law in limits):  # else what debonds opens
         # What only touches zero does not part a mass.
-        strict, when = any(state.name == "v_n" for state in build.states), {**debonded, closed: (1,)}
+        strict, when = any(state.symbol == V for state in build.states), {**debonded, closed: (1,)}
         opens = Edge("open", -t_n, "the interface opens", {closed: NONE}, equilibrates=True, strict=strict, when=when)
         yield Constraint(edges=(opens,))
     gap = build.variables.get("g_n", "the rigid interface", "interface")
@@ -163,7 +163,7 @@ def jumps(build: Build) -> Iterator[str]:
 
 def closing(build: Build, g: Any) -> Iterator[Margin | str]:
     """End a run as the gap closes, unless a potential bears the bodies there, or a law ends there by itself."""
-    if any(margin.name == "g_n > 0" for margin in build.margins):
+    if any(margin.domain and margin.expression == g for margin in build.margins):
         return
     # What the potentials bear deep in contact, unless it is the same as at touch.
     t_n, side = build.expanded(derivative(build.psi, g)), symengine.Symbol("side")
