@@ -51,6 +51,62 @@ def derivative(expression: Expression, symbol: Expression) -> Expression:
     return result
 
 
+def gradient(expression: Expression, known: dict[Any, dict[Any, Expression]] | None = None) -> dict[Any, Expression]:
+    """Derivatives that are not zero, by symbol: what an expression is made of is differentiated once, by the symbols
+    that it contains. ``known`` keeps what has been differentiated.
+
+    >>> import symengine
+    >>> x, y = symengine.symbols("x y")
+    >>> slopes = gradient(x * y + 2 * y)
+    >>> slopes[x], slopes[y]
+    (y, 2 + x)
+    """
+    import symengine
+
+    whole = symengine.sympify(expression)
+    known = {} if known is None else known
+    if whole in known:
+        return known[whole]
+    totals = {symbol: symengine.Add(*slopes) for symbol, slopes in _slopes(whole, known).items()}
+    known[whole] = {symbol: slope for symbol, slope in totals.items() if slope != 0}
+    return known[whole]
+
+
+def _slopes(whole: Any, known: dict[Any, dict[Any, Expression]]) -> dict[Any, list[Expression]]:
+    """Terms of the derivatives of a node by each symbol, one from each of its arguments."""
+    import symengine
+
+    if whole.is_Symbol:
+        return {whole: [symengine.Integer(1)]}
+    found: dict[Any, list[Expression]] = {}
+    if isinstance(whole, symengine.Piecewise):  # its arguments are values and conditions by turns
+        branches = [gradient(value, known) for value in whole.args[::2]]
+        zero = symengine.Integer(0)
+        for symbol in dict.fromkeys(symbol for branch in branches for symbol in branch):
+            values = (branch.get(symbol, zero) for branch in branches)
+            found[symbol] = [symengine.Piecewise(*zip(values, whole.args[1::2], strict=True))]
+        return found
+    for k, part in enumerate(whole.args):
+        slopes = gradient(part, known)
+        outer = _partial(whole, k) if slopes else 0
+        for symbol, slope in slopes.items():
+            found.setdefault(symbol, []).append(outer * slope)
+    return found
+
+
+def _partial(whole: Any, k: int) -> Expression:
+    """Derivative of a sum, product, power or function by its argument number k."""
+    import symengine
+
+    arguments = whole.args
+    if whole.is_Add:
+        return 1
+    if whole.is_Mul:
+        return symengine.Mul(*arguments[:k], *arguments[k + 1 :])
+    dummies = [symengine.Symbol(f"argument {j}") if j == k else arguments[j] for j in range(len(arguments))]
+    return symengine.diff(whole.func(*dummies), dummies[k]).xreplace({dummies[k]: arguments[k]})
+
+
 def magnitude(expression: Expression, sizes: Mapping[Any, Expression] | None = None) -> Expression:
     """Running error bound: evaluated in doubles, the expression errs by a few times half an EPS of this.
 

@@ -16,7 +16,7 @@ import symengine
 from numpy.typing import ArrayLike, NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.expressions import derivative
+from surfacechem.expressions import gradient
 
 
 @dataclass(frozen=True)
@@ -182,21 +182,70 @@ def _compiled(inputs: Sequence[Any], expressions: Sequence[Any], **options: int)
     return Function(int(address or 0), int(user.value), len(expressions), code)
 
 
-def _derivatives(
-    residual: Sequence[Any], states: Sequence[Any], rates: Sequence[Any], chains: Sequence[Chain]
+Named = Sequence[tuple[Any, Any]]
+"""Symbols with the expressions that they stand for; these may contain the symbols before them."""
+
+
+def expanded(named: Named, expressions: Sequence[Any]) -> list[Any]:
+    """The expressions without the named symbols; what is named is one object in all of them."""
+    known: dict[Any, Any] = {}
+
+    def replaced(expression: Any) -> Any:
+        whole = symengine.sympify(expression)
+        parts = {symbol: known[symbol] for symbol in whole.free_symbols if symbol in known}
+        return whole.xreplace(parts) if parts else whole
+
+    for symbol, expression in named:
+        known[symbol] = replaced(expression)
+    return [replaced(expression) for expression in expressions]
+
+
+def jacobian(
+    residual: Sequence[Any], variables: Sequence[Any], named: Named = ()
+) -> tuple[list[dict[Any, Any]], list[tuple[Any, Any]]]:
+    """Derivatives that are not zero, a mapping by variable for each equation, and the names that they contain.
+
+    What is named is differentiated once, by the symbols that it contains, and its derivatives are named themselves: so
+    the work grows like what is not zero, however often a name is used.
+
+    >>> x, y, r = symengine.symbols("x y r")
+    >>> (row,), names = jacobian([r + x], [x, y], [(r, x**2 * y)])
+    >>> expanded(names, [row[x], row[y]])
+    [1 + 2*x*y, x**2]
+    """
+    slopes: dict[Any, dict[Any, Any]] = {x: {x: symengine.Integer(1)} for x in variables}
+    names: list[tuple[Any, Any]] = []
+
+    def total(expression: Any) -> dict[Any, Any]:
+        terms: dict[Any, list[Any]] = {}
+        for symbol, partial in gradient(expression).items():
+            for x, slope in slopes.get(symbol, {}).items():
+                terms.setdefault(x, []).append(partial * slope)
+        return {x: symengine.Add(*items) for x, items in terms.items()}
+
+    for symbol, expression in named:
+        names.append((symbol, expression))
+        slopes[symbol] = {}
+        for x, slope in total(expression).items():
+            slopes[symbol][x] = symengine.Symbol(f"d {symbol} by {x}")
+            names.append((slopes[symbol][x], slope))
+    return [total(row) for row in residual], names
+
+
+def _entries(
+    residual: Sequence[Any], states: Sequence[Any], rates: Sequence[Any], chains: Sequence[Chain], named: Named
 ) -> list[Any]:
     """Derivatives of the residual by states, then by rates: of the core, then of its border, then along the chains."""
     core = chains[0].first if chains else len(states)
-    # Most equations read few variables: looking spares the differentiation.
-    own = [(g, symengine.sympify(g).free_symbols) for g in residual[:core]]
-    zero = symengine.Integer(0)
-    entries = [
-        derivative(g, x) if x in read else zero for over in (states, rates) for g, read in own for x in over[:core]
-    ]
-    places = list(_linked(core, chains))
-    for part in (places[: core * len(chains)], places[core * len(chains) :]):
-        entries += [derivative(residual[i], over[j]) if j >= 0 else zero for over in (states, rates) for i, j in part]
-    return entries
+    slopes, names = jacobian(residual, [*states, *rates], _read(named, residual))
+    linked = list(_linked(core, chains))
+    border = core * len(chains)
+    parts = ([(i, j) for i in range(core) for j in range(core)], linked[:border], linked[border:])
+    zero, entries = symengine.Integer(0), []
+    for part in parts:
+        for over in (states, rates):
+            entries += [slopes[i].get(over[j], zero) if j >= 0 else zero for i, j in part]
+    return expanded(names, entries)
 
 
 def compile_program(
@@ -209,9 +258,9 @@ def compile_program(
     margins: Sequence[Any] = (),
     filler: Filler | None = None,
     chains: Sequence[Chain] = (),
-    groups: Sequence[int] = (),
+    named: Named = (),
 ) -> Program:
-    """Compile a system with the Jacobians differentiated from its residual.
+    """Compile a system with the Jacobians differentiated from its residual; expressions may contain what is ``named``.
 
     States and equations that form chains stand behind the others, chain after chain.
     """
@@ -220,10 +269,11 @@ def compile_program(
         raise ValueError(f"{counts}: a system needs as many equations as states, and one derivative a state.")
     inputs = [t, *states, *derivatives, *parameters]
     n, core = len(states), chains[0].first if chains else len(states)
-    entries = _derivatives(residual, states, derivatives, chains)
+    entries = _entries(residual, states, derivatives, chains, named)
     by_rate = entries[core * core : 2 * core * core]
     pieces = PIECE if chains else None
-    read = {symbol for margin in margins for symbol in symengine.sympify(margin).free_symbols}
+    residual, ledger, margins = (expanded(named, rows) for rows in (residual, ledger, margins))
+    read = {symbol for margin in margins for symbol in margin.free_symbols}
     outside = {inputs[j] for j in filler.positions} if filler else set()
     return Program(
         n=n,
@@ -237,9 +287,19 @@ def compile_program(
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
-        groups=tuple(groups),
         plain_margins=not read & {*derivatives, *outside},
     )
+
+
+def _read(named: Named, expressions: Sequence[Any]) -> Named:
+    """Of what is named that which the expressions contain, or what they contain in turn."""
+    read = {symbol for expression in expressions for symbol in symengine.sympify(expression).free_symbols}
+    found = []
+    for symbol, expression in reversed(named):
+        if symbol in read:
+            read |= symengine.sympify(expression).free_symbols
+            found.append((symbol, expression))
+    return found[::-1]
 
 
 def _linked(core: int, chains: Sequence[Chain]) -> Iterator[tuple[int, int]]:

@@ -409,14 +409,15 @@ class System:
         return [self.expand(row) for row in self.rows.values()]
 
     def local(self, expressions: Sequence[Expression]) -> list[Expression]:
-        """Expanded expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
+        """Expressions in the time of a stretch, so that an event late in a run is as sharp as an early one."""
         start = sum((p.symbol for p in self.parameters if p.path == START), symengine.Integer(0))
         origins = [self.parameters[j].symbol for j in self.origins]
         # What counts from an origin does so in either time; shifted both ways it would be rounded to digits of t.
         lapses = {self.t - origin: symengine.Symbol(f"since {k}") for k, origin in enumerate(origins)}
         shift = {symbol: symbol + start for symbol in (self.t, *origins)}
         back = {dummy: lapse for lapse, dummy in lapses.items()}
-        return [symengine.sympify(self.expand(item)).subs(lapses).subs(shift).subs(back) for item in expressions]
+        items = [symengine.sympify(item) for item in expressions]
+        return [x.subs(lapses).subs(shift).subs(back) if x.free_symbols & shift.keys() else x for x in items]
 
     @cached_property
     def origins(self) -> list[int]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem.compile.preparing import PREPARING
-from surfacechem.compile.program import PIECE, Chain, Filler, Function, Program, compile_function, compile_program
+from surfacechem.compile.program import PIECE, Chain, Filler, Function, compile_function, compile_program
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, suggestion
 from surfacechem.model.checks import check_start
@@ -188,7 +188,7 @@ class Model:
         self.system = system
         self.margins = system.moving_margins()
         """The margins that can close on the way; the rest is checked at the start only."""
-        self.program: Program = compile_program(
+        program = compile_program(
             system.t,
             inputs[1 : n + 1],
             inputs[n + 1 : 2 * n + 1],
@@ -198,8 +198,9 @@ class Model:
             system.local([m.expression for m in self.margins] + [edge.guard for edge in system.edges]),
             filler=filler,
             chains=[Chain(*chain) for chain in system.chains],
-            groups=[GROUPS.get(account.kind, -1) for account in system.ledger],
+            named=list(zip(system.definitions, system.local([item.expression for item in system.named]), strict=True)),
         )
+        self.program = replace(program, groups=tuple(GROUPS.get(account.kind, -1) for account in system.ledger))
         self.jumper = Jumper(system, self.program) if system.in_stretches else None
         outputs = [system.expand(item.expression) for item in system.outputs]
         self.output_function: Function = compile_function(inputs, outputs, PIECE if system.profiles else None)

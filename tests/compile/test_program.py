@@ -1,10 +1,12 @@
 """Machine code from expressions."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import symengine as se
 
-from surfacechem.compile.program import compile_function, compile_program
+from surfacechem.compile.program import compile_function, compile_program, expanded, jacobian
 
 
 def test_derivatives_and_layout() -> None:
@@ -32,3 +34,30 @@ def test_counts_must_agree() -> None:
     t, x, dx = se.symbols("t x dx")
     with pytest.raises(ValueError, match="as many equations as states"):
         compile_program(t, [x], [dx], [], [dx, x])
+
+
+def test_what_is_named_is_differentiated_once() -> None:
+    """Each name stands twice in the next: written out, the equation has 2^60 terms."""
+    t, x, dx = se.symbols("t x dx")
+    names = se.symbols("r:61")
+    named = [
+        (names[0], x),
+        *((after, 1 + before / (1 + before)) for before, after in pairwise(names)),
+    ]
+    program = compile_program(t, [x], [dx], [], [dx - names[-1]], named=named)
+    value, slope = 0.9, 1.0
+    for _ in names[1:]:
+        value, slope = 1 + value / (1 + value), slope / (1 + value) ** 2
+    np.testing.assert_allclose(program.jacobian([0.0, 0.9, 0.0]), [-slope, 1.0], rtol=1e-12)
+
+
+def test_derivatives_are_those_of_the_written_out_equations() -> None:
+    x, y, r, q, unused = se.symbols("x y r q unused")
+    named = [(r, se.exp(-x) * y**1.5), (q, se.Piecewise((se.log(x) * r, x > 1), (r / y, True))), (unused, q**x)]
+    rows = [q * se.tanh(r) + x, y**x - q, se.Piecewise((q, y > r), (0, True))]
+    slopes, names = jacobian(rows, [x, y], named)
+    entries = expanded(names, [row.get(over, 0) for row in slopes for over in (x, y)])
+    exact = [se.diff(row, over) for row in expanded(named, rows) for over in (x, y)]
+    for point in ([0.5, 2.0], [1.5, 0.3]):
+        expected = compile_function([x, y], exact)(point)
+        np.testing.assert_allclose(compile_function([x, y], entries)(point), expected, rtol=1e-13)

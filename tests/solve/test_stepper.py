@@ -1,5 +1,7 @@
 """The compiled stepper: hard problems with known answers, events, batches, failures."""
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
@@ -320,7 +322,8 @@ RTOL = 1e-11
 def booked(rate, end, x_0=0.0, group=0):
     """A quadrature beside x' = 1 - x: its values at the end of a run, and the steps and refusals."""
     t, x, dx = se.symbols("t x dx")
-    program = compile_program(t, [x], [dx], [], [dx - 1 + x], ledger=[rate(t, x, dx)], groups=(group,))
+    program = compile_program(t, [x], [dx], [], [dx - 1 + x], ledger=[rate(t, x, dx)])
+    program = replace(program, groups=(group,))
     result = radau.solve(problem(program, [x_0], [0.0, end], RTOL, times=[end]))
     assert result.status == Status.FINISHED
     return result.ledger[0], result.counters
