@@ -336,7 +336,7 @@ def _linked(text: str) -> str:
 
 def made_variable_table() -> str:
     """What laws may read and cases may prescribe."""
-    from surfacechem.model.assemble import LOADABLE
+    from surfacechem.model.components.interface import LOADABLE
 
     can = {*LOADABLE, "T_1", "T_2", "T_c"}
     rows = [(f"`{name}`", _unit(q.unit), q.long_name, "yes" if name in can else "") for name, q in VARIABLES.items()]
