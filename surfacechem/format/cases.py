@@ -18,7 +18,7 @@ from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
 from surfacechem.format import csvtable
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
-from surfacechem.format.sections import SweepSection
+from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble
 from surfacechem.model.system import System
 from surfacechem.scene import Scene
@@ -92,6 +92,8 @@ def load_text(
     if whole != tree:
         tree, text = whole, document.dump(whole)
     case, mechanism = read_document(tree, str(base), mechanism_text)
+    if case.sweep and not (case.sweep.over or case.sweep.sample):
+        raise case.sweep.error(NOTHING_SWEPT)
     return Case(
         name=name,
         title=case.title or name,

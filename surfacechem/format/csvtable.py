@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import replace
+from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 
@@ -64,6 +65,11 @@ def table(tree: Tree, unit: str) -> Table | None:
         return Table(times=times, values=values, place=tree.place)
     except InputError as error:
         raise error.at(content.place) from None
+
+
+def digest(text: str) -> str:
+    """A short name of a table, the same for the same text."""
+    return sha256(text.encode()).hexdigest()[:12]
 
 
 class CSVText:

@@ -1,4 +1,8 @@
-"""Plans of sweeps: which parameters run over which values, and where each run ends."""
+"""Plans of sweeps: a function from the number of a run to its parameters, and where each run ends.
+
+A plan is a product of dimensions: one for each parameter of a grid, one for parameters that go together, and one for
+the draws of a sample. Nothing of it is a list of its runs, so that a plan of a billion costs no memory.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,8 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +19,54 @@ import numpy as np
 from surfacechem.documents.document import Tree
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError, suggestion
-from surfacechem.format.declarations import Context, read
-from surfacechem.format.sections import LINEAR, MOST_AXES, MOST_RUNS, SWEPT, UNTIL, RangeSection, SweepSection
+from surfacechem.format import csvtable
+from surfacechem.format.declarations import Context, keys, read
+from surfacechem.format.draws import Array, Distribution, Drawn, Index, Lognormal, Normal, Sample, Uniform
+from surfacechem.format.draws import recorded_sample as _recorded_sample
+from surfacechem.format.sections import (
+    GRID,
+    LINEAR,
+    MOST_AXES,
+    NOTHING_SWEPT,
+    SWEPT,
+    UNTIL,
+    DistributionSection,
+    RangeSection,
+    SweepSection,
+    TableSection,
+    UniformSection,
+)
 
 # Statistics of the load at rupture, with their words, where runs end at a load.
 STATISTICS = {"mode": "most probable", "median": "median", "mean": "mean"}
+
+RUN = "run"
+"""The dimension along which several parameters change together."""
+
+
+@dataclass(frozen=True)
+class Spaced:
+    """Values from the first to the last, at equal distances or ratios; none of them is kept."""
+
+    first: float
+    last: float
+    count: int
+    logarithmic: bool = False
+
+    def __len__(self) -> int:
+        """Number of values."""
+        return self.count
+
+    def at(self, index: Index) -> Array:
+        """The values of these numbers, as NumPy's linspace and geomspace have them."""
+        first, last = (np.log10(x) if self.logarithmic else x for x in (self.first, self.last))
+        step = (last - first) / max(self.count - 1, 1)
+        values = np.asarray(index * step + first, dtype=float)
+        values = np.power(10.0, values) if self.logarithmic else values
+        # Both ends are as they are given; a power of ten would round them.
+        values[index == self.count - 1] = self.last
+        values[index == 0] = self.first
+        return values
 
 
 @dataclass(frozen=True)
@@ -26,49 +74,108 @@ class Axis:
     """A swept parameter or initial value: its path, its values in SI, and whether they are spaced by ratios."""
 
     path: str
-    values: Sequence[float]
+    values: Sequence[float] | Spaced
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
-        """Values are at least one, finite and different from each to the next."""
-        if not len(self.values) or not np.all(np.isfinite(self.values)):
+        """Values are at least one and finite."""
+        ends = self.at(np.array([0, -1]) % len(self)) if isinstance(self.values, Spaced) else self.values
+        if not len(self) or not np.all(np.isfinite(ends)):
             raise InputError(f"{self.path} needs finite values, at least one.", path="sweep")
-        if len(set(self.values)) != len(self.values):
-            raise InputError(f"{self.path} has a value twice.", path="sweep")
+
+    def __len__(self) -> int:
+        """Number of values."""
+        return len(self.values)
+
+    def at(self, index: Index) -> Array:
+        """The values of these numbers."""
+        return self.values.at(index) if isinstance(self.values, Spaced) else self._listed[index]
+
+    @cached_property
+    def _listed(self) -> Array:
+        return np.asarray(self.values, dtype=float)
+
+    @property
+    def every(self) -> Array:
+        """All values."""
+        return self.at(np.arange(len(self)))
+
+    @property
+    def has_equals(self) -> bool:
+        """Whether a value is there twice."""
+        if isinstance(self.values, Spaced):
+            return len(self) > 1 and self.values.first == self.values.last
+        return len(set(self.values)) != len(self)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What makes it again."""
+        if isinstance(self.values, Spaced):
+            return {"path": self.path, **vars(self.values)}
+        return {"path": self.path, "values": list(self.values), "logarithmic": self.logarithmic}
 
 
 @dataclass(frozen=True)
 class Plan:
     """What is swept. With ``until`` every run ends where that prescribed variable, a ramp, reaches the value."""
 
-    axes: Sequence[Axis]
+    axes: Sequence[Axis] = ()
     until: tuple[str, float] | None = None
+    zipped: bool = False
+    """Whether the values of the axes go together, instead of as a grid."""
+    sample: Sample | None = None
 
     def __post_init__(self) -> None:
-        """One or two parameters, and no more runs than memory holds."""
-        if not 1 <= len(self.axes) <= MOST_AXES or len({axis.path for axis in self.axes}) != len(self.axes):
-            message = f"a sweep has one or {MOST_AXES} different parameters, not {len(self.axes)}."
+        """Different parameters, as many as a grid may have; those that go together have as many values."""
+        if not self.paths or len(self.axes) > MOST_AXES or len(set(self.paths)) != len(self.paths):
+            message = f"a sweep has different parameters, {MOST_AXES} at most; not {', '.join(self.paths) or 'none'}."
             raise InputError(message, path="sweep")
-        if math.prod(self.shape) > MOST_RUNS:
-            message = f"a sweep of {math.prod(self.shape)} runs is too large; {MOST_RUNS} at most."
-            raise InputError(message, path="sweep")
+        if self.zipped and len({len(axis) for axis in self.axes}) > 1:
+            counts = ", ".join(f"{len(axis)} of {axis.path}" for axis in self.axes)
+            raise InputError(f"values that are combined by zip are as many of each, not {counts}.", path="sweep")
+        if self.zipped and self.sample:
+            raise InputError("a sample goes with a grid of values, not with `combine: zip`.", path="sweep")
+        for axis in () if self.zipped else self.axes:
+            if axis.has_equals:
+                raise InputError(f"{axis.path} has a value twice.", path="sweep")
 
     @property
+    def paths(self) -> list[str]:
+        """Paths of all parameters."""
+        return [*(axis.path for axis in self.axes), *(self.sample.draws if self.sample else ())]
+
+    @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
+        """Number of values along each dimension: those of the grid, or the one of what goes together; then the draws
+        of the sample.
+        """
+        grid = (len(self.axes[0]),) if self.zipped else tuple(len(axis) for axis in self.axes)
+        return (*grid, *((self.sample.runs,) if self.sample else ()))
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return math.prod(self.shape)
+
+    def at(self, index: Index) -> dict[str, Array]:
+        """The parameters of the runs of these numbers, by path, the last dimension fastest."""
+        places = np.unravel_index(np.asarray(index, dtype=np.int64), self.shape)
+        grid = [places[0]] * len(self.axes) if self.zipped else places
+        values = {axis.path: axis.at(place) for axis, place in zip(self.axes, grid, strict=False)}
+        return values | (self.sample.at(places[-1]) if self.sample else {})
 
     @property
     def points(self) -> list[dict[str, float]]:
-        """The swept values of each run by path, the last axis fastest."""
-        paths = [axis.path for axis in self.axes]
-        return [dict(zip(paths, point, strict=True)) for point in product(*(axis.values for axis in self.axes))]
+        """The swept values of each run by path, the last dimension fastest."""
+        values = self.at(np.arange(self.size))
+        return [dict(zip(values, row, strict=True)) for row in zip(*(x.tolist() for x in values.values()), strict=True)]
 
     @property
     def record(self) -> str:
         """The plan as a dataset records it."""
-        axes = [{"path": a.path, "values": list(a.values), "logarithmic": a.logarithmic} for a in self.axes]
-        return json.dumps({"axes": axes, "until": list(self.until) if self.until else None})
+        content = {"axes": [axis.record for axis in self.axes], "until": list(self.until) if self.until else None}
+        more = {"zipped": True} if self.zipped else {}
+        return json.dumps({**content, **more, **({"sample": self.sample.record} if self.sample else {})})
 
 
 def recorded_plan(record: object) -> Plan:
@@ -79,12 +186,23 @@ def recorded_plan(record: object) -> Plan:
             raise TypeError(values)
         return tuple(map(float, values))
 
+    def axis(content: Any) -> Axis:
+        logarithmic = content["logarithmic"] is True
+        if "values" in content:
+            return Axis(str(content["path"]), numbers(content["values"]), logarithmic)
+        first, last = numbers((content["first"], content["last"]))
+        return Axis(str(content["path"]), Spaced(first, last, int(content["count"]), logarithmic), logarithmic)
+
     try:
         content = json.loads(str(record))
-        axes = [Axis(str(a["path"]), numbers(a["values"]), a["logarithmic"] is True) for a in content["axes"]]
-        until = content["until"]
-        return Plan(axes, (str(until[0]), numbers(until[1:])[0]) if until else None)
-    except (LookupError, TypeError, ValueError, RecursionError):
+        until, sample = content["until"], content.get("sample")
+        return Plan(
+            [axis(each) for each in content["axes"]],
+            (str(until[0]), numbers(until[1:])[0]) if until else None,
+            content.get("zipped") is True,
+            _recorded_sample(sample) if sample else None,
+        )
+    except (AttributeError, LookupError, TypeError, ValueError, RecursionError):
         raise InputError("the attribute 'sweep' is no plan of a sweep.") from None
 
 
@@ -94,14 +212,24 @@ def plan_of(section: SweepSection, units: Mapping[str, str], until: Mapping[str,
     ``until`` goes before what the section says of it.
     """
     ends = until or section.until
+    if not section.over and section.sample is None:
+        raise section.error(NOTHING_SWEPT)
     axes = [_axis(path, tree, units) for path, tree in section.over.items()]
-    return Plan(axes, next(iter(ends.items())) if ends else None)
+    sample = None
+    if (drawn := section.sample) is not None:
+        known = {_known(path, tree, units): tree for path, tree in drawn.of.items()}
+        draws = {path: _distribution(path, tree, units[path]) for path, tree in known.items()}
+        sample = Sample(draws, drawn.runs, drawn.method, drawn.seed)
+    return Plan(axes, next(iter(ends.items())) if ends else None, section.combine != GRID, sample)
 
 
 def read_sweep(tree: Tree, usual: SweepSection | None = None) -> SweepSection:
-    """A sweep; where it does not say how runs end, they end as in the usual one."""
-    section = read(SweepSection, tree, Context())
-    return section if section.has("until") or usual is None else SweepSection(over=section.over, until=usual.until)
+    """A sweep; what it does not say is as in the usual one."""
+    section = read(SweepSection, csvtable.embedded(tree, str(Path.cwd())), Context())
+    for name in keys(SweepSection) if usual is not None else ():
+        if not section.has(name):
+            setattr(section, name, getattr(usual, name))
+    return section
 
 
 def read_until(tree: Tree) -> Mapping[str, float]:
@@ -109,15 +237,57 @@ def read_until(tree: Tree) -> Mapping[str, float]:
     return UNTIL.read(tree, "until", Context())
 
 
-def _axis(path: str, tree: Tree, units: Mapping[str, str]) -> Axis:
+def _known(path: str, tree: Tree, units: Mapping[str, str]) -> str:
+    """The path of a parameter; InputError where there is none."""
     path = parameter_path(path, units)
     if path not in units:
         raise InputError(f"no parameter '{path}' to sweep.{suggestion(path, units)}", tree.place)
+    return path
+
+
+def _axis(path: str, tree: Tree, units: Mapping[str, str]) -> Axis:
+    path = _known(path, tree, units)
     values = SWEPT.read(tree, path, Context(x=units[path]))
     if not isinstance(values, RangeSection):
         return Axis(path, list(values))
-    if values.spacing == LINEAR:
-        return Axis(path, np.linspace(values.first, values.last, values.points).tolist())
-    if not (values.first > 0 and values.last > 0):
+    logarithmic = _logarithmic(values)
+    return Axis(path, Spaced(values.first, values.last, values.points, logarithmic), logarithmic)
+
+
+def _logarithmic(values: RangeSection | UniformSection) -> bool:
+    """Whether a range is spaced by ratios; InputError where its ends have none."""
+    if values.spacing != LINEAR and not (values.first > 0 and values.last > 0):
         raise values.error("a logarithmic range needs ends above zero.", "spacing")
-    return Axis(path, np.geomspace(values.first, values.last, values.points).tolist(), logarithmic=True)
+    return values.spacing != LINEAR
+
+
+def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
+    section = read(DistributionSection, tree, Context(x=unit))
+    given = [kind for kind in (section.uniform, section.normal, section.lognormal, section.table) if kind is not None]
+    if len(given) != 1:
+        raise tree.error(
+            "a distribution is one of uniform, normal, lognormal and table, `normal: {mean: ..., std: ...}`."
+        )
+    (kind,) = given
+    if isinstance(kind, UniformSection):
+        if not kind.first < kind.last:
+            raise kind.error(f"the values from {kind.first:g} to {kind.last:g} do not increase.")
+        return Uniform(kind.first, kind.last, _logarithmic(kind))
+    if isinstance(kind, TableSection):
+        return _column(kind, path, unit)
+    if section.normal is not None:
+        return Normal(section.normal.mean, section.normal.std)
+    assert section.lognormal is not None
+    return Lognormal(section.lognormal.median, section.lognormal.sigma)
+
+
+def _column(table: TableSection, path: str, unit: str) -> Drawn:
+    """A column of a table, whose rows all columns of the same text share."""
+    if not table.csv:
+        raise table.error("the table needs a `file`.")
+    variable = path.rpartition(".")[2]
+    content = csvtable.CSVText(table.tree.value["csv"])
+    values = content.column(table.column or variable, unit, variable)
+    if not values:
+        raise table.error("the table has no rows.")
+    return Drawn(tuple(values), source=csvtable.digest(table.csv))

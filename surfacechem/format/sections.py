@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, cast
 
 from surfacechem import laws, references
@@ -66,9 +67,12 @@ EVOLVING = ("g_n", "v_n", "u_t", "u_t2", "v_t", "v", "v_2", "g_t", "w_n", "w_t",
 
 LUMP, INSULATED, QUADRATIC = "lump", "insulated", "quadratic"
 LINEAR, LOGARITHMIC = SPACINGS = ("linear", "logarithmic")
+GRID = "grid"
 
 MOST_OUTPUTS = MOST_RUNS = 1_000_000
-MOST_AXES = 2
+
+# Parameters of a grid, and values of one or draws of a sample: of Sobol' points there are no more.
+MOST_AXES, MOST_POINTS = 32, 2**30
 
 # Ratio of the widths of the first and the last cell at most, so that they keep their order in doubles.
 STEEPEST = 1e6
@@ -392,7 +396,7 @@ class RangeSection(Section):
 
     first: float = quantity("[x]", "first value", REQUIRED, name="from")
     last: float = quantity("[x]", "last value", REQUIRED, name="to")
-    points: int = key(Whole(1, MOST_RUNS), "number of values, both ends included", REQUIRED)
+    points: int = key(Whole(1, MOST_POINTS), "number of values, both ends included", REQUIRED)
     spacing: str = key(OneOf("spacing", lambda: SPACINGS), "of the values", LINEAR)
 
 
@@ -401,12 +405,84 @@ OVER = "over: {loading.f.ramp.rate: {from: 1 pN/s, to: 1 nN/s, points: 31}}"
 # Values of a swept parameter, in its unit.
 SWEPT = Shapes(items=ListOf(amount("[x]"), "[1, 2, 3]", at_least=1), mapping=Nested(RangeSection))
 
-SWEPT_BY_PATH = Entries(
-    others=Later(SWEPT),
-    pattern=lambda: rf"({'|'.join(keys(Document))})(\.[^.]+)*",
-    at_most=MOST_AXES,
-    wanted=f"a sweep needs `over`: one or two parameters, for example `{OVER}`",
-)
+
+def _by_path(content: Content, wanted: str) -> Entries:
+    return Entries(
+        others=Later(content),
+        pattern=lambda: rf"({'|'.join(keys(Document))})(\.[^.]+)*",
+        at_most=MOST_AXES,
+        wanted=wanted,
+    )
+
+
+class UniformSection(Section):
+    """a value between two, each as likely"""
+
+    called = "a uniform distribution"
+
+    first: float = quantity("[x]", "least value", REQUIRED, name="from")
+    last: float = quantity("[x]", "largest value", REQUIRED, name="to")
+    spacing: str = key(OneOf("spacing", lambda: SPACINGS), "whether values or their ratios are as likely", LINEAR)
+
+
+class NormalSection(Section):
+    """a normal distribution"""
+
+    called = "a normal distribution"
+
+    mean: float = quantity("[x]", "mean", REQUIRED)
+    std: float = key(Number(Spec("[x]", "standard deviation", varies=False, at_least=0), True), default=REQUIRED)
+
+
+class LognormalSection(Section):
+    """a distribution whose logarithm is normal"""
+
+    called = "a lognormal distribution"
+
+    median: float = quantity("[x]", "median", REQUIRED, above=0)
+    sigma: float = quantity("1", "standard deviation of the natural logarithm", REQUIRED, at_least=0)
+
+
+class TableSection(Section):
+    """values of a column of a CSV file, whose rows are drawn; columns of one file by the same row"""
+
+    called = "a table"
+
+    file: str | None = key(Text(), "a CSV file beside the case; its first line is like K_0 [J/m^2], mu [1]")
+    csv: str | None = key(Text(), "the text of such a file")
+    column: str | None = key(Text(), "the column, if not named after the parameter")
+
+
+class DistributionSection(Section):
+    """how an uncertain parameter is distributed: one of these"""
+
+    called = "a distribution"
+
+    uniform: UniformSection | None = key(Nested(UniformSection))
+    normal: NormalSection | None = key(Nested(NormalSection))
+    lognormal: LognormalSection | None = key(Nested(LognormalSection))
+    table: TableSection | None = key(Nested(TableSection))
+
+
+OF = "of: {interface.potential.bond-energy.K_0: {normal: {mean: 300 J/m^2, std: 30 J/m^2}}}"
+
+
+class SampleSection(Section):
+    """draws of uncertain parameters"""
+
+    called = "a sample"
+
+    of: Mapping[str, Tree] = key(
+        _by_path(Nested(DistributionSection), f"a sample needs `of`: distributions of parameters, for example `{OF}`"),
+        f"distributions of parameters by path, for example `{OF}`",
+        REQUIRED,
+    )
+    runs: int = key(Whole(1, MOST_POINTS), "number of draws; of Sobol' points a power of two is best", REQUIRED)
+    method: str = key(
+        OneOf("method", lambda: ("sobol", "latin-hypercube", "random")), "how the draws are spread", "sobol"
+    )
+    seed: int = key(Whole(0, 2**31), "another number, another sample", 0)
+
 
 # A prescribed variable and the value at which each run of a sweep ends.
 UNTIL = Entries(
@@ -418,16 +494,23 @@ UNTIL = Entries(
 )
 
 
+NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER}`."
+
+
 class SweepSection(Section):
     """parameters of many runs"""
 
     called = "a sweep"
 
     over: Mapping[str, Tree] = key(
-        SWEPT_BY_PATH,
-        f"values of one or two parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
-        REQUIRED,
+        _by_path(SWEPT, f"a sweep needs `over`: values of parameters, for example `{OVER}`"),
+        f"values of parameters by path, a list or `{{from, to, points, spacing}}`, for example `{OVER}`",
+        MappingProxyType({}),
     )
+    combine: str = key(
+        OneOf("way to combine", lambda: (GRID, "zip")), "every value with every other, or the first of each, ...", GRID
+    )
+    sample: SampleSection | None = key(Nested(SampleSection))
     until: Mapping[str, float] | None = key(
         UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"
     )

@@ -12,12 +12,14 @@ from matplotlib.figure import Figure
 
 from surfacechem.errors import InputError, suggestion
 from surfacechem.format.plans import STATISTICS, recorded_plan
-from surfacechem.format.sections import MOST_AXES
 from surfacechem.plots import style
 from surfacechem.plots.run import KINDS, of_kind
 from surfacechem.plots.style import COLOURS, Array, meaning, symbol, unit, unit_text, varies
 
 PREFIXES = tuple((10.0 ** (-3 * k), prefix) for k, prefix in enumerate(["", "m", "μ", "n", "p", "f"]))
+
+# Parameters of a grid that are drawn.
+MOST_DRAWN = 2
 
 # Values of a second parameter that are drawn as curves of their own.
 MOST_CURVES = 7
@@ -27,7 +29,7 @@ def figure(dataset: xarray.Dataset, variables: Sequence[str] | None = None) -> F
     """The figure of a sweep: the load at rupture, else final values."""
     axes = _axes(dataset) if "status" in dataset else []
     style.check(dataset, {}, {"status": tuple(axes)})
-    if not all(name in dataset.coords for name in axes) or not 1 <= len(axes) <= MOST_AXES:
+    if not all(name in dataset.coords for name in axes) or not 1 <= len(axes) <= MOST_DRAWN:
         raise InputError("the dataset does not hold the parameters of a sweep.")
     style.check(dataset, {"time_reached": tuple(axes), **{name: (name,) for name in axes}})
     panels = _panels(dataset, variables)

@@ -225,27 +225,37 @@ class Simulation:
         until: Mapping[str, object] | None = None,
         changes: Mapping[str, float | str] | None = None,
         threads: int | None = None,
+        sample: Mapping[str, object] | None = None,
+        combine: str | None = None,
     ) -> SweepSolution:
-        """Run over values of one or two parameters in one call of the compiled loop; nothing is compiled twice.
+        """Run over values of parameters in one call of the compiled loop; nothing is compiled twice.
 
-        ``over`` maps paths to lists of values or to ranges {from, to, points, spacing}, ``until`` a prescribed ramp to
-        the value at which each run ends; what is not given is that of the section ``sweep`` of the case.
+        ``over`` maps paths to lists of values or to ranges {from, to, points, spacing}, which are a grid unless
+        ``combine`` is "zip"; ``sample`` is {of: distributions by path, runs, method, seed}, ``until`` a prescribed ramp
+        to the value at which each run ends. What is not given is that of the section ``sweep`` of the case.
         """
-        return self.sweep_plan(self._plan(over, until), changes, threads)
+        return self.sweep_plan(self.plan(over, until, sample, combine), changes, threads)
 
     def sweep_plan(
         self, plan: Plan, changes: Mapping[str, float | str] | None = None, threads: int | None = None
     ) -> SweepSolution:
-        """Run a plan whose values are in SI."""
+        """Run a plan whose values are in SI, with all of its runs in memory."""
+        from surfacechem.format.sections import MOST_RUNS
         from surfacechem.runs import sweeps
 
+        if plan.size > MOST_RUNS:
+            message = f"a sweep of {plan.size} runs is too large; {MOST_RUNS} at most."
+            raise InputError(message, path="sweep")
         constants = self.system.constants
         values = self._values(changes or {})
         # A default that is swept needs a symbol, so that the equations are assembled for any other value of it.
-        swept = {axis.path: axis.values for axis in plan.axes if axis.path in constants}
+        ends = plan.at(np.array([0, plan.size - 1]))
         others = {
-            path: next((x for x in xs if x != constants[path][1]), math.nextafter(constants[path][1], math.inf))
-            for path, xs in swept.items()
+            path: next(
+                (x for x in xs.tolist() if x != constants[path][1]), math.nextafter(constants[path][1], math.inf)
+            )
+            for path, xs in ends.items()
+            if path in constants
         }
         if (freed := self._with_freed({**values, **others})) is not self:
             return freed.sweep_plan(plan, values, threads)
@@ -256,14 +266,22 @@ class Simulation:
         cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
         return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
 
-    def _plan(self, over: Mapping[str, object] | None, until: Mapping[str, object] | None) -> Plan:
+    def plan(
+        self,
+        over: Mapping[str, object] | None = None,
+        until: Mapping[str, object] | None = None,
+        sample: Mapping[str, object] | None = None,
+        combine: str | None = None,
+    ) -> Plan:
+        """The plan of a sweep in SI, given as to :meth:`sweep`: a function from the number of a run to its values."""
         from surfacechem.format.plans import plan_of, read_sweep, read_until
 
         section = self.case.sweep
-        if over is not None:
-            lists = {path: x.tolist() if isinstance(x, np.ndarray) else x for path, x in over.items()}
-            given = {"over": lists}
-            section = read_sweep(from_plain(given, Place(path="sweep")), section)
+        lists = {path: x.tolist() if isinstance(x, np.ndarray) else x for path, x in (over or {}).items()}
+        given = {"over": None if over is None else lists, "combine": combine, "sample": sample}
+        if any(value is not None for value in given.values()):
+            said = {name: value for name, value in given.items() if value is not None}
+            section = read_sweep(from_plain(said, Place(path="sweep")), section)
         if section is None:
             raise InputError(
                 "a sweep needs `sweep: {over: ...}` in the case, or parameters to sweep over.", path="sweep"

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from surfacechem.results.event_table import entropy_destroyed, event_counts, event_summary
 from surfacechem.solve.jumps import ADMISSIBLE
 
 if TYPE_CHECKING:
+    from surfacechem.format.plans import Plan
     from surfacechem.model.system import System
     from surfacechem.results.accuracy import Accuracy
     from surfacechem.results.audit import Audit
@@ -115,12 +118,7 @@ def _balances(books: Audit) -> str:
 def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
     """What was swept, how the runs ended, how accurate and how fast they were, and where they are."""
     lines = [solution.title or "untitled"]
-    spans = {
-        name: f"{axis.values[0]:g} to {axis.values[-1]:g}" if len(axis.values) > 1 else f"{axis.values[0]:g}"
-        for name, axis in solution.axes.items()
-    }
-    axes = [f"{name} ({spans[name]}, {len(axis.values)} values)" for name, axis in solution.axes.items()]
-    lines.append(labelled("swept", " by ".join(axes)))
+    lines.append(labelled("swept", swept_in_words(solution.plan, solution.parameters)))
     lines.append(labelled("solved", _solved(solution.system, solution.run)))
     lines.append(labelled("ended", f"{len(solution.runs)} runs: {solution.ends}"))
     if accuracy := solution.accuracy:
@@ -142,6 +140,21 @@ def sweep_summary(solution: SweepSolution, written: Path | None) -> str:
     return "\n".join(lines)
 
 
+def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
+    """The parameters of a plan, with how many values of each and between which, and the draws of a sample."""
+    ends = [axis.at(np.array([0, -1]) % len(axis)) for axis in plan.axes]
+    axes = [
+        f"{name} ({first:g}{f' to {last:g}' if len(axis) > 1 else ''}, {len(axis)} values)"
+        for name, axis, (first, last) in zip(names, plan.axes, ends, strict=False)
+    ]
+    text = (" with " if plan.zipped else " by ").join(axes)
+    if plan.sample is None:
+        return text
+    drawn = ", ".join([*names][len(plan.axes) :])
+    sample = f"{plan.sample.runs} draws of {drawn} ({plan.sample.method}, seed {plan.sample.seed})"
+    return f"{text} by {sample}" if text else sample
+
+
 def _sweep_events(solution: SweepSolution) -> str:
     """What jumped in all runs, and what the second law says to it."""
     runs = [run.jumps for run in solution.runs]
@@ -154,8 +167,9 @@ def _sweep_events(solution: SweepSolution) -> str:
         found.append(f"{verdict} in {count} of {len(runs)} runs")
     destroyed = [entropy_destroyed(run) for run in runs]
     if (most := max(destroyed)) > 0:
-        at = zip(solution.axes, solution.plan.points[destroyed.index(most)].values(), strict=True)
-        found.append(f"at worst {-most:.3g} J/(m^2 K) at {', '.join(f'{name} = {value:g}' for name, value in at)}")
+        values = solution.plan.at(np.array([destroyed.index(most)]))
+        at = ", ".join(f"{name} = {values[path][0]:g}" for name, path in solution.parameters.items())
+        found.append(f"at worst {-most:.3g} J/(m^2 K) at {at}")
     return f"{event_counts(jumps)}; {', '.join(found) or 'all admissible'}"
 
 

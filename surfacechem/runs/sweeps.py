@@ -16,7 +16,7 @@ from surfacechem import references
 from surfacechem.errors import InputError
 from surfacechem.expressions import derivative
 from surfacechem.format import Case
-from surfacechem.format.plans import STATISTICS, Axis, Plan
+from surfacechem.format.plans import RUN, STATISTICS, Plan
 from surfacechem.model.system import System
 from surfacechem.references.base import SceneView
 from surfacechem.results.accuracy import UNKNOWN, CellErrors, second_tolerance
@@ -175,6 +175,40 @@ def _of_statistics(found: Statistics, exact: references.Reference | Statistics) 
 # -- the dataset ------------------------------------------------------------------------------------------------------
 
 
+def parameter_names(system: System, plan: Plan) -> dict[str, str]:
+    """Paths of the swept parameters by their names in the dataset: the last parts of a path that are no other's."""
+    taken = {*quantities(system), *system.inside, "time", RUN}
+    found: dict[str, str] = {}
+    for path in plan.paths:
+        parts = [p.replace("-", "_").replace("[", "_").strip("]") for p in path.removesuffix(".level").split(".")]
+        names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
+        found[next((name for name in names if name not in taken | set(found)), f"{names[-1]}_swept")] = path
+    return found
+
+
+def dimensions(plan: Plan, names: Mapping[str, str]) -> dict[str, int]:
+    """Sizes of the dimensions of a sweep by name: those of a grid are its parameters."""
+    own = [RUN] if plan.zipped else list(names)[: len(plan.axes)]
+    return dict(zip([*own, *([RUN] if plan.sample else [])], plan.shape, strict=True))
+
+
+def parameter_columns(system: System, plan: Plan, names: Mapping[str, str]) -> list[Column]:
+    """The values of the swept parameters, each along its own dimension."""
+    columns = []
+    drawn = plan.sample.at(np.arange(plan.sample.runs)) if plan.sample else {}
+    values = {axis.path: axis.every for axis in plan.axes} | drawn
+    for name, path in names.items():
+        state = next((s for s in system.states if s.path == path), None)
+        if state is not None:
+            unit, text = state.at_start[0].unit, f"initial {state.at_start[0].long_name}"
+        else:
+            spec = next(p.spec for p in system.parameters if p.path == path)
+            unit, text = spec.unit, f"{spec.text} ({path})"
+        along = RUN if plan.zipped or path in drawn else name
+        columns.append(Column(name, (along,), values[path], unit, text))
+    return columns
+
+
 @dataclass(frozen=True, repr=False)
 class SweepSolution(Results):
     """What a sweep hands back: its runs in the order of :attr:`Plan.points`, their error, and their dataset."""
@@ -238,16 +272,14 @@ class SweepSolution(Results):
         return "failed" if "failed" in every else "stopped" if stopped else "finished"
 
     @cached_property
-    def axes(self) -> dict[str, Axis]:
-        """The swept parameters by the names of their dimensions."""
-        taken = {*quantities(self.system), *self.system.inside, "time"}
-        axes: dict[str, Axis] = {}
-        for axis in self.plan.axes:
-            path = axis.path.removesuffix(".level").split(".")
-            parts = [p.replace("-", "_").replace("[", "_").strip("]") for p in path]
-            names = ["_".join(parts[-k:]) for k in range(1, len(parts) + 1)]
-            axes[next((name for name in names if name not in taken | set(axes)), f"{names[-1]}_swept")] = axis
-        return axes
+    def parameters(self) -> dict[str, str]:
+        """Paths of the swept parameters, by their names in the dataset."""
+        return parameter_names(self.system, self.plan)
+
+    @cached_property
+    def axes(self) -> dict[str, int]:
+        """Sizes of the dimensions of the sweep: those of a grid are its parameters."""
+        return dimensions(self.plan, self.parameters)
 
     @property
     def inner(self) -> str:
@@ -257,7 +289,7 @@ class SweepSolution(Results):
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """Every variable of the dataset, the coordinates first."""
-        shape = dict(zip(self.axes, self.plan.shape, strict=True))
+        shape = self.axes
         along = {column.name: column for column in quantity_columns(self.runs, self.inner, shape)}
         load = along.pop(self.inner, None)
         columns = [*self._coordinates(load), *along.values(), *self._of_runs(), *event_columns(self.runs, shape)]
@@ -273,15 +305,7 @@ class SweepSolution(Results):
 
     def _coordinates(self, load: Column | None) -> list[Column]:
         """The swept parameters, and the times or, where a load ends the runs, the values of this."""
-        columns = []
-        for name, axis in self.axes.items():
-            state = next((s for s in self.system.states if s.path == axis.path), None)
-            if state is not None:
-                unit, text = state.at_start[0].unit, f"initial {state.at_start[0].long_name}"
-            else:
-                spec = next(p.spec for p in self.system.parameters if p.path == axis.path)
-                unit, text = spec.unit, f"{spec.text} ({axis.path})"
-            columns.append(Column(name, (name,), np.asarray(axis.values, dtype=float), unit, text))
+        columns = parameter_columns(self.system, self.plan, self.parameters)
         times = np.array([run.result.problem.times for run in self.runs])
         if self.plan.until is None or load is None:
             return [*columns, Column("time", ("time",), times[0], "s", "time since the start")]

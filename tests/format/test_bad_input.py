@@ -110,7 +110,7 @@ MISTAKES = [
     (
         "reference: bonding",
         "reference: bonding\nsweep: {}",
-        "21: sweep: a sweep needs `over`: values of one or two para",
+        "21: sweep: a sweep needs `over` or `sample`: values of para",
     ),
     (
         "reference: bonding",

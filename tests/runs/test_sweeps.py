@@ -229,7 +229,7 @@ def test_jumps_of_a_sweep_are_judged_as_those_of_a_run():
 )
 def test_paths_of_a_sweep_are_those_of_the_case(case, path, value, written):
     simulation = surfacechem.load(case)
-    assert simulation._plan({path: [value]}, None).axes[0].path == (written or path)
+    assert simulation.plan({path: [value]}).axes[0].path == (written or path)
     if path != "mechanics.normal.k":
         changed = surfacechem.load(case, {path: value}).model.values()
         assert changed == simulation.model.values(simulation._values({path: value}))

@@ -1,0 +1,212 @@
+"""Samples of uncertain parameters: their distributions, and the numbers that each run draws, from its index alone."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+INSIDE = 2.0**-53
+"""What is added to numbers in [0, 1), so that none is zero, where a normal distribution has no value."""
+
+ROUNDS = 6
+"""Rounds of a permutation: four make one that cannot be told from a random one, two more cost nothing."""
+
+
+class Distribution(ABC):
+    """How the value of a parameter is distributed."""
+
+    source: str = ""
+    """What is drawn once for all parameters that have it in common; empty where each is drawn by itself."""
+
+    @abstractmethod
+    def at(self, u: Array) -> Array:
+        """Values below which the parts ``u`` of all draws lie."""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What makes it again."""
+        return {"kind": type(self).__name__, **asdict(self)}  # type: ignore[call-overload]
+
+
+@dataclass(frozen=True)
+class Uniform(Distribution):
+    """Each value between two is as likely, or each ratio."""
+
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    def at(self, u: Array) -> Array:
+        if not self.logarithmic:
+            return self.low + (self.high - self.low) * u
+        values: Array = np.exp(np.log(self.low) + np.log(self.high / self.low) * u)
+        return values
+
+
+@dataclass(frozen=True)
+class Normal(Distribution):
+    """A mean and a standard deviation."""
+
+    mean: float
+    std: float
+
+    def at(self, u: Array) -> Array:
+        return self.mean + self.std * _standard(u)
+
+
+@dataclass(frozen=True)
+class Lognormal(Distribution):
+    """A median, and the standard deviation of the logarithm."""
+
+    median: float
+    sigma: float
+
+    def at(self, u: Array) -> Array:
+        values: Array = self.median * np.exp(self.sigma * _standard(u))
+        return values
+
+
+@dataclass(frozen=True)
+class Drawn(Distribution):
+    """The rows of a table, each as likely; columns of one table are drawn by the same row."""
+
+    values: tuple[float, ...]
+    source: str = ""
+
+    def at(self, u: Array) -> Array:
+        return np.array(self.values)[np.minimum((u * len(self.values)).astype(np.int64), len(self.values) - 1)]
+
+
+KINDS: Mapping[str, Callable[..., Distribution]] = {kind.__name__: kind for kind in (Uniform, Normal, Lognormal, Drawn)}
+
+
+def _standard(u: Array) -> Array:
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(u))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """So many draws of parameters by path: a function from the index of a run, the method and the seed."""
+
+    draws: Mapping[str, Distribution]
+    runs: int
+    method: str
+    seed: int = 0
+
+    def at(self, index: Index) -> dict[str, Array]:
+        """The values of the runs of these numbers, by path."""
+        # Columns of one table are one dimension, so that they are taken from the same row.
+        sources = list(dict.fromkeys(draw.source or path for path, draw in self.draws.items()))
+        own, where = np.unique(index, return_inverse=True)
+        u = METHODS[self.method](own, self.runs, len(sources), self.seed)[where] + INSIDE
+        return {path: draw.at(u[:, sources.index(draw.source or path)]) for path, draw in self.draws.items()}
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What makes it again."""
+        draws = {path: draw.record for path, draw in self.draws.items()}
+        return {"draws": draws, "runs": self.runs, "method": self.method, "seed": self.seed}
+
+
+def recorded_sample(content: Mapping[str, Any]) -> Sample:
+    """The sample of a record; a LookupError, TypeError or ValueError where that is none."""
+    draws = {}
+    for path, record in content["draws"].items():
+        given = {name: tuple(value) if isinstance(value, list) else value for name, value in record.items()}
+        draws[str(path)] = KINDS[str(given.pop("kind"))](**given)
+    runs, seed = int(content["runs"]), int(content["seed"])
+    return Sample(draws, runs, [*METHODS][[*METHODS].index(content["method"])], seed)
+
+
+# -- numbers in [0, 1), a row for each of increasing indices and a column for each of some dimensions ------------------
+
+
+def _blocks(index: Index) -> Iterator[tuple[int, int]]:
+    """First and number of indices that follow each other."""
+    starts = np.flatnonzero(np.diff(index, prepend=-2) != 1)
+    yield from zip(index[starts].tolist(), np.diff(starts, append=len(index)).tolist(), strict=True)
+
+
+def _random(index: Index, runs: int, dimensions: int, seed: int) -> Array:
+    rows = []
+    for first, count in _blocks(index):
+        bits = np.random.Philox(key=seed)
+        before = first * dimensions
+        bits.advance(before // 4)  # a step of this generator makes four numbers; what is over is left out below
+        numbers = np.random.Generator(bits).random(before % 4 + count * dimensions)
+        rows.append(numbers[before % 4 :].reshape(count, dimensions))
+    return np.concatenate(rows)
+
+
+def _sobol(index: Index, runs: int, dimensions: int, seed: int) -> Array:
+    """Scrambled Sobol' points, of which each stretch of 2^k is evenly spread.
+
+    Source: Owen (1998), J. Complexity 14, 466-489; as in SciPy.
+    """
+    from scipy.stats.qmc import Sobol
+
+    engine = Sobol(dimensions, rng=np.random.default_rng(seed))
+    rows, done = [], 0
+    for first, count in _blocks(index):
+        if first > done:
+            engine.fast_forward(first - done)
+        # By itself, as the library warns of a first number of points that is no power of two.
+        rows += [engine.random(1)] if first == 0 else []
+        rows += [engine.random(left)] if (left := count - (first == 0)) else []
+        done = first + count
+    return np.concatenate(rows)
+
+
+def _latin(index: Index, runs: int, dimensions: int, seed: int) -> Array:
+    """A Latin hypercube: of each parameter one draw lies in each of as many equal parts as there are runs."""
+    places = np.column_stack([permuted(index, runs, 1000 * seed + k) for k in range(dimensions)])
+    return (places + _random(index, runs, dimensions, seed)) / runs
+
+
+METHODS: Mapping[str, Callable[[Index, int, int, int], Array]] = {
+    "sobol": _sobol,
+    "latin-hypercube": _latin,
+    "random": _random,
+}
+
+
+def permuted(index: Index, count: int, key: int) -> Index:
+    """Where a permutation of the numbers below ``count`` leads these, without a table of it.
+
+    A Feistel network permutes the numbers below a power of four, and is walked until it is back below the count.
+    Source: Black & Rogaway (2002), Ciphers with arbitrary finite domains, doi 10.1007/3-540-45760-7_9.
+    """
+    half = max(1, ((count - 1).bit_length() + 1) // 2)
+    mask, shift = np.uint64((1 << half) - 1), np.uint64(half)
+    x = index.astype(np.uint64)
+    walking = np.ones(len(x), dtype=bool)
+    # At most three quarters of the numbers lead outside, so that this ends after few rounds.
+    while walking.any():
+        # Each turn changes one half by a function of the other, which can be undone: so no two numbers meet.
+        left, right = x[walking] >> shift, x[walking] & mask
+        for turn in range(ROUNDS):
+            left, right = right, left ^ (mixed(right, key * ROUNDS + turn) & mask)
+        x[walking] = left << shift | right
+        walking = x >= count
+    return x.astype(np.int64)
+
+
+def mixed(x: NDArray[np.uint64], key: int) -> NDArray[np.uint64]:
+    """Numbers whose bits all depend on all bits of x and the key.
+
+    Source: Steele, Lea & Flood (2014), Fast splittable pseudorandom number generators, doi 10.1145/2714064.2660195.
+    """
+    x = x + np.uint64((key + 1) * 0x9E3779B97F4A7C15 % 2**64)
+    x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
+    return x ^ x >> np.uint64(31)
