@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, TypeVar
 
 import symengine
@@ -110,7 +109,8 @@ class Build:
     """Histories that are in use, by variable."""
     constraints: list[Constraint] = field(default_factory=list)
     """All that must not be passed, as it was stated."""
-    equilibria: list[Equilibrium] = field(default_factory=list)
+    balanced: list[Equilibrium] = field(default_factory=list)
+    """What has its equilibrium at all times, as it was stated."""
     motion: Motion = field(default_factory=Motion)
     notes: list[Note] = field(default_factory=list)
     """What is watched along a run, and told where it matters; no equation depends on it."""
@@ -153,21 +153,23 @@ class Build:
             case Constraint():
                 self.constrain(record)
             case HeatPath():
+                # Paths between the same two ends act in parallel: one node balance has their sum.
                 self.conductances.setdefault(record.ends, []).append(record.h)
             case _:
-                self.lists.get(type(record), self.notes).append(record)
+                lists: dict[type, list[Any]] = {
+                    State: self.states,
+                    Account: self.ledger,
+                    Margin: self.margins,
+                    Equilibrium: self.balanced,
+                    Power: self.powers,
+                    str: self.warnings,
+                }
+                lists.get(type(record), self.notes).append(record)
 
-    @cached_property
-    def lists(self) -> Mapping[type, list[Any]]:
-        """Where records are kept, by their types; notes are all others."""
-        return {
-            State: self.states,
-            Account: self.ledger,
-            Margin: self.margins,
-            Equilibrium: self.equilibria,
-            Power: self.powers,
-            str: self.warnings,
-        }
+    @property
+    def equilibria(self) -> list[Equilibrium]:
+        """What has its equilibrium at all times; an elastic gap that slides finds its place before what pulls at it."""
+        return sorted(self.balanced, key=lambda item: item.slides)
 
     def energy_row(self, node: Node) -> Expression:
         """Energy balance of a node as a residual."""

@@ -178,7 +178,7 @@ def _rate(build: Build, law: RateLaw, affinity: Expression) -> Expression:
     rate = build.variables.call(law, law.statement, own)
     build.law_margins(law, own)
     if found := exponents(rate):
-        build.notes.append(Capped(law.title, tuple(found)))
+        build.add(Capped(law.title, tuple(found)))
     return rate
 
 

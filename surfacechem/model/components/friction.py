@@ -21,13 +21,13 @@ from surfacechem.model.system import Given, Margin, State
 from surfacechem.quantities import VARIABLES, Quantity
 
 
-def laws(build: Build) -> Iterator[Power]:
+def laws(build: Build) -> Iterator[Power | State | Margin]:
     """Sliding tractions and what they dissipate; their power comes from outside."""
     rubs, total = build.energy.rubs, symengine.Integer(0)
     for law in build.interface.frictions:
         label = build.unique(law.label)
         bound = build.bound(law)
-        memory(build, law, bound)
+        yield from memory(build, law, bound)
         met = pressed(build, law)
         resisted = resistance(build, law, bound, met)
         build.law_margins(bound, {}, met=met)
@@ -46,7 +46,7 @@ def laws(build: Build) -> Iterator[Power]:
             for v in (d.velocity for d in resisted):
                 if build.slope_of(v) != 0 and not any(margin.name == v for margin in build.margins):
                     reason = "sliding reverses" if len(resisted) == 1 else f"{v} changes its sign"
-                    build.margins.append(Margin(v, symengine.Symbol(v), reason, terminal=False))
+                    yield Margin(v, symengine.Symbol(v), reason, terminal=False)
         else:
             stick_limit(build, law, bound, met)
     if not build.motion.slips and in_parallel(build):
@@ -65,7 +65,7 @@ def pressed(build: Build, law: Friction) -> dict[str, Expression]:
     return {"p": where(p < 0, 0 * p, p) if least is None else where(p < least, least, p)}
 
 
-def memory(build: Build, law: Friction, bound: Friction) -> None:
+def memory(build: Build, law: Friction, bound: Friction) -> Iterator[State]:
     """States of the law and their rates; the initial value is that of the quantity, not of its logarithm."""
     for name, of in law.internal.items():
         symbol, dot = symengine.symbols(f"{name} d{name}_dt")
@@ -74,7 +74,8 @@ def memory(build: Build, law: Friction, bound: Friction) -> None:
             raise InputError(f"initial {of} = {start:g} is outside its range: > 0.", path=f"initial.{of}")
         build.variables.define(name, lambda symbol=symbol: symbol, "evolved", law.path)  # type: ignore[misc]
         given = Given(VARIABLES[of], start)
-        build.states.append(State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given))
+        # As a logarithm it stays positive, and twenty decades of age are as well resolved as one.
+        yield State(VARIABLES[name], symbol, dot, math.log(start), 1.0, algebraic=False, given=given)
         build.name(VARIABLES[of], exp(symbol))
     if law.internal:
         for name, rate in build.variables.call(bound, bound.evolution).items():

@@ -10,9 +10,8 @@ import symengine
 from surfacechem.contracts.terms import Spec
 from surfacechem.errors import InputError, Place
 from surfacechem.expressions import Expression, derivative
-from surfacechem.model.automaton import Constraint, Equilibrium
-from surfacechem.model.balances import Power
-from surfacechem.model.build import Build
+from surfacechem.model.automaton import Constraint
+from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import LENGTH, Held, far_field, held, law_reads
 from surfacechem.model.constraints.threshold import bonds_left
 from surfacechem.model.constraints.unilateral import TOUCHING, closing, contact, impacts
@@ -113,7 +112,7 @@ def _carry(build: Build, traction: Expression) -> None:
     build.variables.define("p", p, "derived", "equilibrium with the far field")
 
 
-def laws(build: Build) -> Iterator[Power | Constraint | Equilibrium | Margin | str]:
+def laws(build: Build) -> Iterator[Record]:
     """Balance of the tractions on the gap, the energies of the bodies and what their dampers turn into heat."""
     mount = held(build, "n")
     if mount is None:

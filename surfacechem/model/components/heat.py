@@ -19,14 +19,14 @@ from surfacechem.contracts.terms import HeatTransfer
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.expressions import Expression, where
 from surfacechem.model.balances import HEAT, INTERFACE, OUTSIDE, Node, Power
-from surfacechem.model.build import BOTH, Build
+from surfacechem.model.build import BOTH, Build, Record
 from surfacechem.model.parts import HeatPath
 from surfacechem.model.system import Margin
 from surfacechem.quantities import Quantity
 from surfacechem.tolerances import NOTHING
 
 
-def laws(build: Build) -> Iterator[Power | HeatPath | Margin]:
+def laws(build: Build) -> Iterator[Record]:
     """Fluxes between nodes and external heat."""
     films = [law for law in build.scene.heat if law.is_film]
     # Paths between the same two ends count together, by what carries the heat.
@@ -199,7 +199,7 @@ def end_node(build: Build, end: str, law: HeatTransfer | None = None) -> Node:
     raise InputError(f"no end '{end}'.{suggestion(end, known)}", _ends(law))
 
 
-def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Power]:
+def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Power | str]:
     """Mean influx q_m = h_m [T_c - 2 T_1 T_2 / (T_1 + T_2)]."""
     bodies = [body.name for body in build.scene.bodies]
     (lower, upper), centre = (end_node(build, name) for name in bodies), end_node(build, "interface")
@@ -210,7 +210,7 @@ def _into_both(build: Build, channels: Mapping[str, Expression]) -> Iterator[Pow
     (cold, _), (hot, name) = sorted((build.at_start(build.thermal.node_of[body].T), body) for body in bodies)
     if hot > cold:
         harmonic = 2 * cold * hot / (cold + hot)
-        build.warnings.append(
+        yield (
             f"`closure: mean` heats both bodies alike: as they start, {name} also from an interface that is cooler "
             f"than itself, between {harmonic:.6g} K and {hot:.6g} K. Their entropy production together is positive. "
             "Where no heat should flow uphill, give paths from each body to the interface."

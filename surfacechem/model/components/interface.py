@@ -210,11 +210,10 @@ def _energies(
     for law in in_parallel(build):
         if (unbonded := getattr(bounds[law], "unbonded", None)) is not None:
             parts.add(build.variables.call(bounds[law], unbonded))
-            build.warnings += [
-                f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
-                for friction in build.interface.frictions
-                if friction.breaks_bonds
-            ]
+            for friction in (item for item in build.interface.frictions if item.breaks_bonds):
+                build.add(
+                    f"{friction.name()} breaks all bonds as sliding starts, and with them the adhesion of {law.name()}."
+                )
     rubs, rubbed = symengine.Mul(*parts), symengine.Integer(0)
     if rubs != 1:
         g_t = symengine.Symbol("g_t")
@@ -235,7 +234,7 @@ def _warn_of_net_pressure(build: Build) -> None:
     relieved = [law for law in readers if law_reads(law, "p") and not getattr(law, "t_n_max", 0)]
     net = [law.name() for law in relieved if not (isinstance(law, UnderPressure) and law.pressure == "contact")]
     if attracting and net:
-        build.warnings.append(
+        build.add(
             f"The attraction of {' and '.join(attracting)} lowers the net pressure, which is read by "
             f"{' and '.join(dict.fromkeys(net))}, although it presses the surfaces together. To read what the contact "
             "bears give the law `pressure: contact`, or a factor `of: p_contact`."

@@ -183,7 +183,9 @@ class FarField:
         """Rate of the gap at which the dampers alone resist what drives it [m/s]."""
         return (self.force(g, symengine.Integer(0)) - traction) / (self.c_b + self.c_g)
 
-    def book(self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None) -> Iterator[Power]:
+    def book(
+        self, build: Build, g: Expression, rate: Expression, moves: Expression | None = None
+    ) -> Iterator[Power | Pace]:
         """Energies of the bodies, work of the far field, heat of the dampers.
 
         Where the rate is what dampers make of the tractions, and so of their rounding, it does its work on how the gap
@@ -192,7 +194,7 @@ class FarField:
         moves = rate if moves is None else moves
         axis = self.mount.axis
         text = AXES[axis]
-        build.notes += self.paces(text)
+        yield from self.paces(text)
         for name, energy, what in (
             ("spring", self.stored(g), "elastic energy of the bodies"),
             ("kinetic", self.m * rate**2 / 2, "kinetic energy"),

@@ -158,7 +158,5 @@ def _rupture(build: Build, law: Law, name: str) -> Stoichiometry:
         raise InputError(message, law.place)
     if any(nu != ways[0] for nu in ways[1:]):
         products = " + ".join(x for x, n in ways[0].items() if n > 0)
-        build.warnings.append(
-            f"{law.name()} breaks {name} into {products}, by the first of the reactions that break it."
-        )
+        build.add(f"{law.name()} breaks {name} into {products}, by the first of the reactions that break it.")
     return ways[0]

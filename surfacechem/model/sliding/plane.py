@@ -30,8 +30,7 @@ import symengine
 from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, cos, depends, derivative, norm, sin, sqrt, where
 from surfacechem.model.automaton import Constraint, Mode, Register
-from surfacechem.model.balances import Power
-from surfacechem.model.build import Build
+from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, LENGTH, Direction, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding.formulation import NONE, PLACE, UNSTABLE, Formulation, evolve, name_traction
@@ -119,7 +118,7 @@ def _began(v: str, values: Mapping[str, float]) -> float:
     return values[f"initial.{v}"] / speed if speed else float(v == "v")
 
 
-def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Power | Constraint | Margin]:
+def motion(build: Build, kinds: Sequence[Formulation]) -> Iterator[Record]:
     """Balances along and across the direction of sliding, and the edges between sticking and sliding."""
     sides, rubs = [], build.energy.rubs
     for kind in kinds:

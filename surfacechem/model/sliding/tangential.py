@@ -19,7 +19,7 @@ from surfacechem.errors import InputError
 from surfacechem.expressions import Expression, absolute, depends, derivative, norm, sign, where
 from surfacechem.model.automaton import Constraint, Equilibrium, Mode, When
 from surfacechem.model.balances import MECHANICS, OUTSIDE, WORK, Power
-from surfacechem.model.build import Build
+from surfacechem.model.build import Build, Record
 from surfacechem.model.components.mounting import ACROSS, ALONG, KEYS, FarField, far_field
 from surfacechem.model.constraints.set_valued import SLIP, breaks_bonds, set_valued
 from surfacechem.model.sliding import plane, rate_and_state
@@ -57,7 +57,7 @@ def variables(build: Build) -> Iterator[Constraint]:
             yield from _states(build, kind)
 
 
-def laws(build: Build) -> Iterator[Power | Constraint | Equilibrium | Margin]:
+def laws(build: Build) -> Iterator[Record]:
     """Balance of the tangential tractions, and the edges between sticking and sliding."""
     if _in_the_plane(build):
         yield from plane.motion(build, build.motion.slips)
@@ -158,7 +158,7 @@ def _displacement(build: Build, kind: Formulation, alone: bool) -> None:
         build.variables.define("v_t", yielding, "derived", place)
 
 
-def _motion(build: Build, kind: Formulation) -> Iterator[Power | Constraint | Equilibrium | Margin]:
+def _motion(build: Build, kind: Formulation) -> Iterator[Record]:
     """Balance of the tractions in one direction, and the edges between sticking and sliding."""
     far = far_field(build, kind.mount) if kind.mount else None
     if build.variables.has("v_t"):
@@ -260,7 +260,7 @@ def _balance(
 
 def _elastic_rows(
     build: Build, kind: Formulation, slides: Expression, t_f: Expression, t_e: Expression, v: Expression
-) -> Generator[Margin, None, bool]:
+) -> Generator[Equilibrium | Margin, None, bool]:
     """Rows of the elastic gap and of sliding without inertia; returns whether that is in proportion to tractions."""
     dg, rate = symengine.Symbol("dg_t_dt"), build.motion.gap_rates["u_t"]
     if kind.rate_dependent:
@@ -269,8 +269,8 @@ def _elastic_rows(
     residual = t_f - t_e
     build.rows.equilibrium("g_t", build.total_derivative(residual), slides, dg - rate)
     size = absolute(t_e) + absolute(t_f)
-    # Before that of the displacement: what slides finds its place first.
-    build.equilibria.insert(0, Equilibrium("g_t", slides * residual, size, active=slides, slides=-1))
+    # Opposed to the displacement behind it: the elastic gap grows by what does not slide.
+    yield Equilibrium("g_t", slides * residual, size, active=slides, slides=-1)
     stiffness = derivative(t_e, symengine.Symbol("g_t"))
     if stiffness.free_symbols & {bond.symbol for bond in build.bonding.values()}:
         reason = "nothing carries the friction of the sliding interface: its tangential stiffness went with its bonds"
