@@ -228,7 +228,7 @@ def mechanism(
     forces = report.span(force, "N", "--force")
     if output:
         check_picture(output)
-    curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase))
+    curves = Curves(load_mechanism(Path(file if Path(file).suffix else f"{file}.yaml"), phase, evaluate=True))
     typer.echo(report.sheet(curves, temperatures, forces))
     if output:
         from surfacechem import plots

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 from surfacechem import solve as solvers
 from surfacechem.contracts.terms import Law, Property
-from surfacechem.documents import document, shipped
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.declarations import UNITS, Context, is_name, keys, number, read
@@ -321,6 +320,7 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
     """
     from surfacechem.mechanism import load_mechanism
     from surfacechem.mechanism.evaluated import Neighbour
+    from surfacechem.mechanism.load import find
 
     section = named if isinstance(named, MechanismSection) else MechanismSection(file=named)
     file = section.file if Path(section.file).suffix in (".yaml", ".yml") else f"{section.file}.yaml"
@@ -334,27 +334,13 @@ def _mechanism(named: str | MechanismSection, tree: Tree, base: Path, content: s
         return _renumbered(loaded, section.species, section.reactions)
 
     if content is None:
-        path = _find(file, base, tree.value["file"] if isinstance(named, MechanismSection) else tree)
+        path = find(file, base, (tree.value["file"] if isinstance(named, MechanismSection) else tree).place)
         return load(path, str(path))
     # Cantera and the messages want a file by its own name.
     with TemporaryDirectory() as folder:
         path = Path(folder) / Path(file).name
         path.write_text(content, encoding="utf-8")
         return load(path, file)
-
-
-def _find(name: str, base: Path, tree: Tree) -> Path:
-    """Beside the case, in the package, or where Cantera itself looks."""
-    path = document.beside(base, name, tree.place) or document.beside(shipped.mechanisms(), name, tree.place)
-    if path is None:
-        import cantera  # slow, hence last
-
-        folders = (Path(folder) for folder in cantera.get_data_directories() if folder != ".")
-        path = next(filter(None, (document.beside(folder, name, tree.place) for folder in folders)), None)
-    if path is not None:
-        return path
-    known = [path.stem for path in shipped.mechanisms().glob("*.yaml")]
-    raise tree.error(f"no mechanism {name} beside the case.{suggestion(Path(name).stem, known)}")
 
 
 def _renumbered(mechanism: Mechanism, species: Tree | None, reactions: Tree | None) -> Mechanism:

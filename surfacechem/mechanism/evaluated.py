@@ -43,8 +43,10 @@ class Neighbour:
     place: Place | None = None
 
 
-def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> None:
-    """Bring the neighbours of a surface to their states; InputError where one is missing, unknown or odd."""
+def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> tuple[str, ...]:
+    """Bring the neighbours of a surface to their states, and say what they lack; InputError where a state is missing,
+    unknown or odd.
+    """
     for name, state in given.items():
         if name not in surface.adjacent:
             message = f"the surface {surface.name} has no neighbour '{name}'.{suggestion(name, surface.adjacent)}"
@@ -59,6 +61,7 @@ def hold(surface: Any, given: Mapping[str, Neighbour], place: Place | None) -> N
         if state.pressure is not None:
             phase.TP = phase.T, state.pressure
         phase.electric_potential = state.electric_potential
+    return lacking(surface)
 
 
 def _problem(phase: Any, state: Neighbour) -> str:
@@ -78,7 +81,7 @@ def _problem(phase: Any, state: Neighbour) -> str:
     return f"the mole fractions of the neighbour {name} sum to {total:.9g}, not to 1." if wrong else ""
 
 
-def remarks(surface: Any) -> tuple[str, ...]:
+def lacking(surface: Any) -> tuple[str, ...]:
     """Species that a neighbour does not hold, though reactions give them to it."""
     back = np.array([reaction.reversible for reaction in surface.reactions()], dtype=bool)
     made = surface.product_stoich_coeffs.sum(axis=1) + surface.reactant_stoich_coeffs[:, back].sum(axis=1)

@@ -140,9 +140,6 @@ class Interaction:
 
 KEY = "coverage-dependencies"
 
-DEPENDENT = "coverage-dependent-surface"
-"""The model of the phase in which species have it."""
-
 CURVES = {
     "linear": ("enthalpy", "entropy"),
     "polynomial": ("enthalpy-coefficients", "entropy-coefficients"),

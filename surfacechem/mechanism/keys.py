@@ -11,10 +11,22 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, DEPENDENT, KEY, TOGETHER
+from surfacechem.mechanism.interaction import CAPACITY, COEFFICIENTS, CURVES, KEY, TOGETHER
 from surfacechem.mechanism.rate_types import kind_of, kinds, names
 from surfacechem.mechanism.rates import InterfaceArrhenius
-from surfacechem.mechanism.source import ENERGY, FILE, PHASE, REACTION, SPECIES, Source, leading, sides, unitless
+from surfacechem.mechanism.source import (
+    DEPENDENT,
+    ENERGY,
+    FILE,
+    PHASE,
+    REACTION,
+    SPECIES,
+    SURFACES,
+    Source,
+    leading,
+    sides,
+    unitless,
+)
 
 _words = str.split
 
@@ -169,7 +181,7 @@ class Check:
             raise error(f"{title}: thermo '{model}' is not lowered: {MODELS[model]}", phase, "thermo")
         known = set(PHASE) - (set() if self.beside else BESIDE)
         self._keys(phase, known - (set() if model == DEPENDENT else {"reference-state-coverage"}), title)
-        if model not in ("ideal-surface", DEPENDENT):
+        if model not in SURFACES:
             raise error(f"{title}: thermo '{model}' is not lowered: use `ideal-surface`.", phase, "thermo")
         kinetics = phase.get("kinetics", "surface")
         if kinetics != "surface":

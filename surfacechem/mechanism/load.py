@@ -22,7 +22,6 @@ from surfacechem.mechanism.evaluated import (
     NeighbourReaction,
     SurfaceEngine,
     hold,
-    remarks,
 )
 from surfacechem.mechanism.interaction import KEY, interactions
 from surfacechem.mechanism.keys import Check, has_neighbours, is_evaluated
@@ -33,8 +32,6 @@ from surfacechem.mechanism.source import LIMITS, Source, own_parameters, sides
 from surfacechem.mechanism.thermo import lower
 from surfacechem.quantities import MOLECULAR
 from surfacechem.scene import BondingVariable, Engine, Sites
-
-NONE: Mapping[str, Neighbour] = {}
 
 REACTIONS = "interface.mechanism.reactions"
 """Where a case gives other numbers of reactions than the mechanism."""
@@ -83,24 +80,24 @@ def load_mechanism(
     bonds: Sequence[str] = (),
     place: Place | None = None,
     evaluate: bool = False,
-    neighbours: Mapping[str, Neighbour] = NONE,
+    neighbours: Mapping[str, Neighbour] | None = None,
     name: str = "",
 ) -> Mechanism:
     """Read one surface phase of a Cantera mechanism.
 
-    ``phase`` may be left out where the file has one; ``bonds`` names the species that count as bonds. ``place`` is
-    where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what is
-    not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which the
-    phases beside the surface are held. ``name`` is what errors call the file if not by its path.
+    ``phase`` may be left out where the file has one surface; ``bonds`` names the species that count as bonds. ``place``
+    is where the case names the mechanism, for errors that are not in the mechanism file itself. With ``evaluate`` what
+    is not lowered is left to Cantera, which gives its rates while a scene runs; ``neighbours`` are the states in which
+    the phases beside the surface are held, None leaves them as the file has them. ``name`` is what errors call the file
+    if not by its path.
     """
-    path = _find(Path(path), place)
+    path = find(str(path), Path(), Place(document.ORIGIN))
     source = Source(name or str(path), document.read(path, name, LIMITS))
     entry = source.phase(phase, place)
     # Before Cantera, which ignores what it does not know.
     Check(source, entry, evaluate).run()
     surface, said = _cantera(source, entry)
-    # Before the reactions are looked at, whose remarks depend on what neighbours hold.
-    hold(surface, neighbours, place)
+    odd = hold(surface, neighbours, place) if neighbours is not None else ()
     kept = _kept(source, entry, surface)
     species = _species(surface, source, entry, any(outside for _, _, outside in kept))
     by_name = {item.name: item for item in species}
@@ -127,17 +124,24 @@ def load_mechanism(
         phase=str(entry["name"]),
         temperatures=temperatures,
         engine=engine if engine.gives else None,
-        remarks=(*said, *remarks(surface)),
+        remarks=(*said, *odd),
     )
 
 
-def _find(path: Path, place: Place | None) -> Path:
-    """The file, or the one of that name that comes with the package."""
-    for candidate in (path, data.mechanisms() / path.name):
-        if candidate.is_file():
-            return candidate
-    known = [file.name for file in data.mechanisms().glob("*.yaml")]
-    raise InputError(f"no mechanism file {path}.{suggestion(path.name, known)}", place)
+def find(name: str, folder: Path, place: Place) -> Path:
+    """The mechanism file of that name in a folder, in this package, or where Cantera itself looks."""
+    path = document.beside(folder, name, place) or document.beside(data.mechanisms(), name, place)
+    if path is not None:
+        return path
+    import cantera  # slow, hence last
+
+    folders = [Path(other) for other in cantera.get_data_directories() if other != "."]
+    for other in folders:
+        if (path := document.beside(other, name, place)) is not None:
+            return path
+    known = [file.name for other in (data.mechanisms(), *folders) for file in other.glob("*.yaml")]
+    message = f"no mechanism file {name}.{suggestion(Path(name).name, known)}"
+    raise InputError(message, place if place.line or place.path else None)
 
 
 def _cantera(source: Source, phase: Any) -> tuple[Any, tuple[str, ...]]:

@@ -23,6 +23,10 @@ LIMITS = Limits(largest=10_000_000, most=200_000)
 ARROWS = ("<=>", "=>", "=")
 """What stands between the sides of an equation; only the second is one way."""
 
+DEPENDENT = "coverage-dependent-surface"
+SURFACES = ("ideal-surface", DEPENDENT)
+"""Phase models that are lowered; only in the second thermo depends on coverages."""
+
 WRITER = "YamlWriter"
 """How Cantera signs the files that it writes."""
 
@@ -198,15 +202,16 @@ class Source:
         return list(entries)
 
     def phase(self, name: str | None, place: Place | None) -> Any:
-        """The phase of that name, or the only one."""
+        """The phase of that name, else the only surface, else the only one."""
         phases = {str(entry.get("name")): entry for entry in self.phases}
         if not phases:
             known = [str(key) for key in self.data]
             guess = next(iter(get_close_matches("phases", known, 1)), None)
             raise self.error(f"no `phases` in the mechanism.{suggestion('phases', known)}", self.data, guess)
-        if name is None and len(phases) > 1:
-            raise InputError(f"the mechanism has several phases, name one.{suggestion('', phases)}", place)
-        name = next(iter(phases)) if name is None else name
+        surfaces = [known for known, entry in phases.items() if entry.get("thermo") in SURFACES] or list(phases)
+        if name is None and len(surfaces) > 1:
+            raise InputError(f"the mechanism has several phases, name one.{suggestion('', surfaces)}", place)
+        name = surfaces[0] if name is None else name
         if name not in phases:
             raise InputError(f"{self.file} has no phase '{name}'.{suggestion(name, phases)}", place)
         return phases[name]

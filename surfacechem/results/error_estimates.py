@@ -227,8 +227,13 @@ def floors(trajectory: Trajectory) -> dict[str, float]:
     relative one, and at most its scale; of a profile the largest of its states; of a named quantity its largest value.
     """
     system = trajectory.model.system
-    sizes = (trajectory.result.problem.atol / trajectory.run.rtol).tolist()
-    found = {state.name: min(size, state.scale) for state, size in zip(system.states, sizes, strict=True)}
+    scales = np.array([state.scale for state in system.states])
+    sizes = np.minimum(trajectory.result.problem.atol / trajectory.run.rtol, scales)
+    # What never exceeds the last digit of its scale is nothing, however tight the absolute tolerance: a species that no
+    # reaction makes has a coverage of rounding.
+    never = np.abs(trajectory.result.outputs).max(axis=0, initial=0.0) < EPS * scales
+    sizes = np.where(never, np.maximum(sizes, EPS * scales), sizes)
+    found = {state.name: size for state, size in zip(system.states, sizes.tolist(), strict=True)}
     found |= {p.name: max((found[state] for state in p.states), default=0.0) for p in system.profiles}
     largest = np.abs(trajectory.outputs).max(axis=0, initial=0.0).tolist()
     return dict(zip(system.output_columns, largest, strict=True)) | found

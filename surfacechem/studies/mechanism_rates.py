@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from surfacechem.contracts.terms import reads
 from surfacechem.expressions import Expression, depends, derivative, log, log_sum
 from surfacechem.mechanism import Mechanism
+from surfacechem.mechanism.evaluated import EvaluatedReaction
 from surfacechem.mechanism.mixture import IdealMixture, Species
 from surfacechem.mechanism.rates import InterfaceArrhenius
 from surfacechem.model.components.pairs import Opposed, lengths, opposed
@@ -90,6 +91,11 @@ class Curves:
                 potential = potential.bind({"species": species})
             psi += self._call(potential.statement)
         return psi
+
+    @property
+    def evaluated(self) -> list[EvaluatedReaction]:
+        """Reactions whose rates Cantera gives while a scene runs."""
+        return [law for law in self.mechanism.reactions if isinstance(law, EvaluatedReaction)]
 
     @property
     def loaded(self) -> bool:

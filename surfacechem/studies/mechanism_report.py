@@ -76,25 +76,22 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     """Everything about a mechanism, one fact a line."""
     shown, grid = reference(temperatures), _grid(curves, temperatures, forces)
     T, f = temperatures.values(), forces.values()
-    reactions = []
-    for label, law in curves.laws.items():
-        place = f"{law.place.file}:{law.place.line}" if law.place else ""
-        units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
-        numbers = [f"{name} = {getattr(law, name):.6g} {unit}".removesuffix(" 1") for name, unit in units.items()]
-        balance = verdict(curves, label, temperatures, forces)
-        reactions += [f"{label}  {law.equation}  ({law.kind}, {place})", f"    {', '.join(numbers)}", f"    {balance}"]
     types = []
     for kind in dict.fromkeys(type(law) for law in curves.laws.values()):
         text = f"{kind.kind}: {source(kind)}".replace("``", "")
         types += textwrap.wrap(text, WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
+    outside = [(law.label, law.equation, f"line {law.place.line}") for law in curves.evaluated if law.place]
     cold, pulled = np.array([shown]), curves.pulled or "a bond"
     sections = {
         f"Species at {shown:g} K, without force": columns(_species(curves, shown)),
-        "Reactions": reactions,
+        "Reactions": list(reaction_lines(curves, temperatures, forces)),
+        "Reactions whose rates Cantera gives, under `solver: cantera`": columns(outside),
         "Cycles": columns((" ".join(cycle.labels), cycle_verdict(cycle, curves, *grid)) for cycle in cycles(curves)),
         "Against temperature, without force; rates per bond at coverages of one": columns(
             _table(curves, "T [K]", T, T, np.zeros(1))
-        ),
+        )
+        if curves.laws
+        else [],
         f"Against the force on {pulled}, at {shown:g} K": columns(_table(curves, "f [pN]", f * 1e12, cold, f))
         if curves.loaded
         else [],
@@ -106,9 +103,20 @@ def sheet(curves: Curves, temperatures: Span, forces: Span) -> str:
     return "\n\n".join([head, *parts])
 
 
+def reaction_lines(curves: Curves, temperatures: Span, forces: Span) -> Iterator[str]:
+    """Formula, numbers and verdict of each reaction that is lowered."""
+    for label, law in curves.laws.items():
+        place = f"{law.place.file}:{law.place.line}" if law.place else ""
+        units = {name: law.refine(name, spec).unit for name, spec in law.specs()}
+        numbers = [f"{name} = {getattr(law, name):.6g} {unit}".removesuffix(" 1") for name, unit in units.items()]
+        yield f"{label}  {law.equation}  ({law.kind}, {place})"
+        yield f"    {', '.join(numbers)}"
+        yield f"    {verdict(curves, label, temperatures, forces)}"
+
+
 def _species(curves: Curves, temperature: float) -> Iterator[tuple[str, ...]]:
     text = Source("", curves.mechanism.text)
-    entries = [entry for phase in text.phases for entry in text.species(phase)]
+    entries = text.species(text.phase(curves.mechanism.phase, None))
     made_of = {str(entry.get("name")): entry.get("composition") or {} for entry in entries}
     yield "", "made of", "sites", "h [kJ/mol]", "s [J/(mol K)]", "g [kJ/mol]"
     for name, value in curves.thermo(temperature).items():
@@ -173,8 +181,9 @@ def remarks(curves: Curves) -> Iterator[str]:
     around = [name for name, item in curves.species.items() if item.interactions]
     if around:
         yield f"The thermo of {', '.join(around)} depends on coverages; everything above is without that."
-    for law in curves.laws.values():
+    for law in (*curves.laws.values(), *curves.evaluated):
         idle -= set(law.change)
+    for law in curves.laws.values():
         where = f"{law.place.file}:{law.place.line}: " if law.place else ""
         if any(nu < 0 and not law.orders.get(name) for name, nu in law.change.items()):
             yield f"{where}{law.equation} goes on where nothing is left to react: its order in a reactant is zero."

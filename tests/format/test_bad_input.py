@@ -136,7 +136,7 @@ MISTAKES = [
     ("reference: bonding", "reference: bondin", "20: reference: no exact solution 'bondin'. Did you mean 'bonding'?"),
     ("reference: bonding", "reference: {name: bonding, tao: 1}", "20: reference: unknown key 'tao'. Did you mean '"),
     ("reference: bonding", "reference: {tau: 1}", "20: reference: the exact solution needs a `name`."),
-    ("  bonding:", "  mechanism: nothing\n  bonding:", "12: interface.mechanism: no mechanism nothing.yaml beside"),
+    ("  bonding:", "  mechanism: nothing\n  bonding:", "12: interface.mechanism: no mechanism file nothing.yaml"),
     ("run: {", "\trun: {", "19: not YAML: while scanning for the next token, found character '\\t' that cannot sta"),
     ("run: {until: 5 s}", "run: {until: 5 s", "20: not YAML: while parsing a flow mapping, expected ',' or '}', bu"),
     ("run: {until: 5 s}\n", "", "1: the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."),

@@ -10,9 +10,18 @@ from typer.testing import CliRunner
 import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError
-from surfacechem.results.error_estimates import EVENTS, against_tighter, apart, difference, estimated, event_errors
+from surfacechem.results.error_estimates import (
+    EVENTS,
+    against_tighter,
+    apart,
+    difference,
+    estimated,
+    event_errors,
+    floors,
+)
 from surfacechem.results.event_table import event_times
 from surfacechem.runs.summaries import run_summary, sweep_summary
+from surfacechem.tolerances import EPS
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +56,14 @@ def test_the_balances_are_the_error_where_nothing_else_is_asked_for():
     solution = surfacechem.load("exothermic").run(error="balances")
     assert solution.accuracy.variables["energy"] == solution.audit.energy_error
     assert solution.accuracy.error == max(solution.accuracy.variables.values())
+
+
+@pytest.mark.parametrize(("phi", "floor"), [(1.0, 1e-60 / 1e-8), (1e-31, EPS)])
+def test_a_coverage_that_is_never_more_than_rounding_has_no_error(phi, floor):
+    """One that decays from something is resolved however small it becomes, where the tolerance says so."""
+    changes = {"initial.phi": phi, "run.rtol": 1e-8, "run.atol": 1e-60, "run.until": "100 s"}
+    case = surfacechem.load("bond-constant-force", changes)
+    assert floors(case.model.solve(case.case.run))["phi"] == pytest.approx(floor, rel=1e-12)
 
 
 def test_an_estimate_looks_at_the_times_of_events(stick_slip):

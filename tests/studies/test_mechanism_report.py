@@ -134,6 +134,26 @@ def test_prints_the_measured_rates(call):
     assert re.search(r"R1  L\(s\) \+ P\(s\) <=> PL\(s\)  \(interface-Arrhenius, .*selectin\.yaml:\d+\)", done.stdout)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "file", "phase"),
+    [
+        (("ptcombust", "-T", "900 K"), "ptcombust.yaml", "Pt_surf"),
+        (("diamond.yaml", "-T", "1200 K"), "diamond.yaml", "diamond_100"),
+        (("SiF4_NH3_mec", "-T", "1600 K"), "SiF4_NH3_mec.yaml", "SI3N4"),
+        (("sofc", "--phase", "oxide_surface"), "sofc.yaml", "oxide_surface"),
+        (("lithium_ion_battery", "--phase", "edge_anode_electrolyte"), "lithium_ion_battery.yaml", None),
+    ],
+)
+def test_surfaces_of_cantera_are_found_by_name_with_every_reaction(call, arguments, file, phase):
+    """Where only one phase is a surface it need not be named; what stands beside it needs no state."""
+    done = call(*arguments)
+    assert done.exit_code == 0, done.stderr
+    surface = ct.Interface(file, phase or arguments[-1])
+    assert done.stdout.startswith(f"phase {surface.name}, ")
+    for number, equation in enumerate(surface.reaction_equations(), start=1):
+        assert re.search(rf"^  R{number} +{re.escape(equation)}  ", done.stdout, re.MULTILINE)
+
+
 def test_the_figure_shows_every_reaction_once(call, tmp_path):
     rates, constants = mechanism_report.figure(Curves(load("dna-film.yaml")), T, F).axes
     assert [line.get_label() for line in rates.lines] == ["R1: A(s) + B(s) <=> AB(s)", "R1, reverse"]
@@ -149,6 +169,8 @@ def test_the_figure_shows_every_reaction_once(call, tmp_path):
     ("arguments", "words"),
     [
         (("selectins",), "no mechanism file selectins.yaml. Did you mean 'selectin.yaml'?"),
+        (("ptcombus",), "no mechanism file ptcombus.yaml. Did you mean 'ptcombust.yaml'?"),
+        (("sofc",), "several phases, name one. Known: metal_surface, oxide_surface."),
         (("selectin", "--phase", "contatc"), "has no phase 'contatc'. Did you mean 'contact'?"),
         (("selectin", "-T", "360..280 K"), "--temperature: '360..280 K' is no range upwards"),
         (("selectin", "-T", "0 K"), "--temperature: '0 K' is no range upwards"),
