@@ -4,7 +4,6 @@ A page asks for a table with a comment: ``<!-- made: variables area-stretch -->`
 """
 
 import dataclasses
-import importlib
 import inspect
 import re
 from collections.abc import Callable, Iterator
@@ -19,7 +18,7 @@ from surfacechem import format as cases
 from surfacechem import plots, references
 from surfacechem.contracts.terms import Law, Potential, Spec, reads
 from surfacechem.documents import shipped as data
-from surfacechem.laws import FAMILIES, laws
+from surfacechem.laws import FAMILIES, laws, module
 from surfacechem.quantities import VARIABLES
 from surfacechem.runs import listing
 from surfacechem.studies.regimes import regimes
@@ -33,6 +32,7 @@ PLACES = {
     "heat": "heat",
     "property": "interface.medium, under the name of the property",
     "loading": "loading.NAME",
+    "shape": "surface, under the name of a body",
     "factor": "the list `times` of a parameter that varies",
 }
 """Where the laws of a contract stand in a case file."""
@@ -123,12 +123,8 @@ def families() -> list[str]:
     return list(dict.fromkeys(family for modules in FAMILIES.values() for family in modules))
 
 
-def _module(family: str) -> Any:
-    return importlib.import_module(f"surfacechem.laws.{family}")
-
-
 def _title(family: str) -> str:
-    return (_module(family).__doc__ or family).split("\n")[0].partition(":")[0].rstrip(".")
+    return (module(family).__doc__ or family).split("\n")[0].partition(":")[0].rstrip(".")
 
 
 def _members(family: str) -> Iterator[tuple[type[Law], type[Law]]]:

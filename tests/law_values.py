@@ -36,11 +36,15 @@ LISTS |= dict.fromkeys(("values", "conductances"), (1.0, 2.5, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
 OPTIONS = LISTS | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
 OPTIONS |= {"shear": "parallel", "pressure": "net"}
+GRID = {"x": range(6), "y": range(6), "z": [0.0] * 36}
+NUMERIC = ("foot", "starts", "derivatives")
+"""Methods of shapes that take arrays of points."""
 
 
 def every() -> dict[str, type[Law]]:
-    """All laws, by contract and name."""
-    return {f"{contract.contract} {name}": law for contract in FAMILIES for name, law in laws(contract).items()}
+    """All laws that are formulas, by contract and name."""
+    found = {f"{contract.contract} {name}": law for contract in FAMILIES for name, law in laws(contract).items()}
+    return {name: law for name, law in found.items() if name != "shape heights"}
 
 
 def instance(law: type[Law], draw: random.Random, far: bool = False) -> Law:
@@ -80,7 +84,15 @@ def formulas(law: Law) -> Iterator[tuple[str, Callable[..., Any]]]:
             yield from item().items()
         elif name in ("ranges", "limits"):
             yield name, partial(getattr(type(law), name).fget, law)
-        elif callable(item) and name not in ("breakpoints", "jumps", "piece", "stoichiometry", "is_default", "refine"):
+        elif callable(item) and name not in (
+            "breakpoints",
+            "jumps",
+            "piece",
+            "stoichiometry",
+            "is_default",
+            "refine",
+            *NUMERIC,
+        ):
             yield name, item
 
 

@@ -16,6 +16,8 @@ contract           states                                              audited f
 :class:`Limit`         traction at which the interface gives way           energy, entropy of jumps
 :class:`Factor`        how a parameter varies with one variable            --
 :class:`Property`      property of the medium between the bodies           --
+:class:`Shape`         surface of a body                                   --
+:class:`PairEnergy`    energy of two points at a distance                  --
 =================  ==================================================  ===========================
 
 A :class:`Fluid` is a medium whose properties have no formula.
@@ -549,6 +551,52 @@ class Property(Law):
     """Name of the property in the table of quantities."""
 
     value: ClassVar[Callable[..., Expression]]
+
+
+class Shape(Law):
+    """Surface of a body as a function of two parameters [m].
+
+    Its highest point is the origin and the body lies below it; a second body is its mirror image above. The normal
+    x_u x x_v points out of the body. It is turned about z first, then tilted about y.
+    """
+
+    contract = "shape"
+    formula = "point"
+    about_axis: ClassVar[bool] = False
+    """Whether v is the angle about z of a surface of revolution."""
+    closed: ClassVar[tuple[bool, bool]] = (False, False)
+    """Whether u and v come round to where they started."""
+
+    turn: float = parameter("rad", "angle by which it is turned about z", default=0.0, varies=False)
+    tilt: float = parameter("rad", "angle by which it is tilted about y", default=0.0, varies=False)
+
+    point: ClassVar[Callable[..., tuple[Expression, Expression, Expression]]]
+
+    @property
+    @abstractmethod
+    def span(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lowest and highest value of u and of v."""
+
+    foot: ClassVar[Callable[..., Any] | None] = None
+    """Parameters (..., 2) of the nearest point of each of the points (..., 3), where there is a closed form."""
+    starts: ClassVar[Callable[..., Sequence[Any]]]
+    """Parameters from which a search for the nearest point begins where there is none, two or more for each point."""
+    derivatives: ClassVar[Callable[..., Any] | None] = None
+    """Derivatives (10, ..., 3) where they are no formulas: 1, u, v, uu, uv, vv, uuu, uuv, uvv, vvv."""
+
+
+class PairEnergy(Law):
+    """Energy [J] of two points of two surfaces at the distance r, per product of their numbers."""
+
+    contract = "pair"
+    formula = "energy"
+    core: ClassVar[bool] = True
+    """Whether it keeps surfaces apart, so that their energy has a lower bound."""
+
+    n_1: float = parameter("1/m^2", "density of interacting points on body 1", above=0, stretch=-1)
+    n_2: float = parameter("1/m^2", "density of interacting points on body 2", above=0, stretch=-1)
+
+    energy: ClassVar[Callable[..., Expression]]
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,23 @@ from __future__ import annotations
 import json
 
 from surfacechem import laws
-from surfacechem.contracts.terms import Factor, Friction, HeatTransfer, Law, Limit, Load, Potential, Property, RateLaw
+from surfacechem.contracts.terms import (
+    Factor,
+    Friction,
+    HeatTransfer,
+    Law,
+    Limit,
+    Load,
+    Potential,
+    Property,
+    RateLaw,
+    Shape,
+)
 from surfacechem.format.csvtable import TEXTS
 from surfacechem.format.declarations import NODE, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 
-CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Property, Load, Factor)
+CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Property, Load, Factor, Shape)
 
 
 def schema() -> Schema:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 from collections.abc import Iterator
+from types import ModuleType
 
 from surfacechem.contracts.terms import (
     BodyEnergy,
@@ -17,6 +18,7 @@ from surfacechem.contracts.terms import (
     Potential,
     Property,
     RateLaw,
+    Shape,
 )
 from surfacechem.errors import InputError, suggestion
 
@@ -30,14 +32,24 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     Property: ("media",),
     Load: ("loading",),
     Factor: ("factors",),
+    Shape: ("shapes",),
 }
 """The modules in which the laws of a contract stand."""
 
 
+ELSEWHERE = {"shapes": "surfacechem.surfaces.shapes"}
+"""Modules of other rooms."""
+
+
+def module(family: str) -> ModuleType:
+    """The module of a family."""
+    return importlib.import_module(ELSEWHERE.get(family, f"{__name__}.{family}"))
+
+
 def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
-    module = importlib.import_module(f"{__name__}.{family}")
-    for value in vars(module).values():
-        own = inspect.isclass(value) and value.__module__ == module.__name__
+    found = module(family)
+    for value in vars(found).values():
+        own = inspect.isclass(value) and value.__module__ == found.__name__
         if own and issubclass(value, contract) and not inspect.isabstract(value):
             yield value
 

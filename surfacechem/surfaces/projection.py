@@ -1,0 +1,271 @@
+"""Surfaces in space and their closest-point projection.
+
+Body 1 lies below its surface. Body 2 is the mirror image of a body that does, moved up by the approach d: at d = 0 the
+highest point of one is at the lowest of the other.
+
+Source: Sauer, Duong & Mandadapu (2021), section 2 with eq. e:gap; Konyukhov & Schweizerhof (2013), Computational
+Contact Mechanics, doi 10.1007/978-3-642-31531-2, for rates and for where a projection is unique.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfacechem.contracts.terms import Shape
+from surfacechem.errors import InputError
+from surfacechem.tolerances import DIGITS, GONE, SAME, TINY, ULPS
+
+Array = NDArray[np.float64]
+
+NEWTONS = 100
+"""Steps after which a search ends; some ten are the rule."""
+
+POLE = GONE
+"""Parameter at the pole of a surface of revolution, where directions along it have no length."""
+
+FIRST, SECOND, THIRD = 3, 6, 10
+"""Numbers of derivatives up to an order: x; x_u, x_v; x_uu, x_uv, x_vv; and four of third order."""
+
+
+@lru_cache(maxsize=64)
+def _compiled(shape: Shape, count: int) -> Callable[[Array], Array]:
+    """The point of a shape and its derivatives as machine code."""
+    import symengine
+
+    u, v = symengine.symbols("u v")
+    orders = [(i - j, j) for i in range(4) for j in range(i + 1)][:count]
+    formulas = []
+    for i, j in orders:
+        for part in map(symengine.sympify, shape.point(u, v)):
+            for symbol in (*[u] * i, *[v] * j):
+                part = symengine.diff(part, symbol)
+            formulas.append(part)
+    compiled: Callable[[Array], Array] = symengine.Lambdify([u, v], formulas, cse=True, backend="llvm")
+    return compiled
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Nearest points of a surface; arrays over the points that were projected.
+
+    ``at`` holds the parameters (..., 2), ``gap`` the distance along ``normal``, negative inside the body [m], ``tied``
+    where another point is as near.
+    """
+
+    at: Array
+    point: Array
+    normal: Array
+    gap: Array
+    tied: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """Mean [1/m] and Gaussian curvature [1/m^2], positive where the body bulges, and their rates."""
+
+    mean: Array
+    gaussian: Array
+    mean_rate: Array
+    gaussian_rate: Array
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates of a projection while point and surface move: of the parameters, of the gap [m/s], of the gap vector from
+    the surface to the point [m/s], of the normal [1/s], and of the curvature there.
+    """
+
+    at: Array
+    gap: Array
+    vector: Array
+    normal: Array
+    curvature: Curvature
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The surface of a body in space; the ``upper`` body is mirrored and moved up by ``approach`` [m]."""
+
+    shape: Shape
+    upper: bool = False
+    approach: float = 0.0
+
+    @cached_property
+    def axes(self) -> Array:
+        """Rotation, of the upper body with a reflection, from the coordinates of the shape to space."""
+        (s, c), (sn, cs) = ((np.sin(angle), np.cos(angle)) for angle in (self.shape.turn, self.shape.tilt))
+        tilted = np.array([[cs, 0, sn], [0, 1, 0], [-sn, 0, cs]]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        return np.asarray(np.diag([1.0, 1.0, -1.0]) @ tilted if self.upper else tilted)
+
+    def derivatives(self, at: Array, count: int = THIRD) -> Array:
+        """Points and derivatives (count, ..., 3) at parameters (..., 2)."""
+        if self.shape.derivatives is not None:
+            own = self.shape.derivatives(at[..., 0], at[..., 1])
+        else:
+            table = _compiled(self.shape, count)(np.ascontiguousarray(at))
+            own = np.moveaxis(table.reshape(*at.shape[:-1], count, 3), -2, 0)
+        found: Array = own[:count] @ self.axes.T
+        found[0, ..., 2] += self.approach
+        return found
+
+    def elements(self, at: Array) -> tuple[Array, Array]:
+        """Points (..., 3) and vectors of the area per parameters (..., 3), which point out of the body."""
+        x, x_u, x_v = self.derivatives(at, FIRST)
+        outward = np.cross(x_u, x_v)
+        return x, -outward if self.upper else outward
+
+    def normals(self, derivatives: Array) -> Array:
+        """Unit normals (..., 3) out of the body."""
+        outward = np.cross(derivatives[1], derivatives[2]) * (-1 if self.upper else 1)
+        return np.asarray(outward / np.linalg.norm(outward, axis=-1, keepdims=True))
+
+    def nearest(self, x: ArrayLike) -> Projection:
+        """Projection of points (..., 3)."""
+        x = np.asarray(x, dtype=float)
+        own, other = (x - [0.0, 0.0, self.approach]) @ self.axes, None
+        if self.shape.foot is not None:
+            at = self.shape.foot(own)
+        else:
+            found = [self._search(x, start) for start in self.shape.starts(own)]
+            distances = np.array([np.linalg.norm(x - self.derivatives(at, FIRST)[0], axis=-1) for at in found])
+            ranked = np.take_along_axis(np.array(found), np.argsort(distances, axis=0)[..., None], axis=0)
+            at, other = ranked[0], ranked[1:]
+        # At the pole itself no direction along the surface has a length.
+        if self.shape.about_axis and self.shape.span[0][0] == 0:
+            at = np.maximum(at, [POLE, -np.inf])
+        D = self.derivatives(at, SECOND)
+        normal, away = self.normals(D), x - D[0]
+        # Beyond an edge the distance is not along the normal, which then tells the side only.
+        size = np.linalg.norm(away, axis=-1)
+        side = np.einsum("...i,...i", away, normal)
+        tied = self._degenerate(D, normal * side[..., None])
+        # Searches from other starts may have ended elsewhere, as near.
+        for places in () if other is None else other:
+            rival = self.derivatives(places, FIRST)[0]
+            near = np.linalg.norm(x - rival, axis=-1) <= size * (1 + SAME)
+            tied |= near & (np.linalg.norm(rival - D[0], axis=-1) > np.sqrt(SAME) * size)
+        return Projection(at, D[0], normal, np.where(side < 0, -size, size), tied)
+
+    def _degenerate(self, D: Array, away: Array) -> NDArray[np.bool_]:
+        """Whether points are where normals meet, so that not one point is nearest but many."""
+        metric, hessian = _forms(D, away)
+        # Eigenvalues of the second in terms of the first, 1 - distance * curvature, vanish there.
+        ratio = _determinant(hessian) / _determinant(metric)
+        trace = (metric[0] * hessian[2] + metric[2] * hessian[0] - 2 * metric[1] * hessian[1]) / _determinant(metric)
+        return np.asarray((ratio <= SAME) & (np.abs(ratio) <= SAME * np.maximum(np.abs(trace), 1)))
+
+    def _search(self, x: Array, start: Array) -> Array:
+        """Parameters of a nearest point by Newton's method; a step that does not come nearer is halved."""
+        low, high = np.transpose(self.shape.span)
+        # What comes round has no edge that a step could leave.
+        low = np.where(self.shape.closed, -np.inf, low) + (POLE if self.shape.about_axis else 0.0)
+        high = np.where(self.shape.closed, np.inf, high)
+        at = np.clip(start, low, high)
+        for _ in range(NEWTONS):
+            D = self.derivatives(at, SECOND)
+            step = _step(D, x - D[0], at <= low, at >= high)
+            if self.shape.about_axis:
+                step[..., 1] = 0.0  # the angle about the axis is that of the start
+            distance, length = np.linalg.norm(x - D[0], axis=-1), np.ones(at.shape[:-1])
+            for _ in range(40):
+                tried = np.clip(at + length[..., None] * step, low, high)
+                # Close to the end distances agree to rounding, while steps still get shorter.
+                worse = np.linalg.norm(x - self.derivatives(tried, FIRST)[0], axis=-1) > distance * (1 + DIGITS)
+                if not worse.any():
+                    break
+                length = np.where(worse, length / 2, length)
+            moved = np.where(worse[..., None], 0.0, tried - at)
+            at = at + moved
+            if np.all(np.abs(moved) <= ULPS * np.abs(at)):
+                break
+        return np.asarray(at)
+
+    def curvature(self, at: Array, rate: Array | None = None) -> Curvature:
+        """Curvature at parameters (..., 2), and its rate where they move at a rate."""
+        D = self.derivatives(at)
+        E, F, G = _metric(D)
+        outward = np.cross(D[1], D[2]) * (-1 if self.upper else 1)
+        size = np.linalg.norm(outward, axis=-1)
+        n = outward / size[..., None]
+        # What follows is the product rule, with rates of the derivatives along the path of the parameters.
+        p, q = np.moveaxis(np.zeros_like(at) if rate is None else rate, -1, 0)[..., None]
+        turned = [p * D[k] + q * D[k + 1] for k in (3, 4, 6, 7, 8)]  # rates of x_u, x_v, x_uu, x_uv, x_vv
+        swing = (np.cross(turned[0], D[2]) + np.cross(D[1], turned[1])) * (-1 if self.upper else 1)
+        n_dot = (swing - n * _dot(n, swing)[..., None]) / size[..., None]
+        L, M, N = (-_dot(n, D[k]) for k in (3, 4, 5))
+        L_dot, M_dot, N_dot = (-_dot(n_dot, D[k]) - _dot(n, turned[k - 1]) for k in (3, 4, 5))
+        E_dot, G_dot = 2 * _dot(D[1], turned[0]), 2 * _dot(D[2], turned[1])
+        F_dot = _dot(D[1], turned[1]) + _dot(turned[0], D[2])
+        area, area_dot = E * G - F**2, E_dot * G + E * G_dot - 2 * F * F_dot
+        mean, gaussian = (E * N - 2 * F * M + G * L) / (2 * area), (L * N - M**2) / area
+        top = E_dot * N + E * N_dot - 2 * (F_dot * M + F * M_dot) + G_dot * L + G * L_dot
+        bottom = L_dot * N + L * N_dot - 2 * M * M_dot
+        return Curvature(mean, gaussian, (top / 2 - mean * area_dot) / area, (bottom - gaussian * area_dot) / area)
+
+    def rates(self, x: ArrayLike, moves: ArrayLike, shift: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> Rates:
+        """Rates of the projection of points that move at velocities [m/s], as the surface moves by ``shift`` [m/s] and
+        turns about the origin by ``spin`` [rad/s]; InputError where the nearest point is not one.
+        """
+        x, moves, spin = (np.asarray(item, dtype=float) for item in (x, moves, spin))
+        found = self.nearest(x)
+        if np.any(found.tied):
+            raise InputError("two points of the surface are equally near, so that their distance has no rate.")
+        D = self.derivatives(found.at, SECOND)
+        relative = moves - np.asarray(shift, dtype=float) - np.cross(spin, x)
+        _, (a, b, c) = _forms(D, found.normal * found.gap[..., None])
+        along, across = _dot(relative, D[1]), _dot(relative, D[2])
+        det = a * c - b**2
+        at = np.stack([(c * along - b * across) / det, (a * across - b * along) / det], axis=-1)
+        glide = at[..., :1] * D[1] + at[..., 1:] * D[2]
+        vector = relative - glide + np.cross(spin, x - D[0])
+        # Weingarten: the normal turns with the second form.
+        slopes = np.stack([_dot(D[3], found.normal), _dot(D[4], found.normal), _dot(D[5], found.normal)])
+        E, F, G = _metric(D)
+        first = slopes[0] * at[..., 0] + slopes[1] * at[..., 1]
+        second = slopes[1] * at[..., 0] + slopes[2] * at[..., 1]
+        area = (E * G - F**2)[..., None]
+        turned = (G * first - F * second)[..., None] * D[1] + (E * second - F * first)[..., None] * D[2]
+        normal = -turned / area + np.cross(spin, found.normal)
+        return Rates(at, _dot(relative, found.normal), vector, normal, self.curvature(found.at, at))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("...i,...i", a, b))
+
+
+def _metric(D: Array) -> tuple[Array, Array, Array]:
+    return _dot(D[1], D[1]), _dot(D[1], D[2]), _dot(D[2], D[2])
+
+
+def _determinant(form: tuple[Array, Array, Array]) -> Array:
+    return form[0] * form[2] - form[1] ** 2
+
+
+def _forms(D: Array, away: Array) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
+    """The metric, and the second derivatives of half the squared distance, each uu, uv, vv."""
+    E, F, G = _metric(D)
+    return (E, F, G), (E - _dot(away, D[3]), F - _dot(away, D[4]), G - _dot(away, D[5]))
+
+
+def _step(D: Array, away: Array, lowest: Any, highest: Any) -> Array:
+    """Newton's step towards the nearest point, that of the metric where the distance is not convex; along an edge where
+    it would leave the surface.
+    """
+    metric, hessian = _forms(D, away)
+    slope = np.stack([-_dot(away, D[1]), -_dot(away, D[2])], axis=-1)
+    convex = (_determinant(hessian) > SAME * _determinant(metric)) & (hessian[0] > 0)
+    a, b, c = (np.where(convex, mine, usual) for mine, usual in zip(hessian, metric, strict=True))
+    held = (lowest & (slope > 0)) | (highest & (slope < 0))
+    b = np.where(held.any(axis=-1), 0.0, b)
+    slope = np.where(held, 0.0, slope)
+    # With the mixed derivative gone each of the others has to be positive by itself.
+    a, c = (np.where(x > 0, x, usual) for x, usual in ((a, metric[0]), (c, metric[2])))
+    det = np.maximum(a * c - b**2, TINY)
+    raised = np.stack([b * slope[..., 1] - c * slope[..., 0], b * slope[..., 0] - a * slope[..., 1]], axis=-1)
+    return np.asarray(raised / det[..., None])

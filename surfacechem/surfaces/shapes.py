@@ -1,0 +1,348 @@
+"""Shapes of surfaces: plane, sphere, cap, cavity, cylinder, paraboloid, cone, torus, wavy, measured heights."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from surfacechem.contracts.terms import Shape, option, parameter
+from surfacechem.errors import InputError
+from surfacechem.expressions import Expression, cos, sin
+
+if TYPE_CHECKING:
+    from surfacechem.contracts.fits import Array
+
+Span = tuple[tuple[float, float], tuple[float, float]]
+Point = tuple[Expression, Expression, Expression]
+
+ROUND = (-math.pi, math.pi)
+STEEPEST = 1.57
+"""Slope of a cone at most; a needle has no height."""
+
+
+def _half(extent: float | None) -> tuple[float, float]:
+    """From minus to plus half of an extent, which may be infinite."""
+    half = math.inf if extent is None else extent / 2
+    return -half, half
+
+
+class Plane(Shape):
+    r"""Plane, or a rectangular plate.
+
+    .. math:: x = (u, v, 0)
+
+    Source: elementary. Without length or width it has no end in that direction.
+
+    >>> Plane().point(1.0, 2.0)
+    (1.0, 2.0, 0.0)
+    """
+
+    length: float | None = parameter("m", "extent along x", default=None, above=0, varies=False)
+    width: float | None = parameter("m", "extent along y", default=None, above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the coordinates (u, v)."""
+        return u, v, 0 * u
+
+    @property
+    def span(self) -> Span:
+        """The rectangle."""
+        return _half(self.length), _half(self.width)
+
+    def foot(self, x: Array) -> Array:
+        """Below the point, or on the edge."""
+        low, high = np.transpose(self.span)
+        return np.asarray(np.clip(x[..., :2], low, high))
+
+
+class Sphere(Shape):
+    r"""Sphere.
+
+    .. math:: x = R\,(\sin u \cos v,\; \sin u \sin v,\; \cos u - 1)
+
+    Source: elementary. u is the angle from the highest point.
+
+    >>> Sphere(R=2.0).point(0.0, 1.0)
+    (0.0, 0.0, 0.0)
+    """
+
+    about_axis = True
+    closed = (False, True)
+    bulge: ClassVar[int] = 1
+    """One where the centre is in the body, minus one where it is outside."""
+
+    R: float = parameter("m", "radius", above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the angles u from the axis and v about it."""
+        return self.R * sin(u) * cos(v), self.R * sin(u) * sin(v), self.bulge * self.R * (cos(u) - 1)
+
+    @property
+    def span(self) -> Span:
+        """All of it."""
+        return (0.0, math.pi), ROUND
+
+    def foot(self, x: Array) -> Array:
+        """Along the radius, or on the edge."""
+        # The direction from the centre, counted from the apex.
+        up = self.R + self.bulge * x[..., 2]
+        angles = np.arctan2(np.hypot(x[..., 0], x[..., 1]), up), np.arctan2(x[..., 1], x[..., 0])
+        return np.asarray(np.clip(np.stack(angles, axis=-1), *np.transpose(self.span)))
+
+
+class Cap(Sphere):
+    r"""Spherical cap, the part of a sphere around its highest point.
+
+    .. math:: x = R\,(\sin u \cos v,\; \sin u \sin v,\; \cos u - 1), \quad 0 \le u \le \alpha
+
+    Source: elementary.
+
+    >>> Cap(R=2.0, angle=0.5).span[0]
+    (0.0, 0.5)
+    """
+
+    angle: float = parameter("rad", "angle from the highest point to the edge", above=0, at_most=math.pi, varies=False)
+
+    @property
+    def span(self) -> Span:
+        """Up to the edge."""
+        return (0.0, self.angle), ROUND
+
+
+class Cavity(Cap):
+    r"""Inside of a hollow sphere, whose lowest point is the origin.
+
+    .. math:: x = R\,(\sin u \cos v,\; \sin u \sin v,\; 1 - \cos u), \quad 0 \le u \le \alpha
+
+    Source: elementary. Less than a whole sphere where an angle is given.
+
+    >>> Cavity(R=2.0).point(0.0, 1.0) == Sphere(R=2.0).point(0.0, 1.0)
+    True
+    """
+
+    bulge = -1
+
+    angle: float = parameter(
+        "rad", "angle from the lowest point to the edge", default=math.pi, above=0, at_most=math.pi, varies=False
+    )
+
+
+class Cylinder(Shape):
+    r"""Cylinder lying along x.
+
+    .. math:: x = (u,\; R \sin v,\; R\,(\cos v - 1))
+
+    Source: elementary. Without a length it has no end; its end faces are not part of the surface.
+
+    >>> Cylinder(R=2.0).point(1.0, 0.0)
+    (1.0, 0.0, 0.0)
+    """
+
+    closed = (False, True)
+
+    R: float = parameter("m", "radius", above=0, varies=False)
+    length: float | None = parameter("m", "length", default=None, above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the length u and the angle v from the highest line."""
+        return u, self.R * sin(v), self.R * (cos(v) - 1)
+
+    @property
+    def span(self) -> Span:
+        """All around."""
+        return _half(self.length), ROUND
+
+    def foot(self, x: Array) -> Array:
+        """Along the radius, or on the edge."""
+        return np.stack([np.clip(x[..., 0], *_half(self.length)), np.arctan2(x[..., 1], x[..., 2] + self.R)], axis=-1)
+
+
+class Turned(Shape):
+    """Surface of revolution over the distance u from its axis; without a radius of its edge it has no end."""
+
+    about_axis = True
+    closed = (False, True)
+
+    radius: float | None = parameter("m", "radius of its edge", default=None, above=0, varies=False)
+
+    @property
+    def span(self) -> Span:
+        """Up to the edge."""
+        return (0.0, math.inf if self.radius is None else self.radius), ROUND
+
+    def starts(self, x: Array) -> Sequence[Array]:
+        """At the angle of the points about the axis and at the opposite one."""
+        angle, radius = np.arctan2(x[..., 1], x[..., 0]), np.hypot(x[..., 0], x[..., 1])
+        return [np.stack([radius, angle + shift], axis=-1) for shift in (0.0, math.pi)]
+
+    @abstractmethod
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the distance u from the axis and the angle v about it."""
+
+
+class Paraboloid(Turned):
+    r"""Paraboloid of revolution.
+
+    .. math:: x = (u \cos v,\; u \sin v,\; -u^2 / 2R)
+
+    Source: elementary; the parabola of Derjaguin's approximation and of Hertz's theory.
+
+    >>> Paraboloid(R=2.0).point(2.0, 0.0)
+    (2.0, 0.0, -1.0)
+    """
+
+    R: float = parameter("m", "radius of curvature at the highest point", above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the distance u from the axis and the angle v about it."""
+        return u * cos(v), u * sin(v), -(u**2) / (2 * self.R)
+
+
+class Cone(Turned):
+    r"""Cone, the tip up.
+
+    .. math:: x = (u \cos v,\; u \sin v,\; -u \tan\alpha)
+
+    Source: elementary. It is not smooth at its tip.
+
+    >>> round(Cone(slope=0.25).point(2.0, 0.0)[2], 9)
+    -0.510683842
+    """
+
+    slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=STEEPEST, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the distance u from the axis and the angle v about it."""
+        return u * cos(v), u * sin(v), -u * math.tan(self.slope)
+
+
+class Torus(Shape):
+    r"""Torus lying flat.
+
+    .. math:: x = ((R + r \sin u) \cos v,\; (R + r \sin u) \sin v,\; r\,(\cos u - 1)), \quad R = R_0 + r
+
+    Source: elementary. Its hole is open, so that it does not meet itself. Its highest points are a circle of radius R.
+
+    >>> Torus(hole=1.0, r=1.0).point(0.0, 0.0)
+    (2.0, 0.0, 0.0)
+    """
+
+    about_axis = True
+    closed = (True, True)
+
+    hole: float = parameter("m", "radius of its hole, R_0", above=0, varies=False)
+    r: float = parameter("m", "radius of its tube", above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the angle u about the middle of the tube and v about the axis."""
+        out = self.hole + self.r * (1 + sin(u))
+        return out * cos(v), out * sin(v), self.r * (cos(u) - 1)
+
+    @property
+    def span(self) -> Span:
+        """All of it."""
+        return ROUND, ROUND
+
+    def foot(self, x: Array) -> Array:
+        """Along the radius of the tube."""
+        out = np.hypot(x[..., 0], x[..., 1]) - self.hole - self.r
+        return np.stack([np.arctan2(out, x[..., 2] + self.r), np.arctan2(x[..., 1], x[..., 0])], axis=-1)
+
+
+class Wavy(Plane):
+    r"""Wavy surface, a crest at the origin.
+
+    .. math:: x = (u,\; v,\; A\,[\cos(2\pi u/\lambda) \cos(2\pi v/\lambda_2) - 1])
+
+    Source: Westergaard (1939), J. Appl. Mech. 6, A49: the usual model of a regular rough surface. Without
+    :math:`\lambda_2` the waves run along x alone.
+
+    >>> Wavy(amplitude=1e-9, wavelength=1e-7).point(5e-8, 0.0)[2]
+    -2e-09
+    """
+
+    foot = None  # type: ignore[assignment]
+
+    amplitude: float = parameter("m", "amplitude", above=0, varies=False)
+    wavelength: float = parameter("m", "wavelength along x", above=0, varies=False)
+    wavelength_2: float | None = parameter("m", "wavelength along y", default=None, above=0, varies=False)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the coordinates (u, v)."""
+        across = 1 if self.wavelength_2 is None else cos(2 * math.pi / self.wavelength_2 * v)
+        return u, v, self.amplitude * (cos(2 * math.pi / self.wavelength * u) * across - 1)
+
+    def starts(self, x: Array) -> Sequence[Array]:
+        """Below the point, and on the crests and flanks around it."""
+        steps = (-0.25, 0.0, 0.25)
+        across = (0.0,) if self.wavelength_2 is None else steps
+        shifts = [(a * self.wavelength, b * (self.wavelength_2 or 0.0)) for a in steps for b in across]
+        return [np.clip(x[..., :2] + shift, *np.transpose(self.span)) for shift in shifts]
+
+
+class Heights(Shape):
+    r"""Measured heights on a grid, joined by a spline of degree five; the highest of them is at zero.
+
+    .. math:: x = (u,\; v,\; h(u, v))
+
+    Source: de Boor (1978), A Practical Guide to Splines. The grid has no holes, and is where the surface ends.
+
+    >>> Heights(x=range(6), y=range(6), z=[0.0] * 36).span
+    ((0.0, 5.0), (0.0, 5.0))
+    """
+
+    x: Sequence[float] = option("places along x, increasing [m]")
+    y: Sequence[float] = option("places along y, increasing [m]")
+    z: Sequence[float] = option("heights, all along y for the first x, then for the next [m]")
+
+    def __post_init__(self) -> None:
+        """Check that the grid is whole."""
+        super().__post_init__()
+        for name, places in (("x", self.x), ("y", self.y)):
+            if len(places) < 6 or np.any(np.diff(places) <= 0):
+                raise InputError(f"heights need at least 6 increasing places along {name}, got {len(places)}.")
+        if len(self.z) != len(self.x) * len(self.y):
+            grid = f"{len(self.x)} x {len(self.y)} places"
+            raise InputError(f"the heights have holes: {len(self.z)} of them on {grid}.")
+        if not np.all(np.isfinite(self.z)):
+            raise InputError("the heights have holes: one of them is not a finite number.")
+
+    @cached_property
+    def spline(self) -> Any:
+        """The surface as a spline."""
+        from scipy.interpolate import RectBivariateSpline
+
+        z = np.reshape(self.z, (len(self.x), len(self.y)))
+        return RectBivariateSpline(self.x, self.y, z - z.max(), kx=5, ky=5)
+
+    def point(self, u: Expression, v: Expression) -> Point:
+        """Point at the coordinates (u, v)."""
+        return u, v, self.spline.ev(u, v)
+
+    @property
+    def span(self) -> Span:
+        """The grid."""
+        return (float(self.x[0]), float(self.x[-1])), (float(self.y[0]), float(self.y[-1]))
+
+    def starts(self, x: Array) -> Sequence[Array]:
+        """Below the point, and the nearest of the places that were measured."""
+        from scipy.spatial import KDTree
+
+        u, v = np.meshgrid(self.x, self.y, indexing="ij")
+        grid = np.stack([u.ravel(), v.ravel(), self.spline(self.x, self.y).ravel()], axis=-1)
+        below = np.clip(x[..., :2], *np.transpose(self.span))
+        return below, grid[KDTree(grid).query(x)[1]][..., :2]
+
+    def derivatives(self, u: Array, v: Array) -> Array:
+        """Those of the spline."""
+        orders = [(i - j, j) for i in range(4) for j in range(i + 1)]
+        found = np.zeros((len(orders), *np.shape(u), 3))
+        found[0, ..., 0], found[0, ..., 1], found[1, ..., 0], found[2, ..., 1] = u, v, 1.0, 1.0
+        for k, (i, j) in enumerate(orders):
+            found[k, ..., 2] = self.spline.ev(u, v, dx=i, dy=j)
+        return found

@@ -1,0 +1,134 @@
+"""Closest-point projection: against dense search, rates against differences, points where it is not one."""
+
+import math
+
+import numpy as np
+import pytest
+
+from surfacechem.errors import InputError
+from surfacechem.laws import find
+from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.shapes import (
+    Cap,
+    Cavity,
+    Cone,
+    Cylinder,
+    Heights,
+    Paraboloid,
+    Plane,
+    Shape,
+    Sphere,
+    Torus,
+    Wavy,
+)
+
+GRID = np.linspace(-3, 3, 25)
+ROUGH = Heights(x=GRID, y=GRID, z=(0.1 * np.cos(1.3 * GRID)[:, None] * np.cos(0.9 * GRID)).ravel())
+SHAPES = [
+    Plane(tilt=0.1),
+    Sphere(R=1.0),
+    Cap(R=1.0, angle=1.2, tilt=0.2),
+    Cavity(R=5.0),
+    Cylinder(R=1.0, turn=0.3),
+    Paraboloid(R=1.0),
+    Cone(slope=0.5),
+    Torus(hole=1.5, r=0.5, tilt=0.1),
+    Wavy(amplitude=0.1, wavelength=3.0, wavelength_2=2.0),
+    Wavy(amplitude=0.1, wavelength=3.0, turn=0.4),
+    ROUGH,
+]
+every_surface = pytest.mark.parametrize(
+    "surface",
+    [Surface(shape, upper, 0.2 * upper) for shape in SHAPES for upper in (False, True)],
+    ids=lambda item: f"{item.shape.name()} {'above' if item.upper else 'below'}",
+)
+
+
+def points(surface):
+    """Points outside of the body, off the axis."""
+    draw = np.random.default_rng(1)
+    x = draw.uniform(0.2, 0.8, (6, 3)) * [1, 1, 0.5] + [0, 0, 0.3]
+    return x * [1, 1, -1] if surface.upper else x
+
+
+@every_surface
+def test_no_other_point_is_nearer_and_the_distance_is_along_the_normal(surface):
+    x = points(surface)
+    found = surface.nearest(x)
+    low, high = np.clip(np.transpose(surface.shape.span), -3, 3)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 401).T, indexing="ij"), axis=-1)
+    all_points = surface.derivatives(np.where(grid == 0, 1e-9, grid), 3)[0].reshape(-1, 3)
+    for point, gap, foot, normal in zip(x, found.gap, found.point, found.normal, strict=True):
+        nearest = np.linalg.norm(all_points - point, axis=-1).min()
+        assert gap <= nearest * (1 + 1e-12)
+        assert nearest - gap < 2e-3
+        assert point - foot == pytest.approx(gap * normal, abs=1e-12)
+    assert not found.tied.any()
+
+
+@every_surface
+def test_rates_are_slopes_of_what_they_are_rates_of(surface):
+    x, h = points(surface), 1e-5
+    draw = np.random.default_rng(2)
+    moves, shift, spin = (draw.normal(size=3) for _ in range(3))
+    rates = surface.rates(x, moves, shift, spin)
+
+    def at(t):
+        """In the coordinates of the moving surface, turned back."""
+        angle = np.linalg.norm(spin) * t
+        k = spin / np.linalg.norm(spin)
+        K = np.cross(np.eye(3), k)
+        turned = np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+        own = (x + moves * t - shift * t) @ turned
+        found = surface.nearest(own)
+        curvature = surface.curvature(found.at)
+        vector = (own - found.point) @ turned.T
+        return found.gap, found.normal @ turned.T, vector, curvature.mean, curvature.gaussian
+
+    early, late = at(-h), at(h)
+    curved = rates.curvature
+    stated = (rates.gap, rates.normal, rates.vector, curved.mean_rate, curved.gaussian_rate)
+    for before, after, rate in zip(early, late, stated, strict=True):
+        assert (after - before) / (2 * h) == pytest.approx(rate, rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("shape", "point"),
+    [
+        (Sphere(R=1.0), (0, 0, -1.0)),
+        (Cavity(R=1.0), (0, 0, 1.0)),
+        (Cylinder(R=1.0), (0.2, 0, -1.0)),
+        (Torus(hole=1.5, r=0.5), (0, 0, 1.0)),
+        (Paraboloid(R=1.0), (0, 0, -3.0)),
+        (Wavy(amplitude=0.5, wavelength=1.0), (0.5, 0, 2.0)),
+    ],
+)
+def test_of_two_equally_near_points_none_is_chosen_silently(shape, point):
+    surface = Surface(shape)
+    assert surface.nearest(point).tied
+    assert not surface.nearest(np.add(point, [0.01, 0.02, 0.03])).tied
+    with pytest.raises(InputError, match="equally near"):
+        surface.rates(point, (0, 0, 1.0))
+
+
+def test_a_body_bulges_or_is_hollow_by_its_curvature():
+    on_axis = [0.0, 0.0, 0.5]
+    for shape, mean in ((Sphere(R=2.0), 0.5), (Cavity(R=2.0), -0.5), (Cylinder(R=2.0), 0.25), (Paraboloid(R=2.0), 0.5)):
+        for surface in (Surface(shape), Surface(shape, upper=True, approach=1.0)):
+            assert surface.curvature(surface.nearest(on_axis).at).mean == pytest.approx(mean, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Torus(hole=0.0, r=1.0), "hole = 0 is outside its range"),
+        (lambda: Heights(x=range(6), y=range(6), z=[0.0] * 35), "have holes: 35 of them on 6 x 6"),
+        (lambda: Heights(x=range(6), y=range(6), z=[math.nan] * 36), "not a finite number"),
+        (lambda: Heights(x=[0.0] * 6, y=range(6), z=[0.0] * 36), "increasing places along x"),
+        (lambda: Sphere(R=-1.0), "R = -1 is outside its range"),
+        (lambda: find(Shape, "spere"), "Did you mean 'sphere'"),
+    ],
+)
+def test_what_is_no_surface_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
