@@ -151,8 +151,12 @@ def check(
     from surfacechem.solve import AUTO
 
     simulation = load(case, changes or ())
+    system, scene = simulation.system, simulation.case.scene
+    if not system.states:
+        typer.echo(check_summary(simulation.case.title, system, scene, None, [], warnings(system)))
+        return
     settings = chosen(simulation, solver, rtol, accuracy)
-    system, scene, model = simulation.system, simulation.case.scene, simulation.model
+    model = simulation.model
     values = model.values()
     try:
         problem = model.problem(settings, values)
@@ -164,6 +168,36 @@ def check(
     why = reasons(model, settings) if settings.solver == AUTO else ()
     settings = model.chosen(settings)
     typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
+
+
+@app.command(epilog=EXIT_CODES)
+def evaluate(
+    case: CaseName,
+    points: Annotated[
+        Path | None,
+        Argument(metavar="[POINTS.csv]", help="States, one a row; the first line is like g_n [nm], T_1 [K]."),
+    ] = None,
+    output: Annotated[
+        Path | None, written_to(".nc, .csv or .parquet; <case name>-points.nc if points are given.")
+    ] = None,
+    changes: Changes = None,
+    quiet: Quiet = False,
+) -> None:
+    """Evaluate a case at given states: tractions, fluxes, rates, energies and their exact derivatives."""
+    from surfacechem.results.netcdf import dataset_path
+    from surfacechem.runs.points import read_points
+    from surfacechem.runs.simulation import load
+    from surfacechem.runs.summaries import points_summary
+
+    simulation = load(case, changes or ())
+    target = dataset_path(output or f"{simulation.case.name}-points.nc") if points or output else None
+    if target:
+        refuse_unwritable(target)
+    found = simulation.evaluated(read_points(points, simulation.evaluator) if points else None)
+    if target:
+        found.write(target)
+    if not quiet:
+        typer.echo(points_summary(found, target))
 
 
 @app.command()

@@ -341,4 +341,7 @@ def from_plain(value: object, place: Place) -> Tree:
         return Tree([from_plain(item, place) for item in value], place)
     if isinstance(value, Real) and not isinstance(value, bool):  # NumPy's numbers too
         return Tree(int(value) if isinstance(value, Integral) else float(value), place)
+    if value is not None and not isinstance(value, str | bool):
+        message = f"a case holds numbers, texts, lists and mappings, not {type(value).__name__}."
+        raise InputError(message, place)
     return Tree(value, place)

@@ -3,7 +3,7 @@
 :mod:`~surfacechem.format.sections` declares every key; reader, JSON Schema and documentation follow from it.
 """
 
-from surfacechem.format.cases import Case, load, load_text, names
+from surfacechem.format.cases import Case, Overrides, Source, load, load_text, names
 from surfacechem.format.reader import ExactSolution
 
-__all__ = ["Case", "ExactSolution", "load", "load_text", "names"]
+__all__ = ["Case", "ExactSolution", "Overrides", "Source", "load", "load_text", "names"]

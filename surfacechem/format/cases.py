@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from io import TextIOBase
 from pathlib import Path
 
 from surfacechem.documents import document, shipped
@@ -36,7 +37,8 @@ class Case:
     source: str
     description: str
     scene: Scene
-    run: Run
+    own_run: Run | None
+    """How it is run; a case that is only evaluated need not say it."""
     reference: ExactSolution | None
     sweep: SweepSection | None
     text: str
@@ -45,6 +47,14 @@ class Case:
     file: str
     unused: str = ""
     """Why the exact solution that the case names does not count after a change; empty where it does."""
+
+    @property
+    def run(self) -> Run:
+        """How it is run; InputError where it does not say it."""
+        if self.own_run is None:
+            message = "the case needs `run`: times, accuracy, solver, for example `run: {until: 5 s}`."
+            raise InputError(message, self.places[""])
+        return self.own_run
 
     def system(self) -> System:
         """The assembled scene; errors have their place in the case file."""
@@ -63,12 +73,26 @@ class Case:
         return InputError(error.message, self.places[path])
 
 
-def load(name: str | Path, overrides: Overrides = ()) -> Case:
-    """Read a case from a file, or one of the shipped ones by its name.
+Source = str | Path | Mapping[str, object] | TextIOBase
+"""A case: its file, the name of a shipped one, its text, its keys and values, or an open file."""
+
+
+def load(source: Source, overrides: Overrides = ()) -> Case:
+    """Read a case from a file, a text of several lines, a mapping or an open file, or a shipped one by its name.
 
     ``overrides`` are texts "path=value" or a mapping from path to value, put into the document before it is read.
     """
-    path, shown = _find(str(name))
+    if isinstance(source, Mapping):
+        return load_text(document.dump(document.from_plain(dict(source), Place())), overrides=overrides)
+    if isinstance(source, str) and "\n" in source:
+        return load_text(source, overrides=overrides)
+    if isinstance(source, TextIOBase):
+        file = Path(str(getattr(source, "name", "case.yaml")))
+        return load_text(source.read(), file.stem, file.parent, overrides=overrides, file=str(file))
+    if not isinstance(source, str | Path):
+        message = f"a case is a path, a name, a text, a mapping or an open file, not {type(source).__name__}."
+        raise InputError(message)
+    path, shown = _find(str(source))
     return load_text(document.read(path, shown), path.stem, path.parent, overrides=overrides, file=shown)
 
 
@@ -100,7 +124,7 @@ def load_text(
         source=case.source,
         description=case.description,
         scene=scene_of(case, mechanism),
-        run=run_of(case.run),
+        own_run=run_of(case.run) if case.run else None,
         reference=exact_solution_of(case.reference) if case.reference else None,
         sweep=case.sweep,
         text=text,

@@ -539,6 +539,6 @@ class Document(Section):
         ListOf(STAGE, "- approach: {w_n: -1 um/s, until: {p: 10 kPa}}"), "stages of the loading", ()
     )
     initial: Mapping[str, Any] | None = key(INITIAL, "initial values of what evolves")
-    run: RunSection = key(Nested(RunSection), default=REQUIRED)
+    run: RunSection | None = key(Nested(RunSection))
     reference: Tree | None = key(Later(REFERENCE), "an exact solution to compare with")
     sweep: SweepSection | None = key(Nested(SweepSection))

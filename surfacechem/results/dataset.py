@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from surfacechem.model.system import Profile, System
 from surfacechem.quantities import Quantity
-from surfacechem.results.netcdf import CONVENTIONS, Column, dataset_path, package_version, save
+from surfacechem.results import exports
+from surfacechem.results.netcdf import CONVENTIONS, TABLES, Column, dataset_path, package_version, save
 from surfacechem.solve.run import Run, Trajectory
 
 if TYPE_CHECKING:
@@ -122,7 +123,10 @@ class Results(ABC):
         return xarray.Dataset(data, coords=coordinates, attrs=dict(self.attributes))
 
     def write(self, path: str | Path) -> Path:
-        """Save as netCDF; the file appears whole or not at all."""
+        """Save as netCDF, or as a table where the name ends with .csv or .parquet; whole or not at all."""
         target = dataset_path(path)
-        save(target, self.columns, self.attributes)
+        if target.suffix.lower() in TABLES:
+            exports.save_table(target, self.dataset)
+        else:
+            save(target, self.columns, self.attributes)
         return target

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -48,6 +49,10 @@ with netCDF4.Dataset(sys.argv[1]) as file:
 
 SUFFIXES = (".nc", ".nc4", ".cdf")
 """What names of netCDF files end with."""
+
+CSV, PARQUET = ".csv", ".parquet"
+TABLES = (CSV, PARQUET)
+"""What names of files end with that hold a dataset as a table."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +105,13 @@ def dataset_path(path: str | Path) -> Path:
     'run.nc'
     """
     target = Path(path)
-    if target.suffix and target.suffix.lower() not in SUFFIXES:
-        remedy = f"{', '.join(SUFFIXES)}. Give {target.with_suffix('.nc').name}, or a name without suffix."
-        raise InputError(f"datasets are written as netCDF, not as '{target.suffix}': {remedy}", Place(str(path)))
+    suffix = target.suffix.lower()
+    if suffix and suffix not in (*SUFFIXES, *TABLES):
+        remedy = f"{', '.join((*SUFFIXES, *TABLES))}. Give {target.with_suffix('.nc').name}, or a name without suffix."
+        raise InputError(f"no dataset is written as '{target.suffix}': {remedy}", Place(str(path)))
+    if suffix == PARQUET and find_spec("pyarrow") is None:
+        message = "Parquet needs PyArrow: `pip install 'surfacechem[parquet]'`. A .csv needs nothing more."
+        raise InputError(message, Place(str(path)))
     return target
 
 

@@ -111,7 +111,7 @@ def run_again(record: Record) -> Solution | SweepSolution:
         plan = recorded_plan(record.attribute("sweep", str))
     except InputError as error:
         raise error.at(record.place) from None
-    return Simulation(replace(case, run=run)).sweep_plan(plan, departures.get("changes"))
+    return Simulation(replace(case, own_run=run)).sweep_plan(plan, departures.get("changes"))
 
 
 def _departures(record: Record) -> Mapping[str, Any]:

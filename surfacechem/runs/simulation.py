@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from surfacechem.contracts.units import parse
 from surfacechem.documents.document import from_plain
 from surfacechem.documents.overrides import parameter_path
 from surfacechem.errors import InputError, Place, suggestion
-from surfacechem.format import Case
+from surfacechem.format import Case, Overrides, Source
 from surfacechem.model.system import System
 from surfacechem.results import spatial
 from surfacechem.results.accuracy import Accuracy, CellErrors
@@ -29,28 +28,56 @@ from surfacechem.solve import AUTO
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
 
 if TYPE_CHECKING:
+    import xarray
+
     from surfacechem.format.plans import Plan
+    from surfacechem.runs.points import Evaluator, PointResults, Points
     from surfacechem.runs.sweeps import SweepSolution
 
 
-def load(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Simulation:
-    """Read a case by file or by the name of a shipped one; ``overrides`` are "path=value" or {path: value}."""
-    return Simulation(cases.load(name, overrides))
+def load(source: Source, overrides: Overrides = ()) -> Simulation:
+    """Read and check a case; it is assembled and compiled when that is first needed.
+
+    Parameters
+    ----------
+    source
+        The path of a case file or the name of a shipped case; a text of several lines, a mapping of the keys of a case,
+        or an open file. Files that a text or a mapping names are looked for in the working directory.
+    overrides
+        What to change in the case before it is read: texts "path=value", or a mapping from path to value, as numbers in
+        SI or as texts with units.
+
+    Returns
+    -------
+    Simulation
+        Which runs, sweeps and evaluates the case.
+
+    Raises
+    ------
+    InputError
+        One line with file, line, what is wrong and what is allowed.
+
+    Examples
+    --------
+    >>> load("exothermic", ["run.until=1 s"])
+    <Simulation 'Exothermic bonding, kappa = 0.5': phi, T>
+    """
+    return Simulation(cases.load(source, overrides))
 
 
-def run(name: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Solution:
-    """Read a case and run it."""
-    return load(name, overrides).run()
+def run(source: Source, overrides: Overrides = ()) -> Solution:
+    """Read a case, as :func:`load` does, and run it."""
+    return load(source, overrides).run()
 
 
 def sweep(
-    name: str | Path,
+    source: Source,
     over: Mapping[str, object] | None = None,
     until: Mapping[str, object] | None = None,
-    overrides: Sequence[str] | Mapping[str, object] = (),
+    overrides: Overrides = (),
 ) -> SweepSolution:
-    """Read a case and run its sweep, or the one given."""
-    return load(name, overrides).sweep(over, until)
+    """Read a case, as :func:`load` does, and run its sweep, or the one given: see :meth:`Simulation.sweep`."""
+    return load(source, overrides).sweep(over, until)
 
 
 class Simulation:
@@ -76,7 +103,50 @@ class Simulation:
     @cached_property
     def model(self) -> Model:
         """The compiled system."""
-        return Model(self.system)
+        try:
+            return Model(self.system)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    @cached_property
+    def evaluator(self) -> Evaluator:
+        """The scene compiled for its values at given states."""
+        from surfacechem.runs.points import Evaluator
+
+        try:
+            return Evaluator(self.case.scene)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def evaluate(self, points: Points | None = None) -> xarray.Dataset:
+        """Quantities of the scene at given states, and their exact derivatives, without a run.
+
+        Parameters
+        ----------
+        points
+            Values by name, each a number, a list of them, or a text with a unit: prescribed variables, states, or
+            parameters by path. In SI; what is not given has the value of the case at its start. What has no capacity
+            or inertia is solved for unless it is given.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along ``point``: what is given, tractions, fluxes, rates, energies, entropies, heat capacities, and the
+            derivative of each by what is given, ``t_n_by_g_n`` for instance, with unit and long name. ``admissible``
+            is zero where a law does not hold, and ``reason`` says why.
+
+        Raises
+        ------
+        InputError
+            Where the scene has nothing of a name, or a value is no finite number.
+        """
+        return self.evaluated(points).dataset
+
+    def evaluated(self, points: Points | None = None) -> PointResults:
+        """The same, ready to be written."""
+        from surfacechem.runs.points import evaluation
+
+        return evaluation(self.evaluator, points or {}, **self._origin({}))
 
     def run(
         self, changes: Mapping[str, float | str] | None = None, run: Run | None = None, error: str = "auto"
@@ -307,7 +377,7 @@ class Simulation:
         if paths not in self._freed:
             case = self.case
             freed = cases.load_text(case.text, case.name, mechanism_text=case.mechanism_text, overrides=departing)
-            self._freed[paths] = Simulation(replace(freed, run=case.run, file=case.file))
+            self._freed[paths] = Simulation(replace(freed, own_run=case.own_run, file=case.file))
         return self._freed[paths]
 
     def _values(self, changes: Mapping[str, float | str]) -> dict[str, float]:

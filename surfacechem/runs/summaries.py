@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
     from surfacechem.runs.check import Group
+    from surfacechem.runs.points import PointResults
     from surfacechem.runs.sweeps import SweepSolution
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Run
@@ -155,6 +156,22 @@ def swept_in_words(plan: Plan, names: Mapping[str, str]) -> str:
     return f"{text} by {sample}" if text else sample
 
 
+def points_summary(found: PointResults, written: Path | None) -> str:
+    """Every quantity of a single point; of many, what there is of them and where it is."""
+    refused = [(i, why) for i, why in enumerate(found.refused) if why]
+    lines, count = [found.title or "untitled"], len(found.refused)
+    if count == 1:
+        table = [(c.name, f"{c.values[0]:.12g}", c.unit, c.long_name) for c in (*found.values, *found.slopes)]
+        lines += [f"  {line}" for line in columns(table)]
+    else:
+        text = f"{count}, with {len(found.values)} quantities and {len(found.slopes)} derivatives each"
+        lines.append(labelled("points", text))
+    if refused:
+        more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
+        lines.append(labelled("refused", f"point {refused[0][0]}: {refused[0][1]}{more}"))
+    return "\n".join([*lines, *([labelled("written", str(written))] if written else [])])
+
+
 def _sweep_events(solution: SweepSolution) -> str:
     """What jumped in all runs, and what the second law says to it."""
     runs = [run.jumps for run in solution.runs]
@@ -177,7 +194,7 @@ def check_summary(
     title: str,
     system: System,
     scene: Scene,
-    run: Run,
+    run: Run | None,
     groups: Sequence[Group],
     warnings: Sequence[str],
     choices: Sequence[Sequence[str]] = (),
@@ -202,8 +219,10 @@ def check_summary(
     return "\n".join(lines)
 
 
-def _plan(system: System, run: Run) -> str:
+def _plan(system: System, run: Run | None) -> str:
     """How a scene is run, and where its steps end."""
+    if run is None:
+        return "none, as everything is prescribed: `surfacechem evaluate` gives its quantities at any state"
     parts = [f"{run.solver} at rtol {run.rtol:g}, {len(run.times)} output times to t = {run.times[-1]:g} s"]
     if inside := sum(0 < t < run.times[-1] for t in system.breakpoints):
         parts.append(f"{inside} breakpoint{'s' if inside > 1 else ''}")

@@ -173,10 +173,18 @@ def values_of(system: System, changes: Mapping[str, float] | None = None) -> dic
     return values
 
 
+def _refuse_nothing(system: System) -> None:
+    """InputError where a scene has no state."""
+    if not system.states:
+        remedy = "Let a temperature or bonds evolve, or give the case to `surfacechem evaluate`."
+        raise InputError(f"there is nothing to solve: everything is prescribed. {remedy}", path="bodies")
+
+
 class Model:
     """A system with its machine code, made when it is built."""
 
     def __init__(self, system: System) -> None:
+        _refuse_nothing(system)
         start = time.perf_counter()
         n, inputs = len(system.states), system.inputs
         filler, outside = None, system.outside

@@ -133,14 +133,14 @@ class TestRun:
         (["run", "bonding.yaml", "-o", "no/folder/x.nc"], "no/folder/x.nc: cannot be written"),
         (["run", "bonding.yaml", "-o", "."], "is a directory"),
         (
-            ["run", "bonding.yaml", "-o", "x.csv"],
-            "x.csv: datasets are written as netCDF, not as '.csv': .nc, .nc4, .cdf.",
+            ["run", "bonding.yaml", "-o", "x.txt"],
+            "x.txt: no dataset is written as '.txt': .nc, .nc4, .cdf, .csv, .parquet.",
         ),
         (["run", "bonding.yaml", "-o", "bonding.yaml"], "is the case itself"),
         (["run", "loop.yaml"], "surfacechem: loop.yaml: is a link to loop.yaml, where no file is."),
         (
-            ["sweep", "bonding.yaml", "--over", "initial.T=[300]", "-o", "x.csv"],
-            "not as '.csv': .nc, .nc4, .cdf. Give x.nc",
+            ["sweep", "bonding.yaml", "--over", "initial.T=[300]", "-o", "x.txt"],
+            "written as '.txt': .nc, .nc4, .cdf, .csv, .parquet. Give x.nc",
         ),
         (["equations", "bonding.yaml", "--format", "pyton"], "Did you mean 'python'?"),
         (["laws", "colomb"], "Did you mean 'coulomb'?"),

@@ -20,14 +20,12 @@ RUN = """\
 initial: {T_1: 300 K, T_2: 310 K}
 run: {until: 5 s}
 """
-RESERVOIRS = BODIES.replace("T_1, C: 1 kJ/m^2/K", "300 K").replace("T_2, C: 1 kJ/m^2/K", "310 K")
 
 MISTAKES = [
     (
         BODIES.replace("T_0: 300 K\n", "") + RUN,
         "case.yaml:2: bodies.lower: the body lower reads the reference temperature T_0,",
     ),
-    (RESERVOIRS + "run: {until: 5 s}\n", "case.yaml:2: bodies: there is nothing to solve: everything is prescribed."),
     (
         BODIES + "interface: {temperature: T_c}\nloading: {Q_c: 1 W/m^2}\n" + RUN,
         "case.yaml:5: interface.temperature: nothing determines the interface temperature T_c: it has no capacity",

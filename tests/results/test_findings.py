@@ -305,7 +305,7 @@ def test_a_factor_of_temperature_is_given_a_temperature():
 
 def test_a_scene_with_nothing_to_solve_is_refused():
     with pytest.raises(InputError, match="there is nothing to solve: everything is prescribed"):
-        assemble(Scene(ISOTHERMAL, Interface(), T_0=300.0))
+        Model(assemble(Scene(ISOTHERMAL, Interface(), T_0=300.0)))
 
 
 def test_bonds_that_pass_their_bound_leave_finite_numbers():

@@ -1,12 +1,16 @@
 """Running a loaded case with changed parameters, times and tolerances."""
 
 import dataclasses
+import io
 import pickle
 
 import numpy as np
+import pandas
 import pytest
+from ruamel.yaml import YAML
 
 import surfacechem
+from surfacechem.documents import shipped
 from surfacechem.errors import InputError
 from surfacechem.runs import rerun
 
@@ -120,9 +124,45 @@ def test_a_sweep_comes_back_from_a_pickle_as_it_was(name, over):
     assert again.dataset.drop_attrs().identical(swept.dataset.drop_attrs())
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".txt"])
+@pytest.mark.parametrize("suffix", [".xlsx", ".json", ".txt"])
 def test_a_dataset_is_written_under_the_name_of_its_format_only(simulation, tmp_path, suffix):
     target = tmp_path / f"run{suffix}"
-    with pytest.raises(InputError, match=r"written as netCDF, not as '\.\w+': \.nc, \.nc4, \.cdf\. Give run\.nc"):
+    with pytest.raises(InputError, match=r"is written as '\.\w+': \.nc, \.nc4, \.cdf, \.csv, \.parquet\. Give run\.nc"):
         simulation.run().write(target)
     assert not target.exists()
+
+
+def test_a_case_is_a_path_a_text_a_mapping_or_an_open_file(tmp_path):
+    path = shipped.cases() / "exothermic.yaml"
+    text = path.read_text()
+    content = YAML(typ="safe").load(text)
+    content["initial"]["T"] = np.float64(300)
+    with path.open() as file:
+        found = [surfacechem.load(source) for source in (path, str(path), text, content, file, io.StringIO(text))]
+    first = found[0].run().dataset["T"].values
+    assert all(np.array_equal(simulation.run().dataset["T"].values, first) for simulation in found[1:])
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (3, "a case is a path, a name, a text, a mapping or an open file, not int"),
+        ({"bodies": object()}, "a case holds numbers, texts, lists and mappings, not object"),
+        ("title: none\n", "case.yaml:1: the case needs `bodies`"),
+    ],
+)
+def test_what_is_no_case_is_refused(source, message):
+    with pytest.raises(InputError, match=message):
+        surfacechem.load(source)
+
+
+def test_a_dataset_is_a_table_by_its_suffix(simulation, tmp_path):
+    solution = simulation.run()
+    frames = [pandas.read_csv(solution.write(tmp_path / "run.csv"))]
+    frames.append(pandas.read_parquet(solution.write(tmp_path / "run.parquet")))
+    for frame in frames:
+        assert np.array_equal(frame["T [K]"], solution.dataset["T"])
+        assert np.array_equal(frame["time [s]"], solution.dataset["time"])
+    swept = simulation.sweep({"initial.T": [300.0, 310.0]})
+    table = pandas.read_csv(swept.write(tmp_path / "sweep.csv"))
+    assert np.array_equal(table["phi [1]"].to_numpy(), swept.dataset["phi"].values.ravel())

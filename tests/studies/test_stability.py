@@ -242,7 +242,7 @@ def test_runs_that_take_too_many_steps_are_counted_and_a_study_tells_what_it_is_
 @pytest.mark.parametrize(("name", "value"), SENSITIVE_CELLS)
 def test_where_an_answer_has_no_digits_the_summary_of_the_run_says_so(name, value):
     case = read(regimes()[name].problem(value))
-    solution = Simulation(replace(case, run=replace(case.run, rtol=1e-10))).run()
+    solution = Simulation(replace(case, own_run=replace(case.run, rtol=1e-10))).run()
     unknown = "ended earlier" in solution.accuracy.source
     assert unknown or solution.accuracy.error > 10.0**-LEAST_DIGITS
     assert any("error" in warning for warning in solution.warnings), solution.warnings

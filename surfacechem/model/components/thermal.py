@@ -117,9 +117,6 @@ def rows(build: Build) -> Iterator[Power | State | Margin]:
             symbol = build.name(quantity, capacity)
             reason = f"the heat capacity at {node.name} was lost"
             yield Margin(f"C_{node.name} > 0", symbol, reason, remedy=CAPACITY_REMEDY, path="interface")
-    if not (build.states or thermal.slabs):
-        message = "there is nothing to solve: everything is prescribed. Let a temperature or bonds evolve."
-        raise InputError(message, Place(path="bodies"))
 
 
 def _temperature_state(build: Build, node: Node) -> State:

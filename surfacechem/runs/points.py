@@ -1,0 +1,345 @@
+"""A scene at given states, without a run: its quantities there, with exact derivatives by what is given.
+
+At each point the states and the prescribed variables have given values, and what is prescribed is held. What follows
+from the balances there is solved for: the rates of what evolves, the values of what has no capacity or inertia.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import symengine
+from numpy.typing import ArrayLike, NDArray
+
+from surfacechem.compile.program import PIECE, Function, compile_function, expanded, jacobian
+from surfacechem.contracts.terms import Load
+from surfacechem.contracts.units import parse, quotient
+from surfacechem.documents import document
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.expressions import derivative
+from surfacechem.format.csvtable import CSVText
+from surfacechem.laws.loading import Hold
+from surfacechem.model.assemble import assemble
+from surfacechem.model.system import Named, System
+from surfacechem.quantities import Quantity
+from surfacechem.results.dataset import DATASET_NAMES, Results
+from surfacechem.results.netcdf import CONVENTIONS, Column, package_version, versions
+from surfacechem.scene import Scene
+from surfacechem.solve.run import values_of
+from surfacechem.tolerances import ROUNDING, TINY
+
+Array = NDArray[np.float64]
+Points = Mapping[str, ArrayLike]
+
+TRIALS = 50
+"""Steps of Newton's method at most; what is linear, as all rates are, takes one."""
+
+POINT = ("point",)
+LEVEL = ".level"
+"""How the paths of the values end at which histories are held."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class PointResults(Results):
+    """Quantities at points: ``dataset`` is the xarray Dataset, ``write`` saves the same as netCDF."""
+
+    values: Sequence[Column]
+    """What is given, and what follows from it."""
+    slopes: Sequence[Column]
+    """Derivatives of what follows by what is given."""
+    refused: Sequence[str]
+    """Why the laws do not hold at a point, by point; empty where they do."""
+
+    @property
+    def columns(self) -> Sequence[Column]:
+        """Every variable of the dataset."""
+        count = len(self.refused)
+        allowed = np.array([not why for why in self.refused], dtype=float)
+        found = [Column("point", POINT, np.arange(count, dtype=float), "1", "number of the point")]
+        found += [*self.values, *self.slopes, Column("admissible", POINT, allowed, "1", "one where all laws hold")]
+        if any(self.refused):
+            why = np.array(self.refused, dtype=object)
+            found.append(Column("reason", POINT, why, "1", "why a law does not hold"))
+        return found
+
+    @property
+    def attributes(self) -> Mapping[str, str | float | int]:
+        """Where the dataset is from."""
+        history = f"evaluated by surfacechem {package_version('surfacechem')} at {len(self.refused)} points"
+        mechanism = {"mechanism": self.mechanism} if self.mechanism else {}
+        origin = {"Conventions": CONVENTIONS, "title": self.title, "source": self.source or "surfacechem"}
+        return {**origin, "history": history, "case": self.case, **mechanism, "versions": versions()}
+
+
+def held(scene: Scene) -> Scene:
+    """The scene with every history held at its value at the start."""
+
+    def level(load: Any) -> Any:
+        # One parameter stands for all of a history, so that derivatives are by that.
+        return Hold(level=load.at_start(), place=load.place) if isinstance(load, Load) else load
+
+    def body(number: int) -> Any:
+        given = scene.bodies[number]
+        conduction = given.conduction and replace(given.conduction, far=level(given.conduction.far))
+        return replace(given, temperature=level(given.temperature), conduction=conduction)
+
+    return replace(
+        scene,
+        bodies=(body(0), body(1)),
+        interface=replace(scene.interface, temperature=level(scene.interface.temperature)),
+        loading={name: level(load) for name, load in scene.loading.items()},
+        surroundings=level(scene.surroundings),
+    )
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What points may give: its place among the arguments of compiled functions, and what it is."""
+
+    column: int
+    quantity: Quantity
+    is_log: bool = False
+    """Whether the argument is its logarithm."""
+
+    def values(self, table: Array) -> Array:
+        """Its values, from the arguments."""
+        return np.exp(table[:, self.column]) if self.is_log else table[:, self.column]
+
+    def put(self, table: Array, values: Array) -> None:
+        """Make these its values; of what has no logarithm the argument is no number, so that no law holds there."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            table[:, self.column] = np.log(values) if self.is_log else values
+
+
+class Evaluator:
+    """A scene compiled for its values and derivatives at many points."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.system = system = assemble(held(scene))
+        if system.outside is not None:
+            message = "rates of the mechanism come from Cantera itself, which gives no derivatives."
+            raise InputError(message, path="interface.mechanism")
+        n = len(system.states)
+        self.given, self.parameters = _states(system) | _histories(system), _parameters(system)
+        # What is solved for: rates of what evolves, values of what is algebraic.
+        self.unknown = [1 + j if state.algebraic else 1 + n + j for j, state in enumerate(system.states)]
+        self.rows = [*_rates(system), *(item for item in system.outputs if item.name not in self.given)]
+        self.rows += _capacities(system, scene, self.given)
+        # Whether a state is stable is not asked of a point.
+        self.margins = [margin for margin, _ in system.limits if not margin.stability]
+        by = sorted({*self.unknown, *(item.column for item in self.given.values())})
+        expressions = [*system.rows.values(), *(row.expression for row in self.rows)]
+        self.slopes = Slopes(system, expressions, by, [margin.masked for margin in self.margins])
+        self.modes = [mode for mode in system.modes if mode.start is not None]
+
+    def at(self, points: Points) -> tuple[list[Column], list[Column], list[str]]:
+        """Columns of what is given, what follows and the derivatives; why laws do not hold, by point."""
+        table, asked = self._table(points)
+        sought = self._sought(asked.values())
+        unknown = [self.unknown[i] for i in sought]
+        # All that may be given, in one order, but for what is solved for.
+        own = {name: item for name, item in self.given.items() if item.column not in unknown}
+        values, slopes, margins = self._solved(table, sought, unknown)
+        shown = {i: row.quantity for i, row in enumerate(self.rows, start=len(self.unknown)) if row.name not in own}
+        found = [_column(item.quantity, item.values(table)) for item in (own | asked).values()]
+        found += [_column(quantity, values[:, i]) for i, quantity in shown.items()]
+        by = [item.column for item in own.values()]
+        total, there = self.slopes.total(slopes, [*shown], by, sought, unknown)
+        derivatives: list[Column] = []
+        for k, item in enumerate(own.values()):
+            # The argument of what is a logarithm is ln x, whose derivative by x is 1/x.
+            per = 1 / item.values(table) if item.is_log else 1.0
+            derivatives += _by(item.quantity, [*shown.values()], total[:, :, k].T * per, there[:, k])
+        return found, derivatives, [self._refusal(row) for row in margins]
+
+    def _sought(self, asked: Iterable[Argument]) -> list[int]:
+        """Balances that hold at the points: those of what they do not give."""
+        taken = {item.column for item in asked}
+        return [i for i, column in enumerate(self.unknown) if column not in taken]
+
+    def _refusal(self, margins: Array) -> str:
+        """Why a law does not hold, at a point with these margins; empty where all do."""
+        return next((m.reason for m, value in zip(self.margins, margins, strict=True) if not value > 0), "")
+
+    def _table(self, points: Points) -> tuple[Array, dict[str, Argument]]:
+        """The arguments of compiled functions at each point, and what the points give."""
+        known, system = self.given | self.parameters, self.system
+        for name in points:
+            if name not in known:
+                raise InputError(f"points cannot give '{name}'.{suggestion(name, known)}")
+        given = {name: _numbers(name, value, known[name].quantity.unit) for name, value in points.items()}
+        try:
+            columns = dict(zip(given, np.broadcast_arrays(*given.values()), strict=True))
+        except ValueError:
+            sizes = ", ".join(f"{len(x)} of {name}" for name, x in given.items())
+            raise InputError(f"points need as many values of everything: there are {sizes}.") from None
+        values = values_of(system)
+        states = [state.from_given(values) for state in system.states]
+        first = [0.0, *states, *np.zeros(len(states)), *(values[p.path] for p in system.parameters)]
+        table = np.tile(np.array(first), (len(next(iter(columns.values()), [0])), 1))
+        for name, x in columns.items():
+            known[name].put(table, x)
+        # A point has no past: bodies that overlap are in contact, what slides slides.
+        if self.modes:
+            table[:, [system.inputs.index(mode.symbol) for mode in self.modes]] = self._start(table)
+        return table, {name: known[name] for name in columns}
+
+    @cached_property
+    def _start(self) -> Function:
+        """The modes in which a run would start from a state."""
+        return compile_function(self.system.inputs, [self.system.expand(mode.start) for mode in self.modes])
+
+    def _solved(self, table: Array, rows: Sequence[int], unknown: Sequence[int]) -> tuple[Array, Array, Array]:
+        """Balances and rows at the points, their derivatives and the margins, where these balances hold."""
+        for _ in range(TRIALS):
+            values, slopes, margins = self.slopes(table)
+            change = -_solve(self.slopes.block(slopes, rows, unknown), values[:, rows, None])[..., 0]
+            if np.all(np.isnan(change) | (np.abs(change) <= ROUNDING * np.maximum(np.abs(table[:, unknown]), TINY))):
+                break
+            table[:, unknown] += change  # all of a row becomes not a number where its balances have no solution
+        return values, slopes, margins
+
+
+class Slopes:
+    """Rows of expressions with their exact derivatives by some arguments, compiled together, and with some margins."""
+
+    def __init__(self, system: System, rows: Sequence[Any], by: Sequence[int], margins: Sequence[Any]) -> None:
+        inputs, self.by = system.inputs, list(by)
+        named = [(symengine.Symbol(item.name), item.expression) for item in system.named]
+        slopes, names = jacobian(rows, [inputs[column] for column in by], named)
+        places = {inputs[column]: k for k, column in enumerate(by)}
+        found = {(i, places[x]): slope for i, row in enumerate(slopes) for x, slope in row.items() if slope != 0}
+        self.pattern = np.zeros((len(rows), len(by)), dtype=bool)
+        self._entries = np.array([*found], dtype=np.int64).reshape(-1, 2).T
+        self.pattern[self._entries[0], self._entries[1]] = True
+        whole = expanded(names, [*rows, *found.values(), *margins])
+        self._function = compile_function(inputs, whole, PIECE if system.profiles else None)
+
+    def __call__(self, table: Array) -> tuple[Array, Array, Array]:
+        """Values, derivatives of shape (points, rows, arguments), and margins."""
+        ends = np.cumsum([len(self.pattern), self._entries.shape[1]])
+        values, entries, margins = np.split(self._function(table), ends, axis=1)
+        slopes = np.zeros((len(table), *self.pattern.shape))
+        slopes[:, self._entries[0], self._entries[1]] = entries
+        return values, slopes, margins
+
+    def block(self, slopes: NDArray[Any], rows: Sequence[int], by: Sequence[int]) -> NDArray[Any]:
+        """Derivatives of some rows by some arguments."""
+        return slopes[..., rows, :][..., [self.by.index(column) for column in by]]
+
+    def total(
+        self, slopes: Array, rows: Sequence[int], by: Sequence[int], sought: Sequence[int], unknown: Sequence[int]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Derivatives of rows by what is given, through what is solved for too, and which of them may be other than 0.
+
+        G(u, x) = 0 gives du/dx = -(dG/du)^-1 dG/dx.
+        """
+        parts = [(rows, by), (rows, unknown), (sought, unknown), (sought, by)]
+        direct, through, inner, outer = (self.block(slopes, *part) for part in parts)
+        there, passes, among, reached = (self.block(self.pattern, *part) for part in parts)
+        # Which unknowns follow an argument through others: what is zero for every scene of this form is left out.
+        for _ in unknown:
+            reached = reached | (among @ reached)
+        return direct - through @ _solve(inner, outer), there | (passes @ reached)
+
+
+def _states(system: System) -> dict[str, Argument]:
+    """States as points may give them, but for those inside bodies."""
+    found = []
+    for column, state in enumerate(system.states, start=1):
+        is_log = state.given is not None and state.given.state is None
+        found.append(Argument(column, state.given.quantity if state.given and is_log else state.quantity, is_log))
+    inside = system.inside
+    return {item.quantity.name: item for item in found if item.quantity.name not in inside}
+
+
+def _histories(system: System) -> dict[str, Argument]:
+    """Prescribed variables, which are parameters where they are held."""
+    levels = {p.symbol for p in system.parameters if p.path.endswith(LEVEL)}
+    held_at = [item for item in system.named if item.expression in levels]
+    return {item.name: Argument(system.inputs.index(item.expression), item.quantity) for item in held_at}
+
+
+def _parameters(system: System) -> dict[str, Argument]:
+    """Parameters of laws by path."""
+    own = [p for p in system.parameters if p.changeable and not p.path.endswith(LEVEL)]
+    quantities = [Quantity(re.sub(r"\W+", "_", p.path).strip("_"), p.spec.unit, p.spec.text) for p in own]
+    return {p.path: Argument(system.inputs.index(p.symbol), q) for p, q in zip(own, quantities, strict=True)}
+
+
+def _rates(system: System) -> Iterator[Named]:
+    """Rates of what evolves and values of what is algebraic."""
+    for state in system.states:
+        if state.algebraic:
+            yield Named(state.quantity, state.symbol)
+        elif state.name not in system.inside:
+            text = f"rate of change of the {state.quantity.long_name}"
+            yield Named(Quantity(f"d{state.name}_dt", quotient(state.quantity.unit, "s"), text), state.dot)
+
+
+def _capacities(system: System, scene: Scene, given: Mapping[str, Argument]) -> Iterator[Named]:
+    """Heat capacities of the bodies and the interface, but for bodies that are divided into cells."""
+    members = [(f"{k}", body.name, body.temperature) for k, body in enumerate(scene.bodies, start=1)]
+    divided = {profile.body for profile in system.profiles}
+    for end, owner, temperature in (*members, ("c", "the interface", scene.interface.temperature)):
+        node = temperature if isinstance(temperature, str) else f"T_{end}"
+        if f"U_{end}" in system.output_columns and node in given and owner not in divided:
+            U, T = system.definitions[symengine.Symbol(f"U_{end}")], system.inputs[given[node].column]
+            yield Named(Quantity(f"C_{end}", "J/(m^2 K)", f"heat capacity of {owner}"), derivative(U, T))
+
+
+def _numbers(name: str, value: ArrayLike, unit: str) -> Array:
+    """Values of a column in SI; a text is a quantity with its unit."""
+    if isinstance(value, str):
+        return np.array([parse(value, unit, name=name)])
+    try:
+        found = np.atleast_1d(np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"{name} takes numbers in SI, or one text with a unit.") from None
+    if found.ndim != 1 or not np.all(np.isfinite(found)):
+        raise InputError(f"{name} takes a list of finite numbers in {unit}.")
+    return found
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """Solutions of many systems; not a number where a matrix is singular."""
+    singular = np.linalg.slogdet(matrix)[0] == 0  # NumPy would refuse all for the sake of one
+    return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
+
+
+def _column(quantity: Quantity, values: Array) -> Column:
+    name = DATASET_NAMES.get(quantity.name, quantity.name)
+    return Column(name, POINT, values, quantity.unit, quantity.long_name, quantity.tag)
+
+
+def _by(x: Quantity, shown: Sequence[Quantity], slopes: Array, there: NDArray[np.bool_]) -> Iterator[Column]:
+    """Derivatives of quantities by one, of those that depend on it."""
+    for quantity, values, depends in zip(shown, slopes, there, strict=True):
+        if depends:
+            name = "_by_".join(DATASET_NAMES.get(name, name) for name in (quantity.name, x.name))
+            text = f"derivative of the {quantity.long_name} by the {x.long_name}"
+            yield Column(name, POINT, values, quotient(quantity.unit, x.unit), text)
+
+
+def read_points(path: Path, evaluator: Evaluator) -> dict[str, list[float]]:
+    """Points from a CSV file, whose first line has names and units: ``g_n [nm], T_1 [K]``."""
+    if not path.is_file():
+        raise InputError("there is no such file of points.", Place(str(path)))
+    text = CSVText(Tree(document.read(path, str(path)), Place(str(path))))
+    for name, _ in text.columns:
+        if name not in evaluator.given:
+            raise text.error(text.heading[0], f"points cannot give '{name}'.{suggestion(name, evaluator.given)}")
+    return {name: text.column(name, evaluator.given[name].quantity.unit, name) for name, _ in text.columns}
+
+
+def evaluation(evaluator: Evaluator, points: Points, **origin: Any) -> PointResults:
+    """Quantities at points, with where they are from."""
+    values, slopes, refused = evaluator.at(points)
+    return PointResults(values=values, slopes=slopes, refused=refused, **origin)

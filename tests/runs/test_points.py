@@ -1,0 +1,145 @@
+"""Quantities at given states: against formulas, against runs, and derivatives against differences."""
+
+import numpy as np
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.runs.points import read_points
+
+ELEMENT = """
+title: A contact element, all of it prescribed
+T_0: 300 K
+bodies:
+  lower: {temperature: 300 K, C: 1 kJ/m^2/K}
+  upper: {temperature: 320 K}
+interface:
+  temperature: 310 K
+  sites: 1e17 1/m^2
+  potential:
+    - bond-stiffness: {E_b: 2 MPa/um, E_n: 50 MPa/um}
+    - bond-energy: {K_2: 30 J/m^2}
+  friction:
+    - coulomb: {mu: 0.3}
+heat:
+  - conductance: {between: [lower, interface], h: 100 W/m^2/K}
+  - conductance: {between: [upper, interface], h: 250 W/m^2/K}
+loading: {g_n: -1 nm, v: 1 mm/s, phi: 0.5}
+run: {until: 1 s}
+"""
+
+POINTS = {
+    "element": {"g_n": -2e-9, "phi": 0.3, "v": 2e-3},
+    "three-temperatures-no-capacity": {},
+    "dna-adhesive": {"theta_bond_s": 0.4, "theta_free_s": 0.5, "T_1": 305.0, "T_2": 330.0},
+    "rate-and-state-velocity-steps": {"theta": 3.0},
+    "generalised-bonding-sliding": {"phi": 0.4, "T": 310.0},
+    "viscous-heating": {},
+}
+
+
+@pytest.fixture
+def element(tmp_path):
+    path = tmp_path / "element.yaml"
+    path.write_text(ELEMENT)
+    return surfacechem.load(path)
+
+
+def test_a_prescribed_contact_gives_what_its_formulas_say(element):
+    gaps = np.array([-3e-9, -1e-9, 2e-9])
+    found = element.evaluate({"g_n": gaps, "T_c": "315 K"})
+    stiffness = np.where(gaps < 0, 50e12, 0.5 * 2e12)
+    assert found["t_n"].values == pytest.approx(stiffness * gaps, rel=1e-14)
+    assert found["t_n_by_g_n"].values == pytest.approx(stiffness, rel=1e-14)
+    assert found["t_n_by_g_n"].attrs == {
+        "units": "Pa m-1",
+        "long_name": "derivative of the normal traction on body 1 by the normal gap",
+    }
+    assert found["t_n_by_phi"].values == pytest.approx(np.where(gaps < 0, 0, 2e12 * gaps), rel=1e-14)
+    assert found["t_coulomb_by_g_n"].values == pytest.approx(np.where(gaps < 0, -0.3 * 50e12, 0), rel=1e-14)
+    assert found["q_1"].values == pytest.approx(1500.0, rel=1e-14)
+    assert found["q_2_by_T_c"].values == pytest.approx(250.0, rel=1e-14)
+    assert found["C_1"].values == pytest.approx(1000.0, rel=1e-14)
+    assert found["S_1_by_T_1"].values == pytest.approx(1000 / 300, rel=1e-14)
+    assert np.all(found["admissible"] == 1)
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_derivatives_are_those_of_the_values(name, element):
+    """Central differences of fourth order agree, to the rounding of the values."""
+    simulation, at = element if name == "element" else surfacechem.load(name), POINTS[name]
+    first = simulation.evaluate(at)
+    given = [key for key in simulation.evaluator.given if key in first and np.any(first[key])]
+    for key in given:
+        x = float(first[key][0])
+        h = 1e-3 * x
+        moved = simulation.evaluate(at | {key: x + h * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])})
+        for slope in (slope for slope in moved if str(slope).endswith(f"_by_{key}")):
+            of = str(slope).removesuffix(f"_by_{key}")
+            y = moved[of].values
+            difference = (8 * (y[3] - y[1]) - (y[4] - y[0])) / (12 * h)
+            size = np.max(np.abs(y)) / abs(x)
+            assert float(moved[slope][2]) == pytest.approx(difference, rel=1e-6, abs=1e-9 * size), slope
+
+
+def test_points_of_a_run_give_its_dataset():
+    simulation = surfacechem.load("three-temperatures")
+    run = simulation.run().dataset
+    states = [state.name for state in simulation.system.states]
+    found = simulation.evaluate({name: run[name].values for name in states})
+    for name in simulation.system.output_columns:
+        if name in found and name in run:
+            size = np.max(np.abs(run[name]))
+            assert found[name].values == pytest.approx(run[name].values, rel=1e-9, abs=1e-12 * float(size)), name
+
+
+def test_what_is_algebraic_is_solved_for_unless_it_is_given():
+    simulation = surfacechem.load("three-temperatures-no-capacity")
+    solved, start = simulation.evaluate(), simulation.run().dataset
+    assert float(solved["T_c"][0]) == pytest.approx(float(start["T_c"][0]), rel=1e-12)
+    assert "q_1_by_T_c" not in solved
+    given = simulation.evaluate({"T_c": solved["T_c"].values})
+    assert float(given["q_1"][0]) == pytest.approx(float(solved["q_1"][0]), rel=1e-12)
+    through = given["q_1_by_T_1"] + given["q_1_by_T_c"] * solved["T_c_by_T_1"]
+    assert float(through[0]) == pytest.approx(float(solved["q_1_by_T_1"][0]), rel=1e-12)
+
+
+def test_a_point_is_the_scene_with_these_values(element, tmp_path):
+    moved = surfacechem.load(tmp_path / "element.yaml", ["loading.g_n=3 nm", "interface.friction.coulomb.mu=0.5"])
+    one = element.evaluate({"g_n": "3 nm", "interface.friction.coulomb.mu": 0.5})
+    other = moved.evaluate()
+    assert all(one[name].values == other[name].values for name in other)
+
+
+def test_points_where_a_law_does_not_hold_say_so():
+    found = surfacechem.load("viscous-heating").evaluate({"g_n": [1e-6, -1e-6]})
+    assert found["admissible"].values.tolist() == [1, 0]
+    assert found["reason"].values[1].startswith("g_n reached zero, where the law viscous")
+
+
+def test_points_come_from_a_table_with_units(element, tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("g_n [nm], T_c [degC]\n-1, 20\n2, 30\n")
+    found = element.evaluate(read_points(path, element.evaluator))
+    assert found["g_n"].values.tolist() == [-1e-9, 2e-9]
+    assert found["T_c"].values.tolist() == [293.15, 303.15]
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ({"g_m": 1.0}, "points cannot give 'g_m'. Did you mean 'g_n'?"),
+        ({"g_n": "1 K"}, "1 K is a temperature; g_n needs a length"),
+        ({"g_n": [1.0, np.nan]}, "g_n takes a list of finite numbers in m."),
+        ({"g_n": ["a"]}, "g_n takes numbers in SI, or one text with a unit."),
+        ({"g_n": [1e-9, 2e-9], "v": [1.0, 2.0, 3.0]}, "there are 2 of g_n, 3 of v."),
+    ],
+)
+def test_what_cannot_be_a_point_is_refused(points, message, element):
+    with pytest.raises(InputError, match=message.replace("(", r"\(")):
+        element.evaluate(points)
+
+
+def test_a_run_of_what_is_prescribed_names_the_command_that_evaluates_it(element):
+    with pytest.raises(InputError, match=r"element.yaml:4: bodies: there is nothing to solve.*`surfacechem evaluate`"):
+        element.run()
