@@ -8,6 +8,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
+from importlib.metadata import version
 from io import BytesIO
 from typing import Any
 
@@ -51,9 +52,10 @@ formula; see the [theory](../theory.md). How to [add a law](../adding-a-law.md).
 
 def on_config(config: Any) -> Any:
     """Put the generated pages of the laws into the navigation."""
-    for entry in config.nav:
-        if "Laws" in entry:
+    for section in config.nav:
+        for entry in (item for items in section.values() for item in items if "Laws" in item):
             entry["Laws"] = ["laws/index.md", *(f"laws/{family}.md" for family in families())]
+    config.copyright = f"surfacechem {version('surfacechem')}"
     return config
 
 

@@ -1,2 +1,0 @@
-// Formulas of pages come in \( \), those of notebooks in dollars; code is left alone.
-window.MathJax = { tex: { inlineMath: [["\\(", "\\)"], ["$", "$"]], displayMath: [["\\[", "\\]"], ["$$", "$$"]] } };
