@@ -1,8 +1,8 @@
 r"""The equations of an assembled scene as readable Python that runs, and as LaTeX.
 
-The Python form is a module of four functions with the signature of the compiled ones: ``residual``, ``outputs``,
-``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code returns NaN, this
-one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed with its time, and
+The Python form is a module of functions with the signature of the compiled ones: ``residual``, ``jacobian``,
+``outputs``, ``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code
+returns NaN, this one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed with its time, and
 the functions use those of the piece in which t lies unless they are given others.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import linecache
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import ModuleType
 from typing import Any
@@ -23,6 +23,7 @@ from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
 from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
+from surfacechem.compile.program import jacobian
 from surfacechem.expressions import Expression
 from surfacechem.model.system import Named, Parameter, System
 from surfacechem.quantities import VARIABLES, Quantity
@@ -100,7 +101,11 @@ class _Python(_Printer, PythonCodePrinter):  # type: ignore[misc]
 def python(system: System, title: str = "") -> str:
     """The equations as the source of a Python module."""
     printer = _Python()
-    functions = [_function(system, printer, name, text, rows) for name, (text, rows) in _functions(system).items()]
+    functions = [
+        _function(system, printer, name, text, rows, ", ".join(printer.name(row.name) for row in rows))
+        for name, (text, rows) in _functions(system).items()
+    ]
+    functions += [_jacobian(system, printer)] if system.rows else []
     lines = [f"    {float(p.at(0.0))!r},  # {p.symbol} {_parameter_text(p)}" for p in system.parameters]
     parameters = "\n".join(["PARAMETERS = (", *lines, ")\n"])
     return "\n\n".join([_head(system, title), parameters, *_pieces(system), *functions])
@@ -192,7 +197,32 @@ def _parameter_text(parameter: Parameter) -> str:
     return _safe(f"[{parameter.spec.unit}] {parameter.spec.text} ({parameter.path})")
 
 
-def _function(system: System, printer: _Python, name: str, text: str, rows: Sequence[Row]) -> str:
+def _jacobian(system: System, printer: _Python) -> str:
+    """The derivatives of the balances by the states and by their rates, as two lists of rows."""
+    arguments = [*(state.symbol for state in system.states), *(state.dot for state in system.states)]
+    known = {symengine.Symbol(item.name): item for item in system.named}
+    slopes, names = jacobian([*system.rows.values()], arguments, [(x, item.expression) for x, item in known.items()])
+    # Names that no formula has, and that Python takes.
+    own = {x: symengine.Symbol(re.sub(r"^d (.*) by (.*)$", r"slope_of_\1_by_\2", str(x))) for x, _ in names}
+    named = [
+        known.get(x) or Named(Quantity(str(own[x]), "1", str(x)), symengine.sympify(expression).xreplace(own))
+        for x, expression in names
+    ]
+    rows = [
+        Row(f"slope_{i}_{j}", symengine.sympify(slope).xreplace(own), f"balance of {name} by {x}")
+        for i, (name, row) in enumerate(zip(system.rows, slopes, strict=True))
+        for j, x in enumerate(arguments)
+        if (slope := row.get(x, symengine.Integer(0))) != 0
+    ]
+    there, n = {row.name for row in rows}, len(system.states)
+    cells = [[f"slope_{i}_{j}" if f"slope_{i}_{j}" in there else "0.0" for j in range(2 * n)] for i in range(n)]
+    parts = (", ".join(f"[{', '.join(row[part])}]" for row in cells) for part in (slice(n), slice(n, None)))
+    text = "Derivatives of the balances, a row each: by y, and by ydot."
+    returned = ", ".join(f"[{part}]" for part in parts)
+    return _function(replace(system, named=tuple(named)), printer, "jacobian", text, rows, returned)
+
+
+def _function(system: System, printer: _Python, name: str, text: str, rows: Sequence[Row], returned: str) -> str:
     states = [state.name for state in system.states]
     rates = [str(state.dot) for state in system.states]
     pieced = bool(pieces(system))
@@ -211,7 +241,6 @@ def _function(system: System, printer: _Python, name: str, text: str, rows: Sequ
     for row in rows:
         if str(row.expression) != row.name:
             lines += _assignment(printer, row.name, row.expression, row.text)
-    returned = ", ".join(printer.name(row.name) for row in rows)
     return "\n".join([*lines, *_broken("    return [", returned, "]"), ""])
 
 
@@ -348,6 +377,10 @@ def latex(system: System, title: str = "") -> str:
     lines = [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in wanted]
     lines += [_latex_row(printer, "0", row, f"balance of {name}", "") for name, row in system.rows.items()]
     lines += [_latex_row(printer, symbol(i.name), i.expression, i.quantity.long_name, i.quantity.unit) for i in others]
+    lines += [
+        _latex_row(printer, "0", row.expression, row.text, "").replace("&=", "&<", 1)
+        for row in _functions(system).get("margins", ("", []))[1]
+    ]
     body = " \\\\\n".join(lines)
     return "\n".join([f"% {_safe(heading)}", *values, r"\begin{align*}", body, r"\end{align*}", ""])
 

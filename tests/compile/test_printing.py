@@ -67,6 +67,11 @@ def test_printed_source_agrees_with_machine_code(scene):
             error = np.abs(np.array(getattr(module, name)(t, y, ydot, parameters)) - exact)
             for i in np.flatnonzero(~(error <= NOISE * np.abs(exact))):
                 assert error[i] <= NOISE * float(magnitude(expressions[i]).subs(point).n(53, real=True)), name
+        for printed, exact in zip(
+            module.jacobian(t, y, ydot, parameters), model.program.derivatives(inputs), strict=True
+        ):
+            size = np.max(np.abs(exact), axis=1, keepdims=True)
+            assert np.all(np.abs(np.array(printed) - exact) <= 1e-12 * size)
 
 
 @each_scene
@@ -77,6 +82,7 @@ def test_lines_are_short_enough_to_read_and_latex_is_balanced(scene):
     breakable = [line for line in code if " " in line.strip() and "conductance" not in line]
     assert max(map(len, breakable)) <= 120
     ast.parse(source)
+    text = text.replace("&<", "&=")  # margins are above zero
     for left, right in (("{", "}"), (r"\begin{cases}", r"\end{cases}"), ("&=", "&& ")):
         assert text.count(left) == text.count(right)
     assert printing.APART not in text

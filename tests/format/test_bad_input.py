@@ -150,7 +150,8 @@ MISTAKES = [
 def test_message(old, new, message):
     assert old in GOOD
     with pytest.raises(InputError) as error:
-        load_text(GOOD.replace(old, new, 1), file="a.yaml").system()
+        case = load_text(GOOD.replace(old, new, 1), file="a.yaml")
+        assert case.system() and case.run
     shown = str(error.value)
     assert message in shown
     assert shown.startswith("a.yaml:")
