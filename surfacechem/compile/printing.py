@@ -2,8 +2,8 @@ r"""The equations of an assembled scene as readable Python that runs, and as LaT
 
 The Python form is a module of functions with the signature of the compiled ones: ``residual``, ``jacobian``,
 ``outputs``, ``ledger`` and ``margins`` of (t, y, ydot, parameters). It is the debug mode: where the compiled code
-returns NaN, this one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed with its time, and
-the functions use those of the piece in which t lies unless they are given others.
+returns NaN, this one raises at the line of the quantity concerned. Where a history is made of pieces, each is printed
+with its time, and the functions use those of the piece in which t lies unless they are given others.
 """
 
 from __future__ import annotations
@@ -199,26 +199,21 @@ def _parameter_text(parameter: Parameter) -> str:
 
 def _jacobian(system: System, printer: _Python) -> str:
     """The derivatives of the balances by the states and by their rates, as two lists of rows."""
-    arguments = [*(state.symbol for state in system.states), *(state.dot for state in system.states)]
+    n = len(system.states)
+    arguments = system.inputs[1 : 1 + 2 * n]
     known = {symengine.Symbol(item.name): item for item in system.named}
     slopes, names = jacobian([*system.rows.values()], arguments, [(x, item.expression) for x, item in known.items()])
     # Names that no formula has, and that Python takes.
     own = {x: symengine.Symbol(re.sub(r"^d (.*) by (.*)$", r"slope_of_\1_by_\2", str(x))) for x, _ in names}
-    named = [
-        known.get(x) or Named(Quantity(str(own[x]), "1", str(x)), symengine.sympify(expression).xreplace(own))
-        for x, expression in names
-    ]
-    rows = [
-        Row(f"slope_{i}_{j}", symengine.sympify(slope).xreplace(own), f"balance of {name} by {x}")
-        for i, (name, row) in enumerate(zip(system.rows, slopes, strict=True))
-        for j, x in enumerate(arguments)
-        if (slope := row.get(x, symengine.Integer(0))) != 0
-    ]
-    there, n = {row.name for row in rows}, len(system.states)
-    cells = [[f"slope_{i}_{j}" if f"slope_{i}_{j}" in there else "0.0" for j in range(2 * n)] for i in range(n)]
+    named = [known.get(x) or Named(Quantity(str(own[x]), "1", str(x)), slope.xreplace(own)) for x, slope in names]
+    cells: list[list[str]] = []
+    rows: list[Row] = []
+    for i, (name, row) in enumerate(zip(system.rows, slopes, strict=True)):
+        found = {x: Row(f"slope_{i}_{x}", row[x].xreplace(own), f"balance of {name} by {x}") for x in row}
+        rows += found.values()
+        cells.append([found[x].name if x in found else "0.0" for x in arguments])
     parts = (", ".join(f"[{', '.join(row[part])}]" for row in cells) for part in (slice(n), slice(n, None)))
-    text = "Derivatives of the balances, a row each: by y, and by ydot."
-    returned = ", ".join(f"[{part}]" for part in parts)
+    text, returned = "Derivatives of the balances, a row each: by y, and by ydot.", ", ".join(f"[{x}]" for x in parts)
     return _function(replace(system, named=tuple(named)), printer, "jacobian", text, rows, returned)
 
 

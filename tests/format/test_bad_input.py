@@ -146,12 +146,16 @@ MISTAKES = [
 ]
 
 
+def _read(text):
+    case = load_text(text, file="a.yaml")
+    return case.system(), case.run
+
+
 @pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[f"{new!r:.40}" for _, new, _ in MISTAKES])
 def test_message(old, new, message):
     assert old in GOOD
     with pytest.raises(InputError) as error:
-        case = load_text(GOOD.replace(old, new, 1), file="a.yaml")
-        assert case.system() and case.run
+        _read(GOOD.replace(old, new, 1))
     shown = str(error.value)
     assert message in shown
     assert shown.startswith("a.yaml:")
