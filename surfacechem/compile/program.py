@@ -60,8 +60,8 @@ class Filler:
 
     def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The inputs, one row or many, filled in place."""
-        for row in inputs.reshape(-1, inputs.shape[-1]):
-            row[self.positions] = self.evaluate(self.reads(row).tolist())
+        rows = inputs.reshape(-1, inputs.shape[-1])
+        rows[:, self.positions] = [self.evaluate(values) for values in self.reads(rows).tolist()]
         return inputs
 
 

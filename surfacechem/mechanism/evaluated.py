@@ -156,6 +156,7 @@ class SurfaceEngine:
         self._taken = np.asarray(lost)[np.ix_(rows, open_ones)].T
         self._charged = [FARADAY * phase.electric_potential * phase.charges for phase in self._phases]
         self._last: tuple[Sequence[float], Sequence[float]] = (), ()
+        self._at, self._energies = math.nan, list[float]()
 
     def __call__(self, values: Sequence[float]) -> Sequence[float]:
         """Net rates [1/(m^2 s)] at a temperature, the amount of the first species at full coverage, and coverages.
@@ -168,16 +169,21 @@ class SurfaceEngine:
         T, amount, *coverages = values
         found = [math.nan] * len(self.gives)
         if T > 0 and amount > 0:
-            self.surface.TP = T, None
-            for phase, pressure in zip(self._phases, self._pressures, strict=True):
-                phase.TP = T, pressure
+            if self._at != T:
+                self._warm(T)
             # A stretched surface has fewer sites per area; coverages that a step tries need not sum to one.
             self.surface.site_density = amount * self._sites / MOLECULAR
             self.surface.set_unnormalized_coverages(coverages)
-            rates = self.surface.net_rates_of_progress
-            found = [float(rates[i]) * MOLECULAR for i in self.positions]
-            for energy in ("partial_molar_enthalpies", "chemical_potentials") if self._phases else ():
-                own = [getattr(x, energy) + charged for x, charged in zip(self._phases, self._charged, strict=True)]
-                found += [float(energy) / MOLECULAR for energy in self._taken @ np.concatenate(own)]
+            found = (self.surface.net_rates_of_progress[self.positions] * MOLECULAR).tolist() + self._energies
         self._last = values, found
         return found
+
+    def _warm(self, T: float) -> None:
+        """Bring the surface and its neighbours, which are held, to a temperature [K]."""
+        self._at, self.surface.TP = T, (T, None)
+        for phase, pressure in zip(self._phases, self._pressures, strict=True):
+            phase.TP = T, pressure
+        self._energies = []
+        for energy in ("partial_molar_enthalpies", "chemical_potentials") if self._phases else ():
+            own = [getattr(x, energy) + charged for x, charged in zip(self._phases, self._charged, strict=True)]
+            self._energies += (self._taken @ np.concatenate(own) / MOLECULAR).tolist()

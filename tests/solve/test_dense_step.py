@@ -65,6 +65,31 @@ def test_what_has_just_fired_has_to_leave_zero_first():
     assert t == pytest.approx(1.0, rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("values", "far"),
+    [
+        ([1.0, 1.1, 1.2], True),
+        ([1.0, 0.6, 0.9], True),
+        ([1.0, 0.4, 0.9], False),  # it may touch zero in between
+        ([1.0, 0.5, -0.1], False),
+        ([0.0, 0.0, 0.0], True),
+        ([0.0, 0.1, 0.2], False),  # it leaves zero, to a side that is to be found
+    ],
+)
+def test_guards_far_from_zero_follow_a_step_at_once(values, far):
+    guards, stepwise = (Guards.of([Margin.restart()], lambda *_: np.zeros(1)) for _ in range(2))
+    rows = np.array(values)[:, None]
+    for each in (guards, stepwise):
+        each.start(rows[0])
+    assert guards.far(rows[1:], np.ones(1, bool)) == far
+    if far:
+        for row in rows[1:]:
+            stepwise.follow(row)
+        assert [vars(guards)[name] for name in ("sides", "largest", "now")] == [
+            vars(stepwise)[name] for name in ("sides", "largest", "now")
+        ]
+
+
 def test_a_ledger_is_the_integral_of_its_rates():
     times = 2.0 + 3.0 * NODES
     ledger = StepLedger(2.0, 3.0, np.array([7.0]), (times**4)[:, None])

@@ -23,6 +23,9 @@ NAMES = ("cantera",)
 LONGEST = 0.1
 """Part of a stretch that a step may take: Cantera cannot be told to end a step at an event."""
 
+FACTORIALS = np.cumprod(np.maximum(np.arange(13.0), 1.0))
+"""Up to the highest order of CVODES."""
+
 CONTENTS = """
 phases:
 - name: interface
@@ -151,18 +154,14 @@ def last_step(net: Any, start: float, end: float, unit: Array, columns: slice = 
     """The step that a network has taken last, from the derivatives of its integrator's polynomial at the present time;
     with variables that it counts in units.
     """
-    now, rows, factorial = float(net.time), [], 1.0
-    for k in range(int(net.solver_stats["last_order"]) + 1):
-        factorial *= max(k, 1)
-        rows.append(np.asarray(net.get_derivative(k))[columns] / factorial)
+    now, orders = float(net.time), np.arange(int(net.solver_stats["last_order"]) + 1)
+    derivatives = np.array([net.get_derivative(k)[columns] for k in orders.tolist()])
+    rows = derivatives / FACTORIALS[: len(orders), None] * unit
 
-    def y(t: float) -> Array:
-        value = np.zeros_like(rows[0])
-        for row in rows[::-1]:
-            value = row + (t - now) * value
-        return value * unit
+    def y(t: Any) -> Array:
+        return np.asarray(np.power.outer(t - now, orders) @ rows)
 
-    return DenseStep(start, end, y)
+    return DenseStep(start, end, y, y)
 
 
 class _Stretch(Method):

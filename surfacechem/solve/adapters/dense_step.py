@@ -16,11 +16,19 @@ POINTS = 16
 
 @dataclass(frozen=True)
 class DenseStep:
-    """A step from ``start`` to ``end`` [s], with the variables at any time in it."""
+    """A step from ``start`` to ``end`` [s], with the variables at any time in it.
+
+    ``many`` gives a row of them for each of several times, where a library can do so at once.
+    """
 
     start: float
     end: float
     y: Callable[[float], Array]
+    many: Callable[[Array], Array] | None = None
+
+    def rows(self, times: Array) -> Array:
+        """Variables at several times, a row each."""
+        return self.many(times) if self.many else np.array([self.y(t) for t in times.tolist()])
 
 
 @dataclass
@@ -65,6 +73,21 @@ class Guards:
         """Which of these values lie across zero in a direction that counts; strict ones by more than their rounding."""
         across = np.where(self.strict, now < -NOISE * self.largest, now * self.sides <= 0.0)
         return across & (self.sides != 0.0) & (self.sides * self.directions <= 0.0)
+
+    def far(self, values: Array, active: NDArray[np.bool_]) -> bool:
+        """Whether no guard changes as much in a step as it is away from zero; they have then followed it to its end.
+
+        ``values`` are those at some points of the step, a row each, its end last. Most guards are bounds of states that
+        are far from them in all steps of a run.
+        """
+        values = np.where(active, np.vstack((self.now, values)), 1.0)
+        heights = values * self.sides
+        lowest, highest = heights.min(axis=0), heights.max(axis=0)
+        if not np.all((lowest > highest - lowest) | ~np.any(values, axis=0)):
+            return False
+        self.largest = np.fmax(self.largest, highest)
+        self.now = values[-1]
+        return True
 
 
 def first_crossing(

@@ -5,12 +5,12 @@ contract.
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from surfacechem.solve.adapters.dense_step import NODES, DenseStep, Guards, StepLedger, first_crossing
-from surfacechem.solve.adapters.evaluation import Evaluation
+from surfacechem.solve.adapters.evaluation import Evaluation, StateRows
 from surfacechem.solve.contract import Array, Counters, Events, Points, Problem, Result, Solver, Status
 from surfacechem.solve.radau import stepper
 from surfacechem.tolerances import SQRT_EPS, ULPS
@@ -49,6 +49,8 @@ class View:
     def __post_init__(self) -> None:
         """Its buffer serves all states of the segment."""
         self.evaluation = Evaluation(self.problem.program, self.start, self.parameters)
+        self.inside = StateRows(self.problem.program, self.parameters, len(NODES) - 1)
+        """At the nodes of a step but the first."""
         self.differential = ~self.problem.program.algebraic_mask
         self.atol = self.problem.atol[self.differential]
 
@@ -152,7 +154,8 @@ class _Run:
         self.solver, self.problem = solver, problem
         self.started = time.monotonic()
         self.t, self.y, self.ydot = float(problem.segments[0]), problem.y0, np.zeros(program.n)
-        self.ledger, self.margins = np.zeros(program.n_ledger), np.zeros(0)
+        self.ledger, self.ledger_rates = np.zeros(program.n_ledger), np.zeros(program.n_ledger)
+        self.margins = np.zeros(0)
         self.guards = Guards.of(problem.margins, self._guards, problem.seen)
         self.in_play = np.array((True,) * program.n_margins if problem.in_play is None else problem.in_play, bool)
         self.outputs: list[Array] = []
@@ -177,6 +180,7 @@ class _Run:
             if not np.all(np.isfinite(self.y)):
                 raise NoStateError
             self.margins = self.view.margins(start, self.y, self.ydot)
+            self.ledger_rates = self.view.ledger_rates(start, self.y, self.ydot)
             self.guards.start(self.margins, fired)
             if not self.outputs and len(self.problem.times) and self.problem.times[0] <= start:
                 self.outputs.append(np.concatenate((self.y, self.ledger)))
@@ -216,25 +220,24 @@ class _Run:
             if self.t == start:
                 self._check_first(step, reached)
             fired: list[int] = []
-            if self.problem.margins:
-                within = DenseStep(self.t, reached, step.y)
+            inside = self._inside(step, reached)
+            if self.problem.margins and not self.guards.far(inside.margins(), self.in_play):
+                within = replace(step, start=self.t, end=reached)
                 # Guards that are zero at one instant are so up to the error of the library's polynomial.
                 resolution = min(self.problem.rtol, SQRT_EPS) * (reached - self.t) + ULPS * abs(reached)
                 reached, fired = first_crossing(within, self.guards, self.in_play, resolution)
                 if fired and self.aim is None and not self._has_seen(step, reached):
                     self.aim = reached
                     return []
-            self._accept(step, reached, fired)
+                inside = self._inside(step, reached)
+            self._accept(step, inside, reached, fired)
             if fired:
                 return fired
         return []
 
-    def _accept(self, step: DenseStep, reached: float, fired: Iterable[int]) -> None:
+    def _accept(self, step: DenseStep, inside: StateRows, reached: float, fired: Iterable[int]) -> None:
         """Move on to a time within the step, with its outputs and events."""
-        rates = np.zeros((len(NODES), 0))
-        if len(self.ledger):
-            states = [(self.t, self.y, self.ydot), *((t, *self._state(step, t)) for t in self._nodes(reached))]
-            rates = np.array([self.view.ledger_rates(*state) for state in states])
+        rates = np.vstack((self.ledger_rates, inside.ledger()))
         ledger = StepLedger(self.t, reached - self.t, self.ledger, rates)
         for t in self.problem.times[len(self.outputs) :]:
             if t > reached:
@@ -243,21 +246,31 @@ class _Run:
             if not np.all(np.isfinite(row)):
                 raise StepError("an output is not finite")
             self.outputs.append(row)
-        (y, ydot), q = self._state(step, reached), ledger.at(reached)
+        # The last node is the end; outputs lie elsewhere and have not changed it.
+        y, ydot, q = inside.y[-1].copy(), inside.ydot[-1].copy(), ledger.at(reached)
         if not (np.all(np.isfinite(y)) and np.all(np.isfinite(ydot)) and np.all(np.isfinite(q))):
             raise StepError("a state is not finite")
         if self.aim is not None and self.aim <= self.t:
             self.aim = None
-        self.t, self.y, self.ydot, self.ledger = reached, y, ydot, q
-        self.margins = self.view.margins(reached, y, ydot)
+        self.t, self.y, self.ydot, self.ledger, self.ledger_rates = reached, y, ydot, q, rates[-1]
+        self.margins = inside.margins()[-1]
+        self.view.evaluation.guess = y[self.view.evaluation.algebraic]
         self.count += 1
         if self.problem.record_steps:
             self.steps.append((reached, y, ydot, q))
         self.events.extend((i, reached, y, ydot, q) for i in fired)
 
-    def _nodes(self, reached: float) -> list[float]:
-        """Quadrature points up to a time within the step, but the first."""
-        return [self.t + (reached - self.t) * float(node) for node in NODES[1:]]
+    def _inside(self, step: DenseStep, reached: float) -> StateRows:
+        """The equations at the quadrature points up to a time within the step, but the first."""
+        view = self.view
+        times = self.t + (reached - self.t) * NODES[1:]
+        times[-1] = reached
+        x = y = step.rows(times)
+        if not self.solver.keeps_algebraic:
+            y = np.empty((len(times), len(self.y)))
+            y[:, view.evaluation.free], y[:, view.evaluation.algebraic] = x, view.evaluation.guess
+        view.inside.put(times, y)
+        return view.inside
 
     def _state(self, step: DenseStep, t: float) -> tuple[Array, Array]:
         """State and derivative inside the last step."""
@@ -286,8 +299,8 @@ class _Run:
         """Whether the rates up to an event inside the last step add up to its increment; a step that is tested at its
         end alone passes over a peak on the way.
         """
-        rates = np.array([self.ydot, *(self._state(step, t)[1] for t in self._nodes(reached))])
-        y = self._state(step, reached)[0]
+        inside = self._inside(step, reached)
+        rates, y = np.vstack((self.ydot, inside.ydot)), inside.y[-1].copy()
         missed = np.abs(StepLedger(self.t, reached - self.t, self.y, rates).at(reached) - y)
         allowed = MISSED * (self.problem.rtol * np.maximum(np.abs(y), np.abs(self.y)) + self.problem.atol)
         return bool(np.all((missed <= allowed)[self.view.differential]))

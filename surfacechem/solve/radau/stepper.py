@@ -214,6 +214,18 @@ def run(batch: Any, first: int, last: int) -> None:
     run_batch()(first, last, memory, tuple(batch))
 
 
+class Repeated:
+    """Runs the same batch again and again in one memory: each time it takes its rows as they are then."""
+
+    def __init__(self, batch: Any) -> None:
+        memory = np.zeros(_bytes_of(tuple(batch.sizes.tolist())) // 8, np.int64)
+        self._arguments = 0, len(batch.ends), memory, tuple(batch)
+        self._kernel = run_batch()
+
+    def __call__(self) -> None:
+        self._kernel(*self._arguments)
+
+
 def load_briefly() -> None:
     """Load the stepper without its compiler where that can be: ready sooner, slower to call; for a process of few
     runs.
