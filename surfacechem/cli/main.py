@@ -107,7 +107,10 @@ def run(
 @app.command(epilog=EXIT_CODES)
 def sweep(
     case: CaseName,
-    output: Annotated[Path | None, written_to("netCDF file; <case name>-sweep.nc if not given.")] = None,
+    output: Annotated[
+        Path | None,
+        written_to("netCDF file, or a Zarr store, NAME.zarr, of any size; <case name>-sweep.nc if not given."),
+    ] = None,
     over: Annotated[
         list[str] | None,
         Option("--over", metavar="PATH=VALUES", help="Values, [1, 2] or {from, to, points, spacing}; repeatable."),
@@ -115,20 +118,36 @@ def sweep(
     until: Annotated[
         str | None, Option("--until", metavar="NAME=VALUE", help="End each run where this ramp is there.")
     ] = None,
+    resume: Annotated[bool, Option("--resume", help="Go on with a store that is not finished.")] = False,
+    part: Annotated[
+        str | None,
+        Option("--part", metavar="K/N", help="Compute the K-th of N parts of a store, as a job of an array."),
+    ] = None,
+    cluster: Annotated[
+        str | None, Option("--cluster", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler.")
+    ] = None,
+    threads: Annotated[
+        int | None, Option("--threads", min=1, help="Threads; as many as processors if not given.")
+    ] = None,
     changes: Changes = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run a case over values of its parameters and write one dataset."""
+    """Run a case over values of its parameters and write one dataset, or a store (.zarr) of any size."""
+    from surfacechem.cli import stores
     from surfacechem.documents.overrides import assignments
     from surfacechem.results.netcdf import dataset_path
     from surfacechem.runs.simulation import load
     from surfacechem.runs.summaries import sweep_summary
 
     simulation = load(case, changes or ())
+    values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
+    if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster}):
+        assert output is not None
+        plan = simulation.plan(values, end)
+        return stores.write(simulation, plan, output, resume, part, cluster, threads, quiet)
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
-    values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    solution = solved(lambda: simulation.sweep(values, end), quiet)
+    solution = solved(lambda: simulation.sweep(values, end, threads=threads), quiet)
     solution.write(target)
     if not quiet:
         typer.echo(sweep_summary(solution, target))

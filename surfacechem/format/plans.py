@@ -268,17 +268,16 @@ def _distribution(path: str, tree: Tree, unit: str) -> Distribution:
         raise tree.error(
             "a distribution is one of uniform, normal, lognormal and table, `normal: {mean: ..., std: ...}`."
         )
-    (kind,) = given
-    if isinstance(kind, UniformSection):
-        if not kind.first < kind.last:
-            raise kind.error(f"the values from {kind.first:g} to {kind.last:g} do not increase.")
-        return Uniform(kind.first, kind.last, _logarithmic(kind))
+    kind: Any = given[0]
     if isinstance(kind, TableSection):
         return _column(kind, path, unit)
     if section.normal is not None:
-        return Normal(section.normal.mean, section.normal.std)
-    assert section.lognormal is not None
-    return Lognormal(section.lognormal.median, section.lognormal.sigma)
+        return Normal(kind.mean, kind.std)
+    if section.lognormal is not None:
+        return Lognormal(kind.median, kind.sigma)
+    if not kind.first < kind.last:
+        raise kind.error(f"the values from {kind.first:g} to {kind.last:g} do not increase.")
+    return Uniform(kind.first, kind.last, _logarithmic(kind))
 
 
 def _column(table: TableSection, path: str, unit: str) -> Drawn:

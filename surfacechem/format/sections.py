@@ -494,6 +494,28 @@ UNTIL = Entries(
 )
 
 
+ALL = "all"
+NAMES = Shapes(OneOf("choice", lambda: (ALL,)), items=ListOf(Text(), "[T, phi]"))
+
+
+class KeepSection(Section):
+    """what a store keeps of each run"""
+
+    called = "the section keep"
+
+    last: str | Sequence[str] = key(NAMES, "quantities at the end, a list or `all`", ())
+    max: str | Sequence[str] = key(NAMES, "quantities whose largest value is kept", ())
+    min: str | Sequence[str] = key(NAMES, "quantities whose least value is kept", ())
+    series: str | Sequence[str] = key(NAMES, "quantities at every output time", ())
+    events: str | Sequence[str] = key(NAMES, "events whose first time is kept", ())
+    at_events: str | Sequence[str] = key(NAMES, "states as they are at these events, just before", (), name="at-events")
+    reach: Mapping[str, float] = key(
+        Entries(others=amount("[x]"), names=lambda case: case.units, what="variables"),
+        "values by variable, the time at which each is first reached is kept: `reach: {phi: 0.95}`",
+        MappingProxyType({}),
+    )
+
+
 NOTHING_SWEPT = f"a sweep needs `over` or `sample`: values of parameters, for example `{OVER}`."
 
 
@@ -513,6 +535,9 @@ class SweepSection(Section):
     sample: SampleSection | None = key(Nested(SampleSection))
     until: Mapping[str, float] | None = key(
         UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"
+    )
+    keep: KeepSection | None = key(
+        Nested(KeepSection), "what a store keeps of each run; if not given all ends, extremes and times of events"
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surfacechem.model.system import System
 from surfacechem.solve.contract import Points
 from surfacechem.solve.run import Trajectory
 from surfacechem.tolerances import EPS, SQRT_EPS
@@ -75,14 +76,14 @@ class Audit:
         """Largest energy residual, relative to the energy exchanged, or to that stored where it is no more than its
         rounding.
         """
-        return _resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding)
+        return float(resolved(self.energy, self.energy_scale, self.energy_stored, self.energy_rounding))
 
     @property
     def entropy_error(self) -> float:
         """Largest entropy residual, relative to that exchanged or produced, or to that stored where it is no more than
         its rounding.
         """
-        return _resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding)
+        return float(resolved(self.entropy, self.entropy_scale, self.entropy_stored, self.entropy_rounding))
 
     @property
     def site_error(self) -> float:
@@ -116,38 +117,70 @@ class Audit:
         return tuple(found)
 
 
-def _relative(residual: Array, scale: float) -> float:
-    worst = float(np.max(np.abs(residual), initial=0.0))
-    return worst / scale if scale > 0 else worst
+def _relative(residual: Array, scale: Any) -> Any:
+    worst = np.max(np.abs(residual), axis=-1, initial=0.0)
+    return worst / np.where(scale > 0, scale, 1.0)
 
 
-def _resolved(residual: Array, scale: float, stored: float, rounding: float) -> float:
-    """Relative residual; where what was exchanged is lost in the last digits of what is stored, relative to this."""
-    unresolved = float(np.max(np.abs(residual), initial=0.0)) <= rounding and UNRESOLVED * scale <= rounding
-    return _relative(residual, max(scale, stored) if unresolved else scale)
+def resolved(residual: Array, scale: Any, stored: Any, rounding: Any) -> Any:
+    """Relative residual along the last axis, of one run or of many; where what was exchanged is lost in the last digits
+    of what is stored, relative to this.
+    """
+    unresolved = (np.max(np.abs(residual), axis=-1, initial=0.0) <= rounding) & (UNRESOLVED * scale <= rounding)
+    return _relative(residual, np.where(unresolved, np.maximum(scale, stored), scale))
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the balances leave open at the outputs of one run or of many, and the most that was exchanged till then."""
+
+    energy: Array
+    entropy: Array
+    energy_scale: Any
+    entropy_scale: Any
+
+
+def residuals(system: System, named: Array, ledger: Array) -> Residuals:
+    """Balances of energy and entropy from named quantities [..., times, outputs] and ledger [..., times, accounts]."""
+    column = system.output_columns
+    # Transitions at the very start come before the first output.
+    ledger = ledger - ledger[..., :1, :]
+
+    def booked(*kinds: str) -> Array:
+        """Columns of the ledger, of accounts of these kinds."""
+        return accounts(system, ledger, *kinds)
+
+    def changes(*names: str) -> Array:
+        """Changes of named quantities since the start."""
+        found = named[..., [column[name] for name in names if name in column]]
+        return found - found[..., :1, :]
+
+    def largest(*tables: Array) -> Any:
+        return np.max([np.max(np.abs(table), axis=(-2, -1), initial=0.0) for table in tables], axis=0)
+
+    return Residuals(
+        changes("E_total")[..., 0] - booked("energy supply").sum(axis=-1),
+        changes("S_total")[..., 0] - booked("entropy supply").sum(axis=-1) - booked("entropy production").sum(axis=-1),
+        largest(changes("U_1", "U_2", "U_c"), booked("energy supply", "dissipation")),
+        largest(changes("S_1", "S_2", "S_c"), booked("entropy supply", "entropy production")),
+    )
+
+
+def accounts(system: System, ledger: Array, *kinds: str) -> Array:
+    """Columns of a ledger, of accounts of these kinds."""
+    return ledger[..., [j for kind in kinds for j in system.account_columns.get(kind, ())]]
 
 
 def audit(trajectory: Trajectory) -> Audit:
     """Audit of a trajectory."""
     model, result, outputs, steps = trajectory.model, trajectory.result, trajectory.outputs, trajectory.result.steps
     system, column = model.system, model.system.output_columns
-    E, S = outputs[:, column["E_total"]], outputs[:, column["S_total"]]
-    # Transitions at the very start come before the first output.
     ledger = result.ledger_outputs - result.ledger_outputs[:1]
-
-    def booked(*kinds: str, table: Array = ledger) -> Array:
-        """Columns of the ledger, of accounts of these kinds."""
-        return table[:, [j for kind in kinds for j in system.account_columns.get(kind, ())]]
-
-    def changes(prefix: str) -> Array:
-        """Changes of totals of bodies and interface since the start."""
-        totals = outputs[:, [column[name] for end in "12c" if (name := f"{prefix}{end}") in column]]
-        return totals - totals[:1]
-
-    # A brief load may come and go between outputs; the ends of the steps have seen it.
-    exchanged = [changes("U_"), booked("energy supply", "dissipation")]
-    exchanged += [booked("energy supply", "dissipation", table=steps.ledger)] if steps else []
-    turned = _largest(changes("S_"), booked("entropy supply", "entropy production"))
+    open_ones = residuals(system, outputs, result.ledger_outputs)
+    energy_scale, turned = float(open_ones.energy_scale), float(open_ones.entropy_scale)
+    if steps:  # a brief load may come and go between outputs; the ends of the steps have seen it
+        energy_scale = max(energy_scale, _largest(accounts(system, steps.ledger, "energy supply", "dissipation")))
+    E, S = (outputs[:, column[name]] for name in ("E_total", "S_total"))
     energy_stored = max(trajectory.roundings["E_total"] / EPS, _largest(E))
     entropy_stored = max(trajectory.roundings["S_total"] / EPS, turned, _largest(S))
     roundings, untimed = ROUNDINGS, 0.0
@@ -162,10 +195,10 @@ def audit(trajectory: Trajectory) -> Audit:
         sites = np.maximum(sites, np.abs(bonds - bonds[:1] - ledger[:, j]))
     least, destroyed, together = _production(trajectory, entropy_stored)
     return Audit(
-        energy=E - E[:1] - booked("energy supply").sum(axis=1),
-        entropy=S - S[:1] - booked("entropy supply").sum(axis=1) - booked("entropy production").sum(axis=1),
+        energy=open_ones.energy,
+        entropy=open_ones.entropy,
         sites=sites,
-        energy_scale=_largest(*exchanged),
+        energy_scale=energy_scale,
         entropy_scale=turned,
         rtol=trajectory.run.rtol,
         energy_stored=energy_stored,

@@ -28,10 +28,13 @@ from surfacechem.solve import AUTO
 from surfacechem.solve.run import Model, Run, Trajectory, values_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray
 
     from surfacechem.format.plans import Plan
     from surfacechem.runs.points import Evaluator, PointResults, Points
+    from surfacechem.runs.streaming import Stream
     from surfacechem.runs.sweeps import SweepSolution
 
 
@@ -314,12 +317,47 @@ class Simulation:
         from surfacechem.runs import sweeps
 
         if plan.size > MOST_RUNS:
-            message = f"a sweep of {plan.size} runs is too large; {MOST_RUNS} at most."
+            message = (
+                f"a sweep of {plan.size} runs is too large; {MOST_RUNS} at most. A store, -o NAME.zarr, takes more."
+            )
             raise InputError(message, path="sweep")
+        if (freed := self._freed_for(plan, values := self._values(changes or {}))) is not self:
+            return freed.sweep_plan(plan, values, threads)
+        values = {path: value for path, value in values.items() if path not in self.system.constants}
+        chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
+        model = done[0].model
+        solution = sweeps.SweepSolution(model, plan, model.chosen(self.case.run), done, **chosen._origin(values))
+        cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
+        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
+
+    def stream(
+        self,
+        plan: Plan,
+        path: str | Path,
+        changes: Mapping[str, float | str] | None = None,
+        *,
+        resume: bool = False,
+        part: tuple[int, int] = (1, 1),
+    ) -> Stream:
+        """A sweep of any size that is about to go into a store, of which `run` computes what is missing."""
+        from surfacechem.runs import streaming
+
+        if (freed := self._freed_for(plan, values := self._values(changes or {}))) is not self:
+            return freed.stream(plan, path, values, resume=resume, part=part)
+        if spatial.wanted(self.case.scene) is not None:
+            message = "cells that follow from an accuracy need all runs at once; give a number of cells for a store."
+            raise InputError(message, path="bodies")
+        values = {path: value for path, value in values.items() if path not in self.system.constants}
+        try:
+            return streaming.stream(self, plan, path, changes=values, resume=resume, part=part)
+        except InputError as error:
+            raise self.case.located(error) from None
+
+    def _freed_for(self, plan: Plan, values: Mapping[str, float]) -> Simulation:
+        """The simulation in whose equations stand symbols for the defaults that are swept or changed."""
         constants = self.system.constants
-        values = self._values(changes or {})
-        # A default that is swept needs a symbol, so that the equations are assembled for any other value of it.
         ends = plan.at(np.array([0, plan.size - 1]))
+        # A default that is swept needs a symbol, so that the equations are assembled for any other value of it.
         others = {
             path: next(
                 (x for x in xs.tolist() if x != constants[path][1]), math.nextafter(constants[path][1], math.inf)
@@ -327,14 +365,7 @@ class Simulation:
             for path, xs in ends.items()
             if path in constants
         }
-        if (freed := self._with_freed({**values, **others})) is not self:
-            return freed.sweep_plan(plan, values, threads)
-        values = {path: value for path, value in values.items() if path not in constants}
-        chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
-        model = done[0].model
-        solution = sweeps.SweepSolution(model, plan, model.chosen(self.case.run), done, **chosen._origin(values))
-        cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
-        return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
+        return self._with_freed({**values, **others})
 
     def plan(
         self,

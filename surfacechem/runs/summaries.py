@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from surfacechem.results.accuracy import Accuracy
     from surfacechem.results.audit import Audit
     from surfacechem.results.solution import Solution
+    from surfacechem.results.store import Store
     from surfacechem.runs.check import Group
     from surfacechem.runs.points import PointResults
+    from surfacechem.runs.streaming import Stream
     from surfacechem.runs.sweeps import SweepSolution
     from surfacechem.scene import Scene
     from surfacechem.solve.run import Run
@@ -243,3 +245,27 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
         start = f"from {starts[p.states[0]]:g}" if p.states else ""
         rows.append((p.name, "[K]", "evolved", start, f"temperatures across {p.body}, in {len(p.points) - 1} cells"))
     return rows
+
+
+def store_summary(stream: Stream, store: Store) -> tuple[str, str]:
+    """How a sweep ended that went into a store, in a word; and what it was and how its runs ended, in words."""
+    from surfacechem.runs.keeping import STATUSES
+    from surfacechem.runs.sweeps import parameter_names
+
+    chunks, layout = stream.chunks, store.layout
+    done = [number for number in range(layout.chunks) if (store.marks / str(number)).exists()]
+    ends, worst = np.zeros(len(STATUSES), np.int64), 0.0
+    for number in done:
+        ends += np.bincount(store.read("status", number), minlength=len(STATUSES))
+        worst = np.fmax(worst, np.fmax.reduce(store.read("energy_error", number), initial=0.0))
+    names = parameter_names(chunks.model.system, chunks.plan)
+    counted = ", ".join(f"{count} {word}" for count, word in zip(ends.tolist(), STATUSES, strict=True) if count)
+    lines = [chunks.simulation.case.title or "untitled"]
+    lines.append(labelled("swept", swept_in_words(chunks.plan, names)))
+    lines.append(labelled("solved", _solved(chunks.model.system, chunks.run)))
+    lines.append(labelled("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"))
+    lines.append(labelled("balances", f"energy {worst:.1e} at worst"))
+    lines.append(labelled("written", f"{store.path}, {len(done)} of {layout.chunks} chunks"))
+    stopped = ends[STATUSES.index("stopped")] == ends.sum()
+    status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"
+    return status, "\n".join(lines)

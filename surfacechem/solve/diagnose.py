@@ -79,18 +79,25 @@ def cause(
 
 def is_led_back(system: System, program: Program, margin: Margin, result: Result) -> bool:
     """Whether the rates at the bound of a bonding variable lead back, so that rounding has carried it beyond."""
+    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
+    return bool(are_led_back(system, program, margin, np.array([result.t]), result.y[None], parameters[None])[0])
+
+
+def are_led_back(
+    system: System, program: Program, margin: Margin, t: Array, y: Array, parameters: Array
+) -> NDArray[np.bool_]:
+    """The same of many runs, whose ends are the rows."""
     names, bonds = [state.name for state in system.states], {a.law for a in system.ledger if a.kind == "bonds"}
     if margin.bound is None or margin.bound[0] not in names:
-        return False
-    (name, limit), y = margin.bound, result.y.copy()
+        return np.zeros(len(t), dtype=bool)
+    (name, limit), y = margin.bound, y.copy()
     for j, other in enumerate(names):
         if other in bonds:  # where one kind of bonds has all sites there is no other
-            y[j] = max(y[j], 0.0) if limit == 0 else 0.0
+            y[:, j] = np.maximum(y[:, j], 0.0) if limit == 0 else 0.0
     j = names.index(name)
-    y[j] = limit
-    parameters = result.problem.parameters[result.segments_at(np.array([result.t]))[0]]
-    found = consistent(program, result.t, y, np.zeros_like(y), parameters)
-    return bool(found.valid and (found.ydot[j] >= 0 if limit == 0 else found.ydot[j] <= 0))
+    y[:, j] = limit
+    found = consistent(program, t, y, np.zeros_like(y), parameters)
+    return found.valid & (found.ydot[:, j] >= 0 if limit == 0 else found.ydot[:, j] <= 0)
 
 
 def closest_margin(system: System, program: Program, margins: Sequence[Margin], result: Result) -> Margin | None:

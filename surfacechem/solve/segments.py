@@ -107,6 +107,11 @@ class Passing:
             self._function = compile_function([system.t, *symbols], [*turns, *places])
         self._found = lru_cache(maxsize=8)(self._find)
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there are none."""
+        return self._function is None
+
     def pieces(self, segments: Array, table: Array, frequency: float, max_steps: int) -> tuple[Array, Array]:
         """Segments that end at these times, too, and their parameters; those of the segments given are ``table``.
 

@@ -256,6 +256,18 @@ def solve_many(
     )
 
 
+def solve_arrays(
+    problem: Problem, y0: Array, parameters: Array, spacing: Array, peaks: Array, segments: Array, times: Array
+) -> Any:
+    """The batch of runs that share with a problem all but what is given, each with the run as first axis, or of length
+    one where it is the same for all; its rows as the stepper writes them.
+    """
+    columns = y0, parameters, spacing, np.array((problem.max_steps,)), peaks, segments, times
+    batch = _batch(problem, tuple(map(np.ascontiguousarray, columns)))
+    stepper.run(batch, 0, len(y0))
+    return batch
+
+
 @dataclass(frozen=True)
 class Consistent:
     """States that satisfy G(t, y, ydot) = 0; ``valid`` is False where none was found."""

@@ -1,0 +1,132 @@
+"""Sweeps into a store on the command line: how far they are, how they end, and how to go on with one that was ended."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from surfacechem.cli.commands import SIGNALLED, SignalledError, leave_with, solved
+from surfacechem.errors import InputError, Place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from surfacechem.format.plans import Plan
+    from surfacechem.runs.simulation import Simulation
+    from surfacechem.runs.streaming import Progress
+
+PATIENCE = 2.0
+"""Seconds after which a bar tells how far a sweep is."""
+
+
+def asked_for(output: Path | None, options: dict[str, object]) -> bool:
+    """Whether a sweep goes into a store; InputError at an option that belongs to one only."""
+    if output is not None and output.suffix == ".zarr":
+        return True
+    for name, value in options.items():
+        if value:
+            raise InputError("belongs to a store: give `-o NAME.zarr`.", Place(path=name))
+    return False
+
+
+def write(
+    simulation: Simulation,
+    plan: Plan,
+    target: Path,
+    resume: bool,
+    part: str | None,
+    cluster: str | None,
+    threads: int | None,
+    quiet: bool,
+) -> None:
+    """Run a sweep into a store, with a bar on a terminal; an interrupt says how to go on."""
+    from surfacechem.runs.summaries import store_summary
+
+    chosen = part_of(part)
+    with client_at(cluster) as client, bar_of(quiet) as told:
+        stream = simulation.stream(plan, target, resume=resume, part=chosen)
+        try:
+            store = solved(lambda: stream.run(threads, client, told), quiet)
+        except SignalledError as error:
+            (number,) = error.args
+            word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+            typer.echo(f"surfacechem: {word}; what is stored is kept: go on with --resume.", err=True)
+            os._exit(
+                SIGNALLED + number
+            )  # at once, as compiled code may run on; a chunk without its mark does not count
+    status, text = store_summary(stream, store)
+    if not quiet:
+        typer.echo(text)
+    leave_with(status)
+
+
+def part_of(text: str | None) -> tuple[int, int]:
+    """The number of a part, and of how many.
+
+    >>> part_of("3/16"), part_of(None)
+    ((3, 16), (1, 1))
+    """
+    if text is None:
+        return 1, 1
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError(f"'{text}' is no part; give its number and that of all, 3/16.", Place(path="--part"))
+    return int(match[1]), int(match[2])
+
+
+@contextmanager
+def client_at(address: str | None) -> Iterator[Any]:
+    """The client of a scheduler; None without one."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        message = "a cluster needs dask.distributed, which is not installed: pip install 'surfacechem[cluster]'."
+        raise InputError(message, Place(path="--cluster")) from None
+    try:
+        client: Any = Client(address, timeout=10)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        message = f"no scheduler answers at {address}: {' '.join(str(error).split())}"
+        raise InputError(message, Place(path="--cluster")) from None
+    with client:
+        yield client
+
+
+@contextmanager
+def bar_of(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """What is told how far a sweep is: a bar on a terminal, nothing else."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    import time
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[more]}"), TimeRemainingColumn()
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    task, begun = bar.add_task("runs", total=None, more=""), time.monotonic()
+
+    def told(now: Any) -> None:
+        seconds = time.monotonic() - begun
+        # What was there before says nothing about the speed now.
+        rate = (now.done - now.resumed) / max(seconds, PATIENCE)
+        more = f"{rate:.0f}/s, {now.failed} failed"
+        bar.update(task, total=now.runs, completed=now.done, more=more)
+        if seconds > PATIENCE and not bar.live.is_started:
+            bar.start()
+
+    try:
+        yield told
+    finally:
+        bar.stop()

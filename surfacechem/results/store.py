@@ -1,0 +1,303 @@
+"""Stores of sweeps: Zarr version 3, chunk by chunk, each of which counts once a mark with its checksum is there.
+
+A store appears whole, with every array and none of its values. Chunks are written by one writer for each part, and may
+be written again: what is in a chunk follows from the case and the plan alone. So a writer may be killed at any moment,
+and the finished store has the same bytes as one that was never interrupted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import secrets
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError, OutputError, Place
+from surfacechem.results.netcdf import Column
+
+if TYPE_CHECKING:
+    import xarray
+
+SUFFIX = ".zarr"
+MARKS = ".marks"
+
+MOST_BYTES = 64 * 2**20
+"""Size of a chunk of all variables together."""
+
+WORDS = {
+    "title": "the title",
+    "case": "the case",
+    "mechanism": "the mechanism",
+    "sweep": "the plan",
+    "keep": "what is kept",
+    "run": "the settings of the run",
+    "check": "what is checked",
+    "versions": "the versions",
+}
+"""Attributes that two writers of a store must share, and how messages call them."""
+
+NEEDED = "stores need Zarr, which is not installed: pip install 'surfacechem[sweeps]', or write to a name with .nc."
+
+
+@dataclass(frozen=True)
+class StoredArray:
+    """An array of a store: its type, dimensions, and attributes."""
+
+    kind: str
+    dimensions: tuple[str, ...]
+    attributes: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is in a store: sizes of its dimensions, of which those of the runs come first; arrays; coordinates."""
+
+    sizes: Mapping[str, int]
+    runs: tuple[str, ...]
+    """Dimensions of the runs."""
+    variables: Mapping[str, StoredArray]
+    coordinates: Sequence[Column]
+    attributes: Mapping[str, Any]
+    at_once: int
+    """Most runs of a chunk."""
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Number of runs along each of their dimensions."""
+        return tuple(self.sizes[name] for name in self.runs)
+
+    @cached_property
+    def chunk(self) -> tuple[int, ...]:
+        """Runs of a chunk along each of their dimensions, the last first."""
+        bytes_of_run = sum(
+            np.dtype(v.kind).itemsize * math.prod(self.sizes[d] for d in v.dimensions[len(self.runs) :])
+            for v in self.variables.values()
+        )
+        left = max(1, min(self.at_once, MOST_BYTES // bytes_of_run))
+        found = []
+        for size in reversed(self.shape):
+            found.append(min(size, left))
+            left = max(1, left // found[-1])
+        return tuple(reversed(found))
+
+    @cached_property
+    def counts(self) -> tuple[int, ...]:
+        """Number of chunks along each dimension."""
+        return tuple(-(-size // part) for size, part in zip(self.shape, self.chunk, strict=True))
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return math.prod(self.counts)
+
+    def region(self, number: int) -> tuple[slice, ...]:
+        """The runs of a chunk."""
+        places = np.unravel_index(number, self.counts)
+        return tuple(
+            slice(int(k) * part, min((int(k) + 1) * part, size))
+            for k, part, size in zip(places, self.chunk, self.shape, strict=True)
+        )
+
+    def index(self, number: int) -> NDArray[np.int64]:
+        """Numbers of the runs of a chunk, in its order."""
+        ranges = [np.arange(part.start, part.stop) for part in self.region(number)]
+        return np.ravel_multi_index(np.meshgrid(*ranges, indexing="ij"), self.shape).ravel()
+
+
+@dataclass
+class Store:
+    """A store that is written to."""
+
+    path: Path
+    layout: Layout
+    _arrays: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def marks(self) -> Path:
+        """The folder of the marks."""
+        return self.path / MARKS
+
+    def write(self, number: int, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Write a chunk, and then its mark."""
+        region = self.layout.region(number)
+        shape = tuple(part.stop - part.start for part in region)
+        with self.writing():
+            for name in self.layout.variables:
+                values = columns[name]
+                self._array(name)[region] = values.reshape(*shape, *values.shape[1:])
+            self.mark(str(number), self.checksum(number))
+
+    def mark(self, name: str, text: str) -> None:
+        """Put a mark in its place, whole or not at all."""
+        # A name that is replaced at once is there whole or not at all, whenever the process is killed.
+        temporary = self.marks / f".{secrets.token_hex(8)}"
+        temporary.write_text(text)
+        temporary.replace(self.marks / name)
+
+    def done(self, number: int) -> bool:
+        """Whether a chunk is marked, and is what its mark says."""
+        try:
+            return (self.marks / str(number)).read_text() == self.checksum(number)
+        except OSError:
+            return False
+
+    def checksum(self, number: int) -> str:
+        """A checksum of the files of a chunk; values that are all missing have none."""
+        found = hashlib.sha256()
+        places = "/".join(map(str, np.unravel_index(number, self.layout.counts)))
+        for name, variable in self.layout.variables.items():
+            inner = "/0" * (len(variable.dimensions) - len(self.layout.runs))
+            # Of the files, as a disk may spoil what was written well; Zarr leaves out what is all missing.
+            file = self.path / name / f"c/{places}{inner}"
+            found.update(file.read_bytes() if file.exists() else b"")
+        return found.hexdigest()
+
+    def read(self, name: str, number: int) -> NDArray[Any]:
+        """Values of an array in a chunk, a run a row."""
+        values = np.asarray(self._array(name)[self.layout.region(number)])
+        return values.reshape(-1, *values.shape[len(self.layout.runs) :])
+
+    def _array(self, name: str) -> Any:
+        if name not in self._arrays:
+            self._arrays[name] = _zarr().open_array(self.path / name, mode="r+")
+        return self._arrays[name]
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """OutputError where the disk does not take what is written."""
+        try:
+            yield
+        except OSError as error:
+            kept = "What is stored is kept: when there is room, go on with --resume."
+            raise OutputError(f"cannot be written: {error.strerror or error}. {kept}", Place(str(self.path))) from error
+
+    @contextmanager
+    def locked(self, part: str) -> Iterator[None]:
+        """Be the one writer of a part; InputError where there is one. A lock ends with its process."""
+        import fcntl
+
+        file = self.marks / f"writer-{part}"
+        with self.writing(), file.open("a") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(f"another process is writing part {part} of it.", Place(str(self.path))) from None
+            try:
+                yield
+            finally:
+                file.unlink(missing_ok=True)
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """The store as it is, read when it is asked for."""
+        return opened(self.path)
+
+
+def opened(path: str | Path) -> xarray.Dataset:
+    """The dataset of a store, whose values are read when they are asked for."""
+    import xarray
+
+    _zarr()
+    found: xarray.Dataset = xarray.open_zarr(path, chunks=None)
+    return found
+
+
+def _zarr() -> Any:
+    try:
+        import zarr
+    except ImportError:
+        raise InputError(NEEDED) from None
+    return zarr
+
+
+def store_path(path: str | Path) -> Path:
+    """The path of a store; InputError where nothing can be written there."""
+    target = Path(path)
+    _zarr()
+    if not target.parent.is_dir():
+        raise InputError(f"cannot be written: there is no folder {target.parent}.", Place(str(path)))
+    if not os.access(target if target.exists() else target.parent, os.W_OK):
+        raise InputError("cannot be written: it is read-only.", Place(str(path)))
+    return target
+
+
+def begin(path: Path, layout: Layout, resume: bool) -> Store:
+    """A store of this layout: a new one, or the one that is there, if it is of the same case, plan and versions.
+
+    InputError where there is another, or where it is not asked to ``resume``.
+    """
+    if not path.exists():
+        temporary = path.with_name(f".surfacechem-{secrets.token_hex(8)}{SUFFIX}")
+        store = Store(path, layout)
+        try:
+            with store.writing():
+                _make(temporary, layout)
+            # Of several that start at once the first one has made it, and the others go on with that.
+            with suppress(OSError):
+                temporary.rename(path)
+                return store
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+        resume = True
+    place = Place(str(path))
+    if not resume:
+        raise InputError("is there already: --resume goes on with it; or give another name.", place)
+    try:
+        there = json.loads((path / "zarr.json").read_text())["attributes"]
+        known = (path / MARKS).is_dir() and "sweep" in there
+    except (OSError, LookupError, TypeError, ValueError):
+        known = False
+    if not known:
+        raise InputError("is no store of a sweep; give another name.", place)
+    # As JSON has it, in which the store keeps it.
+    ours = json.loads(json.dumps(dict(layout.attributes)))
+    different = [word for name, word in WORDS.items() if there.get(name) != ours.get(name)]
+    if different:
+        raise InputError(f"is of another sweep: {', '.join(different)} differ.", place)
+    return Store(path, layout)
+
+
+def _make(path: Path, layout: Layout) -> None:
+    """All arrays, without values but those of the coordinates."""
+    zarr = _zarr()
+    group = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
+    for name, item in layout.variables.items():
+        inner = tuple(layout.sizes[dimension] for dimension in item.dimensions[len(layout.runs) :])
+        group.create_array(
+            name,
+            shape=(*layout.shape, *inner),
+            chunks=(*layout.chunk, *inner),
+            dtype=item.kind,
+            fill_value=np.nan if item.kind.startswith("float") else -1,
+            dimension_names=item.dimensions,
+            attributes=dict(item.attributes),
+        )
+    for column in layout.coordinates:
+        values = np.asarray(column.values)
+        made = group.create_array(
+            column.name,
+            shape=values.shape,
+            chunks=tuple(min(size, 2**20) for size in values.shape),
+            dtype=values.dtype,
+            dimension_names=column.dimensions,
+            attributes=column.attributes,
+        )
+        made[...] = values
+    # Coordinates are written at once, as they follow from the plan.
+    with warnings.catch_warnings():
+        # Not yet of the standard, and read by what knows it only: without, each array is looked for by itself.
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(path)
+    (path / MARKS).mkdir()

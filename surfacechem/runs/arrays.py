@@ -1,0 +1,378 @@
+"""Runs of one model as arrays: from columns of values through the compiled loop to columns of what is kept.
+
+No object is made for a run. What the arrays cannot tell (a start that is not admissible, an edge that is due, a run
+that could not go on) is left to runs that are looked at one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.compile.program import Function, compile_function
+from surfacechem.errors import InputError
+from surfacechem.expressions import derivative, magnitude
+from surfacechem.format.plans import Plan
+from surfacechem.model.system import System
+from surfacechem.quantities import VELOCITIES
+from surfacechem.results.audit import ROUNDINGS, residuals, resolved
+from surfacechem.runs import spectrum
+from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
+from surfacechem.solve.contract import Problem, Status
+from surfacechem.solve.diagnose import are_led_back
+from surfacechem.solve.radau.solver import consistent, solve_arrays
+from surfacechem.solve.radau.stepper import END, EVENTS, OUTPUTS, RECORDS
+from surfacechem.solve.run import OWN, Model, Run
+from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
+
+FIRST_STEP = 4
+"""Column of the counts that holds the number of steps."""
+
+TRIED = 100
+"""Runs of a plan that are tried for one that is admissible, whose problem the others share."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Runs of a batch that the arrays tell: rows of the arguments of compiled functions where each ended."""
+
+    batch: Any
+    table: Array
+    """Parameters, shape (runs, segments, parameters)."""
+    segments: Array
+    times: Array
+
+    def inputs(self, owner: Index, t: Array, y: Array, ydot: Array) -> Array:
+        """Arguments of compiled functions at points of the runs that own them."""
+        breaks = self.segments[np.minimum(owner, len(self.segments) - 1), 1:-1]
+        segment = (t[:, None] > breaks).sum(axis=1)
+        return np.concatenate([t[:, None], y, ydot, self.table[owner, segment]], axis=1)
+
+
+def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
+    """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
+    system = model.system
+    one_arc = model.jumper is None or len(problem.segments) == 2
+    own = run.solver == OWN and run.max_seconds is None and model.program.filler is None
+    shared = model.passing.is_empty and not set(plan.paths) & set(system.cycles)
+    return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
+
+
+def _starts_as_given(system: System, swept: set[str]) -> bool:
+    """Whether states and modes start with what is given, or with its logarithm, and none of them is searched for."""
+    searched = [state for state in system.states if state.algebraic]
+    made = [state for state in system.states if state.given is not None and state.given.state and state.path in swept]
+    modes = [mode for mode in system.modes if mode.start is not None]
+    memory = [item for item in system.memory if item.given is not None]
+    return not (searched or made or modes or memory)
+
+
+class ArrayRuns:
+    """Runs of a plan that :func:`solvable` says are arrays."""
+
+    def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
+        self.model, self.plan, self.run, self.keep = model, plan, run, keep
+        self.values = model.values(changes)
+        self.problem = self._first_problem(changes)
+        system = model.system
+        self.n = len(system.states)
+        paths = [parameter.path for parameter in system.parameters]
+        self.parameter_columns = {path: paths.index(path) for path in plan.paths if path in paths}
+        self.state_columns = [(j, state) for j, state in enumerate(system.states) if state.path in plan.paths]
+        self.reasons = reason_table(system)
+        every = bool(keep.max or keep.min or keep.series)
+        self.shape = self.problem.times if every else self.problem.times[[0, -1]]
+        """Output times of a run of the case."""
+        self.keeps_steps = bool(keep.max or keep.min)
+
+    def _first_problem(self, changes: Mapping[str, float]) -> Problem:
+        """The problem of the first run that is admissible; InputError where none of the first is."""
+        refused = InputError("no run of the plan is admissible.", path="sweep")
+        for number in range(min(self.plan.size, TRIED)):
+            point = {path: float(value[0]) for path, value in self.plan.at(np.array([number])).items()}
+            try:
+                return self.model.problem(self.run, self.model.values({**changes, **point}))
+            except InputError as error:
+                refused = error
+        raise refused
+
+    # -- compiled once ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def limits(self) -> Function | None:
+        """What must be above zero at the start, as far as it needs no derivatives; then the sizes of its terms."""
+        system = self.model.system
+        rates = {state.dot for state in system.states}
+        found = [expression for _, expression in system.limits if not expression.free_symbols & rates]
+        return compile_function(system.inputs, [*found, *map(magnitude, found)]) if found else None
+
+    @cached_property
+    def ramp(self) -> Function | None:
+        """Value and slope at the start of the load that ends the runs, where one does."""
+        if self.plan.until is None:
+            return None
+        system = self.model.system
+        line = spectrum.history(system, self.plan.until[0])
+        return compile_function(system.inputs, [line, derivative(line, system.t)])
+
+    # -- from values to arrays ----------------------------------------------------------------------------------------
+
+    def solve(self, values: Mapping[str, Array]) -> tuple[Mask, Columns]:
+        """Which runs with these values the arrays tell, and what is kept of those."""
+        table, y0 = self.starts(values)
+        rows = np.concatenate([np.zeros((len(y0), 1)), y0, np.zeros_like(y0), table[:, 0]], axis=1)
+        peaks, quiet = self.guards(rows)
+        ends, times = self.ends(rows)
+        told = self._admissible(values, rows) & quiet & np.isfinite(ends) & (ends > 0)
+        if not told.any():
+            return told, {}
+        own = np.flatnonzero(told)
+        peaks, times = (shared if len(shared) == 1 else shared[own] for shared in (peaks, times))
+        segments = self.problem.segments[None]
+        if self.ramp is not None:
+            segments = np.column_stack([np.zeros(len(own)), ends[own]])
+        # Looks at the equations follow the length of a run; outputs are for what is kept of its course.
+        problem = self.problem.changed(times=times[0], record_steps=self.keeps_steps)
+        spacing = segments[:, -1] / self.run.samples
+        batch = solve_arrays(problem, y0[own], table[own], spacing, peaks, segments, times)
+        clear, columns = self._columns(Ends(batch, table[own], segments, times))
+        told[own[~clear]] = False
+        return told, {name: column[clear] for name, column in columns.items()}
+
+    def starts(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Parameters [run, segment, parameter] and initial states [run, state]."""
+        count, states = len(next(iter(values.values()))), self.model.system.states
+        table = np.repeat(self.problem.parameters[None], count, axis=0)
+        y0 = np.repeat(np.array([state.from_given(self.values) for state in states])[None], count, axis=0)
+        for path, column in self.parameter_columns.items():
+            table[:, :, column] = values[path][:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for column, state in self.state_columns:
+                y0[:, column] = values[state.path] if state.given is None else np.log(values[state.path])
+        return table, y0
+
+    def _admissible(self, values: Mapping[str, Array], rows: Array) -> Mask:
+        """Which starts are within all ranges, and beyond doubt within all limits."""
+        told: Mask = np.all(np.isfinite(rows), axis=1)
+        system = self.model.system
+        specs = {parameter.path: parameter.spec for parameter in system.parameters}
+        for path, column in values.items():
+            spec = specs.get(path)
+            if spec is not None:
+                told &= (column > spec.above) & (column >= spec.at_least) & (column <= spec.at_most)
+        if self.limits is not None:
+            # What is zero but for rounding is looked at in exact numbers, run by run.
+            with np.errstate(all="ignore"):
+                limits, sizes = np.split(self.limits(rows), 2, axis=1)
+                told &= np.all(limits > CROSSED * sizes, axis=1)
+        return told
+
+    def ends(self, rows: Array) -> tuple[Array, Array]:
+        """When each run ends, and the output times: of each, where a load ends them, else of all."""
+        if self.ramp is None:
+            return np.full(len(rows), self.problem.segments[-1]), self.shape[None]
+        assert self.plan.until is not None
+        value, slope = self.ramp(rows).T
+        with np.errstate(all="ignore"):
+            ends = (self.plan.until[1] - value) / slope
+        return ends, np.asarray(self.shape / self.shape[-1]) * ends[:, None]
+
+    def guards(self, rows: Array) -> tuple[Array, Mask]:
+        """Largest accounts and guards before the start, as a first arc has them, and which starts no edge is due at."""
+        model, count = self.model, len(rows)
+        program, jumper = model.program, model.jumper
+        nothing = np.zeros((1, program.n_ledger + program.n_margins))
+        if jumper is None or program.margins is None:
+            return nothing, np.ones(count, dtype=bool)
+        # As an instant sees them at the start of a run, when nothing has been seen before.
+        first, scales = (
+            len(model.margins),
+            np.array([(s.finest or s.scale) * (s.name in VELOCITIES) for s in model.system.states]),
+        )
+        y = rows[:, 1 : 1 + self.n]
+        sizes = np.nan_to_num(jumper.magnitudes(np.concatenate([rows, np.maximum(scales, np.abs(y))], axis=1)))
+        seen = rows
+        if jumper.guards_read_rates:
+            point = consistent(program, np.zeros(count), y, np.zeros_like(y), rows[:, 1 + 2 * self.n :])
+            seen = np.concatenate([rows[:, :1], point.y, point.ydot, rows[:, 1 + 2 * self.n :]], axis=1)
+        now = program.margins(seen)
+        playing = np.array(model.system.in_play(self.problem.parameters[0]))
+        quiet: Mask = np.all(((now > CROSSED * sizes) | ~playing)[:, first:], axis=1)
+        returns = [first + j for j, edge in enumerate(model.system.edges) if edge.returns is not None]
+        sizes[:, returns] = np.maximum(sizes[:, returns], MICROMETRE)
+        return np.concatenate([np.zeros((count, program.n_ledger)), sizes], axis=1), quiet
+
+    # -- from arrays to columns ---------------------------------------------------------------------------------------
+
+    def _columns(self, found: Ends) -> tuple[Mask, Columns]:
+        """What is kept of runs, and which of them the arrays tell."""
+        batch, n = found.batch, self.n
+        counts, count = batch.counts, len(batch.counts)
+        end, every = batch.ends, np.arange(count)
+        last = found.inputs(every, end[:, 0], end[:, 1 : 1 + n], end[:, 1 + n : 1 + 2 * n])
+        status, reason, clear = self._verdicts(found, last)
+        # What its tables were too short for, and what ended before its first output, is looked at by itself.
+        clear &= (counts[:, EVENTS] <= batch.events.shape[1]) & (counts[:, OUTPUTS] > 0)
+        clear &= (counts[:, RECORDS] <= batch.records.shape[1]) | (not self.keeps_steps)
+        columns: Columns = {
+            "status": status,
+            "reason": reason,
+            "time_reached": end[:, 0].copy(),
+            "steps": counts[:, FIRST_STEP].astype(np.int32),
+        }
+        values = self._values(last)
+        columns |= {f"{name}_last": values[name] for name in self.keep.last}
+        columns |= self.along(found, clear)
+        return clear, columns | self._event_columns(found)
+
+    def _verdicts(self, found: Ends, last: Array) -> tuple[Any, Any, Mask]:
+        """Codes of status and reason, and which runs they are known of without a look at each."""
+        model, batch = self.model, found.batch
+        system, outcome = model.system, batch.counts[:, END]
+        ended, stopped = outcome == Status.FINISHED, outcome == Status.EVENT
+        reason = np.full(len(outcome), self.reasons.index(self.reasons[0]), np.int16)
+        clear = ended | (stopped & (model.jumper is None))
+        if model.jumper is None and stopped.any():
+            self._stops(found, last, stopped, reason, clear)
+        elif model.jumper is not None:  # a gap that has closed unseen
+            first, gaps = len(model.margins), batch.ends[:, -model.program.n_margins :]
+            returns = [first + j for j, edge in enumerate(system.edges) if edge.returns is not None]
+            clear &= ~(gaps[:, returns] < -PICOMETRE).any(axis=1)
+        return np.where(stopped, STATUSES.index("stopped"), 0).astype(np.int8), reason, clear
+
+    def _stops(self, found: Ends, last: Array, stopped: Mask, reason: Any, clear: Mask) -> None:
+        """Set the reasons of runs that a limit has stopped; not clear are those that its own rates lead back from."""
+        model, batch, n = self.model, found.batch, self.n
+        newest = np.clip(batch.counts[:, EVENTS], 1, batch.events.shape[1]) - 1
+        index = batch.events[np.arange(len(stopped)), newest, 0]
+        for j, margin in enumerate(model.margins):
+            hit = np.flatnonzero(stopped & (index == j))
+            if len(hit):
+                t, y, parameters = last[hit, 0], last[hit, 1 : 1 + n], last[hit, 1 + 2 * n :]
+                led = are_led_back(model.system, model.program, margin, t, y, parameters)
+                reason[hit] = self.reasons.index(margin.reason)
+                clear[hit] &= ~led & (margin.below is None)
+
+    def _values(self, rows: Array) -> dict[str, Array]:
+        """States and named quantities at rows of arguments, by name."""
+        system = self.model.system
+        named = self.model.output_function(rows)
+        found = {state.name: rows[:, 1 + j] for j, state in enumerate(system.states)}
+        return found | {name: named[:, j] for name, j in system.output_columns.items()}
+
+    def along(self, found: Ends, clear: Mask) -> Columns:
+        """Series, extremes and balances, from outputs and steps."""
+        batch, n, keep = found.batch, self.n, self.keep
+        counts, times = batch.counts, found.times
+        count, most = batch.outputs.shape[:2]
+        reached = np.arange(most) < counts[:, OUTPUTS, None]
+        # A row for each output that a run has reached, so that nothing is evaluated in vain.
+        owner, k = np.nonzero(reached)
+        t, y = times[np.minimum(owner, len(times) - 1), k], batch.outputs[owner, k, :n]
+        rows = found.inputs(owner, t, y, np.zeros_like(y))
+        rows[:, 1 + n : 1 + 2 * n] = consistent(self.model.program, t, y, np.zeros_like(y), rows[:, 1 + 2 * n :]).ydot
+        values = self._values(rows)
+
+        def table(column: Array) -> Array:
+            """A column of the outputs as a table of the runs, not a number where a run did not arrive."""
+            whole = np.full((count, most), np.nan)
+            whole[owner, k] = column
+            return whole
+
+        columns: Columns = {name: table(values[name]) for name in keep.series}
+        columns |= self.balances(found, rows, values, reached)
+        if not self.keeps_steps:
+            return columns
+        return columns | self.extremes(found, clear, owner, values)
+
+    def extremes(self, found: Ends, clear: Mask, owner: Index, values: Mapping[str, Array]) -> Columns:
+        """Largest and least values over the outputs, which ``owner`` says the runs of, and over the ends of steps."""
+        batch, n = found.batch, self.n
+        taken = np.arange(batch.records.shape[1]) < np.where(clear, batch.counts[:, RECORDS], 0)[:, None]
+        step_owner, m = np.nonzero(taken)
+        steps = batch.records[step_owner, m]
+        beside = self._values(found.inputs(step_owner, steps[:, 0], steps[:, 1 : 1 + n], steps[:, 1 + n : 1 + 2 * n]))
+        columns: Columns = {}
+        for which, names, best in (("max", self.keep.max, np.fmax), ("min", self.keep.min, np.fmin)):
+            for name in names:
+                extreme = np.full(len(clear), np.nan)
+                best.at(extreme, owner, values[name])
+                best.at(extreme, step_owner, beside[name])
+                columns[f"{name}_{which}"] = extreme
+        return columns
+
+    def balances(self, found: Ends, rows: Array, values: Mapping[str, Array], reached: Mask) -> Columns:
+        """Errors of the balances of each run over its outputs, as its audit has them."""
+        system, batch, n = self.model.system, found.batch, self.n
+        count, most = reached.shape
+        owner, k = np.nonzero(reached)
+
+        def whole(columns: Array) -> Array:
+            """A table of the runs; beyond the end of a run as at its start, so that nothing is exchanged there."""
+            filled = np.zeros((count, most, columns.shape[1]))
+            filled[owner, k] = columns
+            return np.where(reached[..., None], filled, filled[:, :1])
+
+        # The same residuals and roundings as those of the audit of one run, over the outputs that there are.
+        named = whole(np.column_stack([values[name] for name in system.output_columns]))
+        ledger = np.where(reached[..., None], batch.outputs[..., n:], batch.outputs[:, :1, n:])
+        left = residuals(system, named, ledger)
+        totals = {"energy": "E_total", "entropy": "S_total"}
+        rounded = self._rounded(rows, values, totals)
+        columns: Columns = {}
+        for which, name in totals.items():
+            scale = getattr(left, f"{which}_scale")
+            largest = np.abs(named[..., system.output_columns[name]]).max(axis=1)
+            stored = np.maximum(whole(rounded[which][:, None]).max(axis=(1, 2)) / EPS, largest)
+            stored = np.maximum(stored, scale) if which == "entropy" else stored
+            rounding = EPS * stored * (ROUNDINGS + batch.counts[:, RECORDS])
+            columns[f"{which}_error"] = resolved(getattr(left, which), scale, stored, rounding)
+        sites = np.zeros(count)
+        for j in system.account_columns.get("bonds", ()):
+            bonds = whole(values[system.ledger[j].law][:, None])[..., 0]
+            open_ones = np.abs(bonds - bonds[:, :1] - ledger[..., j])
+            sites = np.maximum(sites, open_ones.max(axis=1))
+        return {**columns, "site_error": sites}
+
+    def _rounded(self, rows: Array, values: Mapping[str, Array], totals: Mapping[str, str]) -> dict[str, Array]:
+        """By how much the last bit of a state changes each total at most."""
+        found = {which: np.zeros(len(rows)) for which in totals}
+        for j in range(self.n):
+            moved = rows.copy()
+            moved[:, 1 + j] *= 1 + EPS
+            nudged = self._values(moved)
+            for which, name in totals.items():
+                found[which] = np.fmax(found[which], np.abs(nudged[name] - values[name]))
+        return found
+
+    def _event_columns(self, found: Ends) -> Columns:
+        """First times of events after which a run goes on, and of values that are reached."""
+        # The first row of a run that fits; a row of another run's kind is masked out afterwards.
+        batch, margins, keep = found.batch, self.model.margins, self.keep
+        columns: Columns = {}
+        names = [*((name, f"time_{variable(name)}") for name in keep.events)]
+        names += [(f"{REACHED}{name}", f"time_to_{name}") for name in keep.reach or {}]
+        happened = np.arange(batch.events.shape[1]) < batch.counts[:, EVENTS, None]
+        for name, column in names:
+            wanted = [j for j, margin in enumerate(margins) if margin.name == name]
+            fits = happened & np.isin(batch.events[..., 0], wanted)
+            first = fits.argmax(axis=1) if fits.shape[1] else np.zeros(len(fits), np.int64)
+            any_of = fits.any(axis=1)
+            rows = (
+                batch.events[np.arange(len(fits)), first] if fits.shape[1] else np.full((len(fits), 2 + self.n), np.nan)
+            )
+            columns[column] = np.where(any_of, rows[:, 1], np.nan)
+            if name in keep.events:
+                for state in keep.at_events:
+                    j = self.model.system.state_columns[state]
+                    columns[f"{state}_at_{variable(name)}"] = np.where(any_of, rows[:, 2 + j], np.nan)
+        return columns

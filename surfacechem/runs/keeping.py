@@ -1,0 +1,220 @@
+"""What a store keeps of each run, as columns: ends, extremes, times of events, series; how runs end as codes."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import suggestion
+from surfacechem.format.sections import ALL, KeepSection
+from surfacechem.model.system import Margin, System
+from surfacechem.quantities import Quantity
+from surfacechem.results.audit import audit
+from surfacechem.results.dataset import quantities
+from surfacechem.results.event_table import events_of
+from surfacechem.solve.contract import REASONS, Status
+from surfacechem.solve.run import Model, Trajectory
+
+Array = NDArray[np.float64]
+Columns = dict[str, NDArray[Any]]
+"""What is kept by name, the run as first axis."""
+
+STATUSES = ("finished", "stopped", "failed", "refused")
+"""How a run ends, in the order of its codes; refused is one whose values are not admissible at its start."""
+
+REFUSED, OTHER = "the values are not admissible at the start", "another reason"
+
+REACHED = "reaches "
+"""How the names of margins begin that tell when a quantity reaches a value."""
+
+
+@dataclass(frozen=True)
+class Keep:
+    """Names of the quantities and events of which something is kept; values to be reached by name."""
+
+    last: tuple[str, ...] = ()
+    max: tuple[str, ...] = ()
+    min: tuple[str, ...] = ()
+    series: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
+    at_events: tuple[str, ...] = ()
+    reach: Mapping[str, float] | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """All quantities of which a value is kept."""
+        return list(dict.fromkeys((*self.last, *self.max, *self.min, *self.series)))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What a store says of it."""
+        return asdict(self)
+
+
+def recorded_keep(record: str) -> Keep:
+    """What is kept, as a store says it."""
+    content = json.loads(record)
+    reach = content.pop("reach")
+    return Keep(**{name: tuple(names) for name, names in content.items()}, reach=reach)
+
+
+def keep_of(section: KeepSection | None, system: System) -> Keep:
+    """What is kept, by name: of all ends, extremes and events where nothing is said; InputError at an unknown name."""
+    states = [state.name for state in system.states if state.name not in system.inside]
+    known = {"quantities": [*quantities(system)], "events": event_names(system), "states": states}
+    if section is None:
+        every = tuple(known["quantities"])
+        return Keep(last=every, max=every, min=every, events=tuple(known["events"]))
+    kinds = dict.fromkeys(("last", "max", "min", "series"), "quantities") | {"events": "events", "at_events": "states"}
+    found: dict[str, tuple[str, ...]] = {}
+    for key, kind in kinds.items():
+        given = getattr(section, key)
+        found[key] = tuple(known[kind] if given == ALL else given)
+        for name in found[key]:
+            if name not in known[kind]:
+                raise section.error(f"no {kind} are called '{name}'.{suggestion(name, known[kind])}", key)
+    for name in section.reach:
+        if name not in known["quantities"]:
+            raise section.error(f"nothing in this case is called '{name}'.", "reach")
+    return Keep(**found, reach=dict(section.reach))
+
+
+def event_names(system: System) -> list[str]:
+    """Events after which a run goes on: kinks and edges. One that ends it is its reason."""
+    kinks = [margin.name for margin in system.moving_margins() if not (margin.terminal or margin.peak)]
+    return list(dict.fromkeys([*kinks, *(edge.name for edge in system.edges)]))
+
+
+def reaching(system: System, keep: Keep) -> System:
+    """The system that also locates where quantities reach the values of which the times are kept."""
+    symbols = {state.name: state.symbol for state in system.states}
+    margins = []
+    for name, value in (keep.reach or {}).items():
+        expression = symbols.get(name) or system.find(name).expression
+        margins.append(Margin(f"{REACHED}{name}", expression - value, f"{name} reaches {value:g}", terminal=False))
+    return replace(system, margins=(*system.margins, *margins))
+
+
+def reason_table(system: System) -> list[str]:
+    """Why runs end, in the order of the codes."""
+    margins = system.moving_margins()
+    ends = [text for margin in margins for text in (margin.reason, *(margin.below or ("", ""))[1:]) if text]
+    failures = [text for status, text in REASONS.items() if not status.success]
+    return list(
+        dict.fromkeys(
+            [REASONS[Status.FINISHED], REFUSED, *ends, *(edge.reason for edge in system.edges), *failures, OTHER]
+        )
+    )
+
+
+def variable(name: str) -> str:
+    """The name of an event as part of that of a variable.
+
+    >>> variable("g_n > 0")
+    'g_n_0'
+    """
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def described(system: System, keep: Keep) -> dict[str, tuple[str, str, str]]:
+    """Type, unit and meaning of every column but the series, by name."""
+    q = quantities(system)
+    found = {
+        "status": ("int8", "1", "how the run ended"),
+        "reason": ("int16", "1", "why the run ended"),
+        "time_reached": ("float64", "s", "time that the run reached"),
+        "steps": ("int32", "1", "steps of the run"),
+        "energy_error": ("float64", "1", "largest energy residual relative to the energy exchanged"),
+        "entropy_error": ("float64", "1", "largest entropy residual relative to what was exchanged"),
+        "site_error": ("float64", "1", "largest residual of the site balances"),
+    }
+    words = {
+        "last": "at the end of the run",
+        "max": "at most, over outputs and steps",
+        "min": "at least, over the same",
+    }
+    for which, word in words.items():
+        for name in getattr(keep, which):
+            found[f"{name}_{which}"] = ("float64", q[name].unit, f"{q[name].long_name} {word}")
+    for name in keep.events:
+        found[f"time_{variable(name)}"] = ("float64", "s", f"first time of the event {name}")
+        for state in keep.at_events:
+            text = f"{q[state].long_name} before the event {name}"
+            found[f"{state}_at_{variable(name)}"] = ("float64", q[state].unit, text)
+    for name, value in (keep.reach or {}).items():
+        found[f"time_to_{name}"] = ("float64", "s", f"time at which {name} first reaches {value:g} {q[name].unit}")
+    return found
+
+
+def series(system: System, keep: Keep) -> dict[str, Quantity]:
+    """The quantities that are kept at every output time."""
+    q = quantities(system)
+    return {name: q[name] for name in keep.series}
+
+
+class RunByRun:
+    """Columns of runs that are solved and looked at one after the other: any scene, any end."""
+
+    def __init__(self, model: Model, keep: Keep) -> None:
+        self.model, self.keep = model, keep
+        self.reasons = reason_table(model.system)
+
+    def columns(self, runs: Sequence[Trajectory | None], times: int) -> Columns:
+        """What is kept of runs, None for one that was refused, with so many output times."""
+        rows = [self._refused() if run is None else self._kept(run, times) for run in runs]
+        kinds = {name: kind for name, (kind, _, _) in described(self.model.system, self.keep).items()}
+        found: Columns = {name: np.array([row.get(name, np.nan) for row in rows], kind) for name, kind in kinds.items()}
+        for name in self.keep.series:
+            nothing = np.full(times, np.nan)
+            found[name] = np.array([row.get(name, nothing) for row in rows])
+        return found
+
+    def _refused(self) -> dict[str, Any]:
+        return {"status": STATUSES.index("refused"), "reason": self.reasons.index(REFUSED), "steps": 0}
+
+    def _kept(self, run: Trajectory, times: int) -> dict[str, Any]:
+        result, books, keep = run.result, audit(run), self.keep
+        row: dict[str, Any] = {
+            "status": STATUSES.index(run.status),
+            "reason": self._code(run.reason),
+            "time_reached": result.t,
+            "steps": result.counters.steps,
+            **{f"{kind}_error": getattr(books, f"{kind}_error") for kind in ("energy", "entropy", "site")},
+        }
+        names = [state.name for state in self.model.system.states] + [*self.model.system.output_columns]
+        end = np.array([result.t]), result.y[None], result.ydot[None]
+        last = dict(zip(names, [*result.y, *self.model.evaluate(result, *end)[0]], strict=True)) if keep.last else {}
+        row |= {f"{name}_last": last[name] for name in keep.last}
+        with np.errstate(invalid="ignore"):
+            row |= {f"{name}_max": np.fmax.reduce(run.everywhere[name], initial=np.nan) for name in keep.max}
+            row |= {f"{name}_min": np.fmin.reduce(run.everywhere[name], initial=np.nan) for name in keep.min}
+        reached = len(result.times)
+        for name in keep.series:
+            row[name] = np.append(run.everywhere[name][:reached], np.full(times - reached, np.nan))
+        return row | self._events(run)
+
+    def _events(self, run: Trajectory) -> dict[str, float]:
+        """Times of events and of values reached, each the first of its name."""
+        row: dict[str, float] = {}
+        # Events are in order of time, so that the first of a name is the one that counts.
+        columns = self.model.system.state_columns
+        reached = {f"{REACHED}{name}": f"time_to_{name}" for name in self.keep.reach or {}}
+        for event in events_of(run) if self.keep.events or reached else ():
+            if event.name in reached:
+                row.setdefault(reached[event.name], event.t)
+            elif (name := variable(event.name)) and f"time_{name}" not in row:
+                row[f"time_{name}"] = event.t
+                row |= {f"{state}_at_{name}": event.before[columns[state]] for state in self.keep.at_events}
+        return row
+
+    def _code(self, reason: str) -> int:
+        """The code of a reason, which goes on behind what the table has of it."""
+        # Reasons of runs go on with times and numbers, which are no part of the code.
+        fitting = [text for text in self.reasons if reason.startswith(text)]
+        return self.reasons.index(max(fitting, key=len, default=OTHER))

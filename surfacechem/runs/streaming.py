@@ -1,0 +1,284 @@
+"""Sweeps of any size: runs in chunks, from the plan to the store, with no more in memory than is being computed."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem import format as cases
+from surfacechem.errors import InputError
+from surfacechem.format.plans import Plan, recorded_plan
+from surfacechem.results.netcdf import CONVENTIONS, Column, cf_unit, versions
+from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, store_path
+from surfacechem.runs import keeping, sweeps
+from surfacechem.runs.arrays import ArrayRuns, solvable
+from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
+from surfacechem.solve.run import Model, Run, Trajectory
+
+if TYPE_CHECKING:
+    from surfacechem.runs.simulation import Simulation
+
+Index = NDArray[np.int64]
+
+RUNS_OF_A_CHUNK, OF_A_SLOW_ONE = 2**14, 2**9
+"""Runs of a chunk at most: a second or two of the compiled loop. Of runs that are looked at one by one fewer."""
+
+RUNS_OF_A_PIECE = 2**11
+"""Runs that one thread takes at a time, so that all of them share a chunk."""
+
+
+class ChunkRuns:
+    """The runs of a plan, in any order and in parts of any size, as columns of what is kept."""
+
+    def __init__(self, simulation: Simulation, plan: Plan, keep: Keep, changes: Mapping[str, float]) -> None:
+        self.simulation, self.plan, self.keep = simulation, plan, keep
+        self.changes = changes
+        self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
+        self.run = self.model.chosen(simulation.case.run)
+        self.one_by_one = RunByRun(self.model, keep)
+        arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
+        self.arrays = arrays if solvable(self.model, plan, self.run, arrays.problem) else None
+
+    @cached_property
+    def piece(self) -> int:
+        """Runs that are computed at once, so that their outputs and all that is made of them stay small."""
+        system = self.model.system
+        if self.arrays is None:
+            return 2**6
+        points = len(self.arrays.shape) + (100 if self.arrays.keeps_steps else 0)
+        row = 8 * points * (4 * len(system.inputs) + 4 * len(system.outputs) + len(system.ledger))
+        return int(np.clip(MOST_BYTES // (2 * row), 2**6, RUNS_OF_A_PIECE))
+
+    def flags(self, name: str) -> dict[str, Any]:
+        """What the codes of a variable mean, where it holds codes."""
+        words = {"status": STATUSES, "reason": self.one_by_one.reasons}.get(name)
+        if words is None:
+            return {}
+        return {"flag_values": list(range(len(words))), "flag_meanings": " ".join(map(variable, words))}
+
+    def columns(self, index: Index) -> Columns:
+        """What is kept of the runs of these numbers."""
+        values = self.plan.at(index)
+        times = len(self.run.times)
+        if self.arrays is None:
+            return self.one_by_one.columns(self._solved(values, np.arange(len(index))), times)
+        told, found = self.arrays.solve(values)
+        left = np.flatnonzero(~told)  # what arrays do not tell is run by run, and the same in any company
+        if not len(left):
+            return found
+        others = self.one_by_one.columns(self._solved(values, left), times)
+        if not found:
+            return others
+        return {name: _merged(told, found[name], others[name]) for name in others}
+
+    def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | None]:
+        """Some runs by themselves, None for one whose values are not admissible."""
+        points = [{path: float(column[i]) for path, column in values.items()} for i in chosen.tolist()]
+        pairs: list[tuple[Run, Mapping[str, float]] | None] = []
+        for point in points:
+            try:
+                full = self.model.values({**self.changes, **point})
+                (run,) = sweeps.settings(self.model.system, self.plan, self.run, [full])
+                self.model.problem(run, full)
+                pairs.append((run, full))
+            except InputError:
+                pairs.append(None)
+        # Those that are admissible go through the compiled loop together.
+        admissible = [pair for pair in pairs if pair is not None]
+        done = iter(self.model.solve_all(admissible) if admissible else [])
+        return [None if pair is None else next(done) for pair in pairs]
+
+
+def _merged(told: NDArray[np.bool_], these: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+    """A column of runs of which some are told by the one, the rest by the other."""
+    whole = np.empty((len(told), *these.shape[1:]), dtype=these.dtype)
+    whole[told], whole[~told] = these, others
+    return whole
+
+
+# -- a sweep into a store ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker needs to compute any runs of a sweep, as text."""
+
+    name: str
+    case: str
+    mechanism: str | None
+    plan: str
+    keep: str
+    changes: str
+    run: Run
+
+
+@lru_cache(maxsize=2)
+def _runs_of(job: Job) -> ChunkRuns:
+    from surfacechem.runs.simulation import Simulation
+
+    case = cases.load_text(job.case, job.name, mechanism_text=job.mechanism)
+    simulation = Simulation(replace(case, own_run=job.run))
+    return ChunkRuns(simulation, recorded_plan(job.plan), keeping.recorded_keep(job.keep), json.loads(job.changes))
+
+
+def columns_of(job: Job, index: Index) -> Columns:
+    """What is kept of some runs of a sweep, computed in any process."""
+    return _runs_of(job).columns(index)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is."""
+
+    runs: int
+    done: int
+    failed: int
+    resumed: int
+    """Runs that were there before."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A sweep on its way into a store."""
+
+    chunks: ChunkRuns
+    store: Store
+    job: Job
+    part: tuple[int, int] = (1, 1)
+
+    @property
+    def numbers(self) -> range:
+        """Chunks of this part: every so many, so that parts take the same time."""
+        k, count = self.part
+        return range(k - 1, self.store.layout.chunks, count)
+
+    def run(
+        self, threads: int | None = None, client: Any = None, told: Callable[[Progress], None] = lambda _: None
+    ) -> Store:
+        """Compute what is missing and store it; ``client`` is that of a cluster of dask.distributed, whose workers
+        compute while this process writes.
+        """
+        layout = self.store.layout
+        with self.store.locked(f"{self.part[0]}-of-{self.part[1]}"):
+            numbers = list(self.numbers)
+            missing = [number for number in numbers if not self.store.done(number)]
+            runs, resumed = (
+                sum(len(layout.index(number)) for number in some) for some in (numbers, set(numbers) - set(missing))
+            )
+            done, failed = resumed, 0
+            told(Progress(runs, done, failed, resumed))
+            for number, columns in self._computed(missing, threads or os.cpu_count() or 1, client):
+                # Only this thread writes, so that chunks and their marks come in order.
+                self.store.write(number, columns)
+                done += len(columns["status"])
+                failed += int(np.sum(columns["status"] >= STATUSES.index("failed")))
+                told(Progress(runs, done, failed, resumed))
+        return self.store
+
+    def _computed(self, numbers: Sequence[int], threads: int, client: Any) -> Iterator[tuple[int, Columns]]:
+        """The columns of chunks, in order; the next are computed while one is written."""
+        pool = ThreadPoolExecutor(threads)
+
+        def submit(part: Index) -> Any:
+            if client:
+                return client.submit(columns_of, self.job, part, pure=False)
+            return pool.submit(self.chunks.columns, part)
+
+        ahead = 2 * len(client.scheduler_info()["workers"]) if client else 1
+        waiting: deque[tuple[int, list[Any]]] = deque()
+        try:
+            for number in numbers:
+                index = self.store.layout.index(number)
+                size = len(index) if client else self.chunks.piece
+                parts = [index[first : first + size] for first in range(0, len(index), size)]
+                waiting.append((number, [submit(part) for part in parts]))
+                if len(waiting) > ahead:
+                    yield _joined(*waiting.popleft())
+            while waiting:
+                yield _joined(*waiting.popleft())
+        finally:
+            # Where writing has failed nothing more is computed in vain.
+            for future in (future for _, futures in waiting for future in futures):
+                future.cancel()
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _joined(number: int, futures: Sequence[Any]) -> tuple[int, Columns]:
+    found = [future.result() for future in futures]
+    return number, {name: np.concatenate([columns[name] for columns in found]) for name in found[0]}
+
+
+def stream(
+    simulation: Simulation,
+    plan: Plan,
+    path: str | Path,
+    *,
+    changes: Mapping[str, float],
+    resume: bool = False,
+    part: tuple[int, int] = (1, 1),
+) -> Stream:
+    """A sweep that is about to go into a store, which is made, or opened to be gone on with."""
+    target, case = store_path(path), simulation.case
+    keep = keep_of(case.sweep.keep if case.sweep else None, sweeps.prepared(simulation.system, plan))
+    chunks = ChunkRuns(simulation, plan, keep, changes)
+    job = Job(
+        case.name,
+        case.text,
+        case.mechanism_text,
+        plan.record,
+        json.dumps(keep.record),
+        json.dumps(dict(changes)),
+        chunks.run,
+    )
+    store = begin(target, _layout(chunks, job), resume or part != (1, 1))
+    return Stream(chunks, store, job, part)
+
+
+def _layout(chunks: ChunkRuns, job: Job) -> Layout:
+    """Arrays, coordinates and attributes of the store of a sweep."""
+    system, plan, keep = chunks.model.system, chunks.plan, chunks.keep
+    names = sweeps.parameter_names(system, plan)
+    sizes = sweeps.dimensions(plan, names)
+    runs = tuple(sizes)
+    variables = {
+        name: StoredArray(kind, runs, {"units": cf_unit(unit), "long_name": text, **chunks.flags(name)})
+        for name, (kind, unit, text) in keeping.described(system, keep).items()
+    }
+    coordinates = sweeps.parameter_columns(system, plan, names)
+    if keep.series:
+        sizes["time"] = len(chunks.run.times)
+        coordinates.append(Column("time", ("time",), np.asarray(chunks.run.times), "s", "time since the start"))
+    for name, q in keeping.series(system, keep).items():
+        attributes = Column(name, (), None, q.unit, q.long_name).attributes
+        variables[name] = StoredArray("float64", (*runs, "time"), attributes)
+    at_once = RUNS_OF_A_CHUNK if chunks.arrays else OF_A_SLOW_ONE
+    return Layout(sizes, runs, variables, coordinates, _attributes(chunks, job), at_once)
+
+
+def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
+    """Where a store is from: the same for all that write to it, and nothing that changes from time to time."""
+    case = chunks.simulation.case
+    return {
+        "Conventions": CONVENTIONS,
+        "title": case.title,
+        "source": case.source or "surfacechem",
+        **{name: text for name in ("case", "mechanism") if (text := getattr(job, name))},
+        "sweep": job.plan,
+        "keep": job.keep,
+        "changes": job.changes,
+        "run": json.dumps({**asdict(chunks.run), "times": list(chunks.run.times)}),
+        "runs": chunks.plan.size,
+        "regime": chunks.model.system.regime,
+        "reasons": chunks.one_by_one.reasons,
+        "versions": versions(),
+    }

@@ -1,0 +1,263 @@
+"""Sweeps into a store: each run as by itself; the same bytes however it was computed, interrupted and gone on with."""
+
+import hashlib
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import surfacechem
+from surfacechem.cli.main import app
+from surfacechem.errors import InputError, OutputError
+from surfacechem.results.store import Layout, StoredArray, opened
+from surfacechem.runs import streaming
+from surfacechem.runs.keeping import STATUSES
+
+pytestmark = pytest.mark.around
+
+K_0 = "interface.potential.bond-energy.K_0"
+ENDS = {"last": ["T", "phi"]}
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    monkeypatch.setattr(streaming, "RUNS_OF_A_CHUNK", 16)
+
+
+def case(name="exothermic", keep=None, over=None, **more):
+    over = over or {K_0: {"from": 100, "to": 300, "points": 60}}
+    return surfacechem.load(name, {"sweep": {"over": over, **({"keep": keep} if keep else {}), **more}})
+
+
+def stored(path, simulation=None, **options):
+    simulation = simulation or case(keep=ENDS)
+    stream = simulation.stream(
+        simulation.plan(), path, resume=options.pop("resume", False), part=options.pop("part", (1, 1))
+    )
+    return stream.run(options.pop("threads", 1), **options)
+
+
+def digest(path):
+    files = sorted(file for file in path.rglob("*") if file.is_file())
+    return [(str(file.relative_to(path)), hashlib.sha256(file.read_bytes()).hexdigest()) for file in files]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A store that was written at once, by one thread."""
+    path = tmp_path_factory.mktemp("whole") / "o.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(streaming, "RUNS_OF_A_CHUNK", 16)
+        stored(path)
+    return path
+
+
+SWEPT = {
+    "exothermic": {K_0: [100.0, 300.0], "initial.phi": [0.0, 0.2, 0.4]},
+    "shared-load-rupture": {"loading.t_n": [200.0, 517.743, 1000.0]},
+    "debonding": {"interface.limits.tensile-strength.t_max": ["20 MPa", "1 GPa"]},
+    "force-spectroscopy": {"loading.f.ramp.rate": [1e-12, 1e-9]},
+    "epoxy-cure-adiabatic": {"initial.T": [400.0, 420.0]},
+}
+
+
+@pytest.mark.parametrize("name", SWEPT)
+def test_what_is_kept_of_a_run_is_that_of_the_run_by_itself(name, tmp_path):
+    simulation = case(name, over=SWEPT[name])
+    store = stored(tmp_path / "o.zarr", simulation)
+    data, points = store.dataset, simulation.plan().points
+    for i, point in enumerate(points):
+        one = {key: values.values.ravel()[i] for key, values in data.data_vars.items()}
+        alone = simulation.run(point)
+        run = alone.trajectory
+        assert STATUSES[one["status"]] == run.status
+        assert run.reason.startswith(data.attrs["reasons"][one["reason"]])
+        assert (one["time_reached"], one["steps"]) == (run.result.t, run.result.counters.steps)
+        for balance in ("energy_error", "entropy_error", "site_error"):
+            assert one[balance] == pytest.approx(alone.attributes[balance], rel=1e-9, abs=1e-15)
+        for key in data.data_vars:
+            variable, _, which = key.rpartition("_")
+            if which in ("max", "min"):
+                assert one[key] == getattr(np, f"nan{which}")(run.everywhere[variable])
+            if which == "last" and variable in run.model.system.state_columns:
+                assert one[key] == run.result.y[run.model.system.state_columns[variable]]
+        for event in alone.dataset["event_time"].values if "event_time" in alone.dataset else ():
+            assert event in [one["time_reached"], *(one[key] for key in one if key.startswith("time_"))]
+
+
+def test_times_of_values_and_states_at_events(tmp_path):
+    keep = {"reach": {"phi": 0.5, "T": "310 K"}, "series": ["T"]}
+    simulation = case(keep=keep, over={K_0: [300.0, 30.0]})
+    data = stored(tmp_path / "o.zarr", simulation).dataset
+    alone = simulation.run({K_0: 300.0})
+    np.testing.assert_allclose(data["T"].values[0], alone.dataset["T"].values, rtol=1e-9)  # its steps end elsewhere
+    for name, value in (("phi", 0.5), ("T", 310.0)):
+        t = data[f"time_to_{name}"].values[0]
+        ended = surfacechem.run("exothermic", {"run.until": t}).dataset
+        assert ended[name].values[-1] == pytest.approx(value, rel=1e-9)
+    assert np.isnan(data["time_to_T"].values[1])
+    simulation = case("debonding", {"events": "all", "at-events": ["phi"]}, SWEPT["debonding"])
+    data = stored(tmp_path / "d.zarr", simulation).dataset
+    assert data["time_debond"].values[0] > 0
+    assert data["phi_at_debond"].values[0] > 0
+    assert np.isnan(data["time_debond"].values[1])
+
+
+def test_a_run_whose_values_are_not_admissible_is_refused_and_leaves_the_others_alone(tmp_path):
+    simulation = case(keep=ENDS, over={"initial.phi": [0.2, 1.2, 0.4], "initial.T": [-1.0, 300.0]})
+    data = stored(tmp_path / "o.zarr", simulation).dataset
+    assert [[STATUSES[code] for code in row] for row in data["status"].values] == [
+        ["refused", "finished"],
+        ["refused", "refused"],
+        ["refused", "finished"],
+    ]
+    assert np.isnan(data["T_last"].values[:, 0]).all()
+    assert data["T_last"].values[2, 1] == simulation.run({"initial.phi": 0.4}).dataset["T"].values[-1]
+
+
+def test_threads_pieces_and_parts_change_no_byte(whole, tmp_path, monkeypatch):
+    stored(tmp_path / "threads.zarr", threads=3)
+    assert digest(tmp_path / "threads.zarr") == digest(whole)
+    for k in (2, 1, 3):
+        stored(tmp_path / "parts.zarr", part=(k, 3))
+    assert digest(tmp_path / "parts.zarr") == digest(whole)
+    monkeypatch.setattr(streaming, "RUNS_OF_A_PIECE", 64)
+    monkeypatch.setattr(streaming.ChunkRuns, "piece", 5)
+    stored(tmp_path / "pieces.zarr")
+    assert digest(tmp_path / "pieces.zarr") == digest(whole)
+
+
+SCRIPT = """
+import sys, time
+from surfacechem.runs import streaming
+streaming.RUNS_OF_A_CHUNK = 16
+import surfacechem
+from surfacechem.results.store import Store
+write = Store.write
+def slowly(self, number, columns):
+    write(self, number, columns)
+    time.sleep(0.2)
+Store.write = slowly
+simulation = surfacechem.load("exothermic", {over})
+simulation.stream(simulation.plan(), sys.argv[1], resume="resume" in sys.argv).run(1)
+"""
+
+
+def script():
+    text = {"sweep": {"over": {K_0: {"from": 100, "to": 300, "points": 60}}, "keep": ENDS}}
+    return SCRIPT.replace("{over}", repr(text))
+
+
+def test_a_killed_writer_loses_at_most_a_chunk_and_no_byte(whole, tmp_path):
+    path = tmp_path / "o.zarr"
+    writer = subprocess.Popen([sys.executable, "-c", script(), str(path)])
+    while not (path / ".marks" / "1").exists():
+        assert writer.poll() is None
+        time.sleep(0.01)
+    with pytest.raises(InputError, match="another process is writing part 1-of-1"):
+        stored(path, resume=True)
+    writer.send_signal(signal.SIGKILL)
+    writer.wait()
+    marks = sorted(file.name for file in (path / ".marks").iterdir())
+    assert {"0", "1"} <= set(marks) < {"0", "1", "2", "3", "writer-1-of-1"}
+    told = []
+    stored(path, resume=True, told=told.append)
+    assert told[0].resumed == 16 * (len(marks) - 1)
+    assert told[-1].done == told[-1].runs == 60
+    assert digest(path) == digest(whole)
+
+
+def test_a_damaged_chunk_is_computed_again(whole, tmp_path):
+    path = tmp_path / "o.zarr"
+    stored(path)
+    (path / "T_last/c/2").write_bytes(b"damaged")
+    (path / "phi_last/c/1").unlink()
+    told = []
+    stored(path, resume=True, told=told.append)
+    assert told[0].resumed == 60 - 2 * 16
+    assert digest(path) == digest(whole)
+
+
+def test_another_sweep_or_what_is_no_store_is_refused(whole, tmp_path):
+    with pytest.raises(InputError, match="is there already: --resume goes on with it"):
+        stored(whole)
+    with pytest.raises(InputError, match="is of another sweep: the case, what is kept differ"):
+        stored(whole, case(keep={"last": ["T"]}), resume=True)
+    with pytest.raises(InputError, match="is of another sweep: the case, the plan differ"):
+        stored(whole, case(keep=ENDS, over={K_0: [1.0, 2.0]}), resume=True)
+    (tmp_path / "foreign.zarr").mkdir()
+    (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")
+    with pytest.raises(InputError, match="is no store of a sweep"):
+        stored(tmp_path / "foreign.zarr", resume=True)
+    with pytest.raises(InputError, match="there is no folder"):
+        stored(tmp_path / "no" / "o.zarr")
+    with pytest.raises(InputError, match="no quantities are called 'Tee'"):
+        stored(tmp_path / "o.zarr", case(keep={"last": ["Tee"]}))
+    assert not (tmp_path / "o.zarr").exists()
+
+
+def test_a_store_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # of a superuser nothing is protected
+    with pytest.raises(InputError, match="cannot be written: it is read-only"):
+        stored(tmp_path / "o.zarr")
+
+
+def test_a_full_disk_is_an_error_of_a_line_and_loses_nothing(whole, tmp_path, monkeypatch):
+    path, soft = tmp_path / "o.zarr", resource.getrlimit(resource.RLIMIT_FSIZE)
+    stream = (simulation := case(keep=ENDS)).stream(simulation.plan(), path)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, soft[1]))
+        with pytest.raises(OutputError, match=r"cannot be written: .*go on with --resume"):
+            stream.run(1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, soft)
+    stored(path, resume=True)
+    assert digest(path) == digest(whole)
+
+
+def test_a_killed_worker_of_a_cluster_changes_no_byte(whole, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        victim = next(iter(client.run(os.getpid).values()))
+        told = []
+
+        def kill(progress):
+            if progress.done == 16:
+                os.kill(victim, signal.SIGKILL)
+            told.append(progress)
+
+        stored(tmp_path / "o.zarr", client=client, told=kill)
+    assert told[-1].done == 60
+    assert digest(tmp_path / "o.zarr") == digest(whole)
+
+
+def test_chunks_of_a_grid_are_blocks_of_it():
+    layout = Layout({"a": 5, "b": 7, "time": 3}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, [], {}, 16)
+    assert (layout.chunk, layout.counts, layout.chunks) == ((2, 7), (3, 1), 3)
+    assert np.array_equal(np.concatenate([layout.index(k) for k in range(3)]), np.arange(35))
+    huge = Layout({"a": 2**20, "b": 2**20}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, [], {}, 2**14)
+    assert huge.region(huge.chunks - 1) == (slice(2**20 - 1, 2**20), slice(2**20 - 2**14, 2**20))
+
+
+def test_commands_write_a_store_and_go_on_with_it(tmp_path):
+    path = tmp_path / "o.zarr"
+    given = ["sweep", "exothermic", "--over", f"{K_0}=[100, 200, 300]", "-o", str(path), "--threads", "1"]
+    result = CliRunner().invoke(app, [*given, "--part", "1/1"])
+    assert result.exit_code == 0, result.output
+    assert "3 of 3 runs: 3 finished" in result.output
+    assert CliRunner().invoke(app, given).exit_code == 2
+    assert CliRunner().invoke(app, [*given, "--resume", "-q"]).exit_code == 0
+    for option, message in ((["--part", "5/4"], "'5/4' is no part"), (["--cluster", "nowhere"], "--cluster")):
+        assert message in CliRunner().invoke(app, [*given, *option]).output
+    data = opened(path)
+    assert data["K_0"].values.tolist() == [100, 200, 300]
+    assert data["T_max"].attrs["units"] == "K"
