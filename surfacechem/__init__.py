@@ -7,7 +7,7 @@
 
 ``load`` reads a case and returns a :class:`~surfacechem.runs.simulation.Simulation`, which compiles once and runs with
 any values of its parameters; ``run`` does both, ``sweep`` runs many at once, ``precision`` measures error against run
-time.
+time, ``register`` makes a law of one's own known.
 Theory: Sauer, Duong & Mandadapu (2021), doi 10.1177/10812865211032723.
 """
 
@@ -16,10 +16,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from surfacechem.laws import register
     from surfacechem.runs.simulation import Simulation, load, run, sweep
     from surfacechem.studies.precision import precision
 
-__all__ = ["Simulation", "load", "precision", "run", "sweep"]
+__all__ = ["Simulation", "load", "precision", "register", "run", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
@@ -27,6 +28,10 @@ def __getattr__(name: str) -> Any:
         from surfacechem.studies import precision
 
         return precision.precision
+    if name == "register":
+        from surfacechem import laws
+
+        return laws.register
     if name in __all__:
         from surfacechem.runs import simulation
 

@@ -240,12 +240,30 @@ def equations(
     typer.echo(getattr(printing, form)(read.system(), title), nl=False)
 
 
-@app.command()
-def laws(name: Annotated[str | None, Argument(help="Show all about this law.")] = None) -> None:
-    """List the laws, or show one."""
-    from surfacechem.runs.listing import law_page, law_table
+@app.command(epilog=EXIT_CODES)
+def laws(
+    name: Annotated[str | None, Argument(help="Show all about this law, or about those of this contract.")] = None,
+    file: Annotated[
+        Path | None, Option("--from", metavar="FILE.py", help="A file with laws of your own, whose code is run.")
+    ] = None,
+    check: Annotated[bool, Option("--check", help="Try what every law has to keep on those of the file.")] = False,
+) -> None:
+    """List the laws by contract, show one, or check laws of your own."""
+    from surfacechem import laws as every
+    from surfacechem.documents import document
+    from surfacechem.format.own_laws import read
+    from surfacechem.runs.lawcheck import report
+    from surfacechem.runs.listing import law_list, law_page
 
-    typer.echo(law_page(name) if name else law_table())
+    own = [*read(document.read(file), str(file))] if file else []
+    if check and not own:
+        raise InputError("gives no file to check: add `--from my_laws.py`.", Place(path="--check"))
+    if check:
+        text, well = report(own)
+        typer.echo(text)
+        raise typer.Exit(0 if well else DIFFERENT)
+    with every.known(own):
+        typer.echo(law_page(name) if name else law_list())
 
 
 @app.command()
@@ -323,6 +341,10 @@ def plot(
 def rerun(
     file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
     output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,
+    allow_code: Annotated[
+        bool,
+        Option("--allow-code", help="Run the laws of its own whose source the dataset keeps: code, so read it before."),
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a dataset from itself and compare bit for bit."""
@@ -332,7 +354,7 @@ def rerun(
     record = again.read(file)
     if output:
         refuse_unwritable(dataset_path(output))
-    solution = solved(lambda: again.run_again(record), quiet, brief=True)
+    solution = solved(lambda: again.run_again(record, allow_code), quiet, brief=True)
     if output:
         solution.write(output)
     different = again.differences(record, solution)

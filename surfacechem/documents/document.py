@@ -8,6 +8,7 @@ nothing is evaluated. In a list of laws an item's path is its name, ``interface.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from io import StringIO
@@ -185,10 +186,12 @@ def dump(tree: Tree) -> str:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.allow_unicode = True
-    yaml.width = 120
+    plain = tree.plain()
+    # ruamel breaks long texts of several lines, of source code for instance, so that some come back with a space more.
+    yaml.width = sys.maxsize if "\\n" in repr(plain) else 120
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     stream = StringIO()
-    yaml.dump(tree.plain(), stream)
+    yaml.dump(plain, stream)
     return stream.getvalue()
 
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from io import TextIOBase
 from pathlib import Path
 
+from surfacechem import laws
 from surfacechem.documents import document, shipped
 from surfacechem.documents import overrides as changes
 from surfacechem.documents.document import Tree
 from surfacechem.errors import InputError, Place, nearest
-from surfacechem.format import csvtable
+from surfacechem.format import csvtable, own_laws
 from surfacechem.format.reader import ExactSolution, exact_solution_of, read_document, run_of, scene_of
 from surfacechem.format.sections import NOTHING_SWEPT, SweepSection
 from surfacechem.model.assemble import assemble
@@ -103,8 +104,12 @@ def load_text(
     mechanism_text: str | None = None,
     overrides: Overrides = (),
     file: str = "",
+    allow_code: bool = False,
 ) -> Case:
-    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given."""
+    """Read a case from its text; mechanisms are looked for in ``base`` unless their text is given.
+
+    With ``allow_code`` laws whose source stands in the text, as in that of a dataset, are run.
+    """
     tree = document.parse(text, file or f"{name}.yaml")
     unused = ""
     if overrides:
@@ -112,10 +117,11 @@ def load_text(
         tree, unused = _without_stale_reference(before, tree)
         text = document.dump(tree)
     # With the text of its tables a case can be read again without their files.
-    whole = csvtable.embedded(tree, str(base))
+    whole, own = own_laws.embedded(csvtable.embedded(tree, str(base)), Path(base), allow_code)
     if whole != tree:
         tree, text = whole, document.dump(whole)
-    case, mechanism = read_document(tree, str(base), mechanism_text)
+    with laws.known(own):
+        case, mechanism = read_document(tree, str(base), mechanism_text)
     if case.sweep and not (case.sweep.over or case.sweep.sample):
         raise case.sweep.error(NOTHING_SWEPT)
     return Case(

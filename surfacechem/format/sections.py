@@ -541,6 +541,16 @@ class SweepSection(Section):
     )
 
 
+class LawsSection(Section):
+    """a Python file with laws of one's own"""
+
+    called = "a file of laws"
+
+    file: str = key(Text(), "its name, beside the case", REQUIRED)
+    sha256: str = key(Text(), "checksum of the file, without which any file of that name is meant", "")
+    python: str = key(Text(), "the source itself, as a dataset keeps it", "")
+
+
 class Document(Section):
     """a case"""
 
@@ -550,6 +560,11 @@ class Document(Section):
     source: str = key(Text(), "where the case comes from", "")
     description: str = key(Text(), "what the case shows", "")
     T_0: float | None = quantity("K", "reference temperature of energies and factors", above=0)
+    laws: Sequence[Any] = key(
+        ListOf(Shapes(Text(), mapping=Nested(LawsSection)), "- my_laws.py"),
+        "Python files with laws of one's own: names, or `{file, sha256}`",
+        (),
+    )
     bodies: Mapping[str, BodySection] = key(
         Entries(others=Nested(BodySection), pattern=BODY_NAME, words="two bodies by name"),
         "the two bodies, of which the first is body 1, for example `bodies: {lower: {...}, upper: {...}}`",

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
 from types import ModuleType
+from typing import TypeVar
 
 from surfacechem.contracts.terms import (
     BodyEnergy,
@@ -21,6 +25,8 @@ from surfacechem.contracts.terms import (
     Shape,
 )
 from surfacechem.errors import InputError, suggestion
+
+L = TypeVar("L", bound=type[Law])
 
 FAMILIES: dict[type[Law], tuple[str, ...]] = {
     BodyEnergy: ("bulk",),
@@ -47,7 +53,10 @@ def module(family: str) -> ModuleType:
 
 
 def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
-    found = module(family)
+    return _stated_in(module(family), contract)
+
+
+def _stated_in(found: ModuleType, contract: type[Law]) -> Iterator[type[Law]]:
     for value in vars(found).values():
         own = inspect.isclass(value) and value.__module__ == found.__name__
         if own and issubclass(value, contract) and not inspect.isabstract(value):
@@ -56,6 +65,11 @@ def _in_module(contract: type[Law], family: str) -> Iterator[type[Law]]:
 
 def laws(contract: type[Law]) -> dict[str, type[Law]]:
     """All laws that fulfil a contract, by name."""
+    own = [*_of_packages(), *_registered.values(), *_of_the_case.get()]
+    return _shipped(contract) | {law.name(): law for law in own if issubclass(law, contract)}
+
+
+def _shipped(contract: type[Law]) -> dict[str, type[Law]]:
     return {law.name(): law for family in FAMILIES[contract] for law in _in_module(contract, family)}
 
 
@@ -66,4 +80,70 @@ def find(contract: type[Law], name: str) -> type[Law]:
         for law in _in_module(contract, family):
             if law.name() == name:
                 return law
-    raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, laws(contract))}")
+    every = laws(contract)
+    if name in every:
+        return every[name]
+    raise InputError(f"no {contract.contract} law '{name}'.{suggestion(name, every)}")
+
+
+# -- laws of one's own ------------------------------------------------------------------------------------------------
+
+GROUP = "surfacechem.laws"
+"""Entry points by which packages give their laws: classes, or modules of them."""
+
+_registered: dict[str, type[Law]] = {}
+_of_the_case: ContextVar[tuple[type[Law], ...]] = ContextVar("laws of the case that is read", default=())
+
+
+def register(law: L) -> L:
+    """Make a law known by its name to all cases that are read from now on; a decorator, too.
+
+    Registered again, as a notebook does when a cell is run again, it takes the place of the one before. InputError
+    where the class is no law, or has the name of one of the package.
+    """
+    check_own(law)
+    _registered[law.name()] = law
+    return law
+
+
+def check_own(law: type[Law]) -> None:
+    """InputError unless a class is a law of some contract, with a name that no law of the package has."""
+    contracts = [contract for contract in FAMILIES if contract in getattr(law, "__mro__", ())]
+    if not contracts or inspect.isabstract(law):
+        known = ", ".join(contract.__name__ for contract in FAMILIES)
+        raise InputError(f"{getattr(law, '__name__', law)} is no law: a law is a subclass of one of {known}.")
+    for contract in contracts:
+        if law.name() in _shipped(contract):
+            raise InputError(
+                f"{law.__name__} has the name of the {contract.contract} law '{law.name()}' of the package."
+            )
+
+
+def in_module(found: ModuleType) -> list[type[Law]]:
+    """The laws that a module defines."""
+    own = (value for contract in FAMILIES for value in _stated_in(found, contract))
+    return list(dict.fromkeys(own))
+
+
+@contextmanager
+def known(own: Sequence[type[Law]]) -> Iterator[None]:
+    """Laws that count while a case is read, and in no other case."""
+    token = _of_the_case.set(tuple(own))
+    try:
+        yield
+    finally:
+        _of_the_case.reset(token)
+
+
+@cache
+def _of_packages() -> tuple[type[Law], ...]:
+    """Laws of installed packages, which are imported when a name is none of the package's own, or all are listed."""
+    from importlib.metadata import entry_points  # a case that names no such law need not wait for it
+
+    found: list[type[Law]] = []
+    for point in entry_points(group=GROUP):
+        given = point.load()
+        found += in_module(given) if isinstance(given, ModuleType) else [given]
+    for law in found:
+        check_own(law)
+    return tuple(found)

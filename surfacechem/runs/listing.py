@@ -70,14 +70,24 @@ def _atom(text: str) -> str:
     return text.strip() if re.fullmatch(r"\s*-?[\w.^]+\s*", text) else f"({text.strip()})"
 
 
-def law_table() -> str:
-    """Every law by contract: what it states, its formula, parameters and source."""
+def law_list() -> str:
+    """The laws by contract, one a line."""
     parts: list[str] = []
     for contract in FAMILIES:
-        parts.append(f"{contract.contract.upper()}: {_first_line(contract)}")
-        for law in laws(contract).values():
-            texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
-            parts.append("\n".join([f"  {law.name()}", *map(_filled, texts)]))
+        lines = [f"{contract.contract.upper()}: {_first_line(contract)}"]
+        own = laws(contract)
+        width = max(map(len, own), default=0)
+        lines += [f"  {name:{width}}  {textwrap.shorten(_first_line(law), WIDTH - width)}" for name, law in own.items()]
+        parts.append("\n".join(lines))
+    return "\n\n".join([*parts, "`surfacechem laws NAME` shows all about a law, or about those of a contract."])
+
+
+def law_table(contract: type[Law]) -> str:
+    """The laws of a contract: what each states, its formula, parameters and source."""
+    parts = [f"{contract.contract.upper()}: {_first_line(contract)}"]
+    for law in laws(contract).values():
+        texts = [_first_line(law), *formulas(law), *parameters(law), f"Source: {source(law)}"]
+        parts.append("\n".join([f"  {law.name()}", *map(_filled, texts)]))
     return "\n\n".join(parts)
 
 
@@ -113,7 +123,9 @@ def source(law: type[Law]) -> str:
 
 
 def law_page(name: str) -> str:
-    """Everything about the laws of that name: the docstring, the parameters and their ranges."""
+    """Everything about the laws of that name, or of that contract: docstring, parameters and their ranges."""
+    if asked := [contract for contract in FAMILIES if contract.contract == name]:
+        return law_table(asked[0])
     every = [(contract, law) for contract in FAMILIES for law in laws(contract).values()]
     found = [(contract, law) for contract, law in every if law.name() == name]
     if not found:

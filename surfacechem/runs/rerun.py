@@ -84,11 +84,12 @@ def read(path: str | Path) -> Record:
     return reading(Path(path), record)
 
 
-def run_again(record: Record) -> Solution | SweepSolution:
-    """The case of a record, run or swept as it was."""
+def run_again(record: Record, allow_code: bool = False) -> Solution | SweepSolution:
+    """The case of a record, run or swept as it was; with ``allow_code`` by laws whose source the record keeps."""
     mechanism = record.attribute("mechanism", str) if "mechanism" in record.attributes else None
     text = record.attribute("case", str)
-    case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=f"case in {record.path}")
+    where = f"case in {record.path}"
+    case = cases.load_text(text, record.path.stem, record.path.parent, mechanism, file=where, allow_code=allow_code)
     departures = _departures(record)
     solver, rtol = record.attribute("solver", str), record.attribute("rtol", float)
     if solver not in solvers.names:

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from test_laws import example
 from thermodynamics import number
 
-from surfacechem.contracts.terms import Potential, reads
+from surfacechem.contracts.terms import Friction, Potential, reads
 from surfacechem.expressions import EXPONENT_CAP, derivative
 from surfacechem.format.schema import schema
 from surfacechem.laws import laws
@@ -263,7 +263,7 @@ def test_a_coefficient_may_be_left_out_of_a_scene():
         scene = Scene(pair, Interface("T", (), [law]), (), loading, None, 300.0, {"T": 300.0})
         names = [str(parameter.symbol) for parameter in assemble(scene).parameters]
         assert [name for name in names if name.startswith("mu")] == found
-    assert "mu_s [1]: static friction coefficient; mu if not given, >= 0\n" in law_table()
+    assert "mu_s [1]: static friction coefficient; mu if not given, >= 0\n" in law_table(Friction)
     definition = schema()["$defs"]["friction.coulomb"]
     assert definition["required"] == ["mu"]
     assert "default" not in definition["properties"]["mu_s"]

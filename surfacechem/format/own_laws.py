@@ -1,0 +1,95 @@
+"""Laws of a case's own: Python files that it names, with their checksums; a dataset keeps their source.
+
+Code runs only where a line of a case names its file, or where one says so: never because a dataset is opened.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+from surfacechem import laws
+from surfacechem.contracts.terms import Law
+from surfacechem.documents import document
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place
+
+KEYS = ("file", "sha256", "python")
+
+_run: dict[str, ModuleType] = {}
+"""Modules whose code this process has run, by checksum: it may be asked for again."""
+
+
+def embedded(tree: Tree, base: Path, allow_code: bool = False) -> tuple[Tree, list[type[Law]]]:
+    """The tree with the source and the checksum of every file that it names, and the laws in them.
+
+    Source that stands in the tree itself, as in the case of a dataset, is run where ``allow_code`` says so, or where
+    this process has run it before.
+    """
+    given = tree.value.get("laws") if isinstance(tree.value, dict) else None
+    if given is None:
+        return tree, []
+    entries: list[Tree] = []
+    found: list[type[Law]] = []
+    for entry in given.items("laws: [my_laws.py]"):
+        fields = {"file": entry} if isinstance(entry.value, str) else entry.mapping(KEYS)
+        if "file" not in fields:
+            raise entry.error("a file of laws needs its name, `file: my_laws.py`.")
+        name = fields["file"].text("a file of laws")
+        source = _source(fields, name, base, allow_code)
+        checksum = hashlib.sha256(source.encode()).hexdigest()
+        wanted = fields["sha256"].text("sha256") if "sha256" in fields else checksum
+        if wanted != checksum:
+            raise fields["sha256"].error(f"{name} is another file than the one meant: its checksum is {checksum}.")
+        found += read(source, name, entry.place)
+        texts = {"file": name, "sha256": checksum, "python": source}
+        entries.append(Tree({key: Tree(text, entry.place) for key, text in texts.items()}, entry.place))
+    return replace(tree, value={**tree.value, "laws": replace(given, value=entries)}), found
+
+
+def _source(fields: dict[str, Tree], name: str, base: Path, allow_code: bool) -> str:
+    """The source of an entry: in the entry itself, or in the file that it names."""
+    if "python" not in fields:
+        path = document.beside(base, name, fields["file"].place)
+        if path is None:
+            raise fields["file"].error(f"there is no file {name} beside the case.")
+        return document.read(path)
+    source = str(fields["python"].value)
+    if not allow_code and hashlib.sha256(source.encode()).hexdigest() not in _run:
+        raise fields["python"].error(
+            f"the case carries code of its own, {name}, which runs only where you allow it: by `--allow-code`, or "
+            "`allow_code=True` in Python. Read it before."
+        )
+    return source
+
+
+def read(source: str, name: str, place: Place | None = None) -> Sequence[type[Law]]:
+    """The laws that Python source defines; InputError with its line where it fails, or defines none."""
+    checksum = hashlib.sha256(source.encode()).hexdigest()
+    if checksum not in _run:
+        module = ModuleType(f"surfacechem_laws_{checksum[:16]}")
+        module.__file__ = name
+        # Dataclasses look for the module of a class, tracebacks and doctests for its lines.
+        sys.modules[module.__name__] = module
+        linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
+        try:
+            exec(compile(source, name, "exec"), vars(module))
+        except Exception as error:
+            del sys.modules[module.__name__]
+            lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == name]
+            line = error.lineno if isinstance(error, SyntaxError) else (lines or [0])[-1]
+            message = f"{type(error).__name__}: {error.msg if isinstance(error, SyntaxError) else error}"
+            raise InputError(message, Place(name, line or 0)) from error
+        _run[checksum] = module
+    found = laws.in_module(_run[checksum])
+    if not found:
+        raise InputError(f"{name} defines no law: a law is a subclass of Friction or of another contract.", place)
+    for law in found:
+        laws.check_own(law)
+    return found

@@ -1,0 +1,144 @@
+"""What every law has to keep, tried on one of somebody's own: documented, with units, the same for floats and symbols,
+and never against the second law.
+"""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import math
+import random
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import symengine
+
+from surfacechem.contracts.terms import Friction, HeatTransfer, Law, Load, RateLaw, reads
+from surfacechem.contracts.units import needed
+from surfacechem.errors import InputError, suggestion
+from surfacechem.quantities import BOLTZMANN, VARIABLES
+from surfacechem.tolerances import NOTHING, TINY
+
+TRIALS = 20
+"""Draws of parameters and variables; a choice."""
+
+INSIDE, ROOM = (0.1, 0.9), 600.0
+"""Parts of a range that are drawn from, and twice the temperature [K] of a room."""
+
+READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
+"""What formulas may read in every scene, beside temperatures and coverages by name."""
+
+GIVEN, VALUES = (0.0, 1.0, 3.0), (1.0, 2.0, 0.5)
+OPTIONS: dict[str, Any] = {
+    "between": ("lower", "upper"),
+    "of": "T_c",
+    **dict.fromkeys(("times", "pressures", "gaps"), GIVEN),
+    **dict.fromkeys(("values", "conductances"), VALUES),
+}
+"""Values of options that have no default."""
+
+DOCUMENTED = {
+    ".. math::": "no formula: write it under `.. math::` in the docstring",
+    "Source:": "no source: write `Source: ...` into the docstring, with the range of validity",
+    ">>> ": "no worked number: write one into the docstring, after `>>>`",
+}
+
+
+def problems(law: type[Law]) -> list[str]:
+    """What a law does not keep, in words; nothing where all is well."""
+    found = [message for mark, message in DOCUMENTED.items() if mark not in (inspect.getdoc(law) or "")]
+    found += [f"{name} has no meaning: say what it is" for name, spec in law.specs() if not spec.text]
+    for name, spec in law.specs():
+        try:
+            needed(spec.unit.replace("[x]", "1"))
+        except InputError as error:
+            found.append(f"{name}: {error.message}")
+    read = reads(getattr(law, law.formula))[1:]
+    unknown = [name for name in read if name not in READABLE and not name.startswith(("T", "theta_"))]
+    found += [f"it reads '{name}', which no scene has.{suggestion(name, READABLE)}" for name in unknown]
+    return found or [*worked_numbers(law), *tried(law)]
+
+
+def worked_numbers(law: type[Law]) -> Iterator[str]:
+    """The worked numbers of the docstring, run with what the module of the law knows."""
+    runner = doctest.DocTestRunner(verbose=False, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    known = vars(sys.modules[law.__module__])
+    for example in doctest.DocTestFinder(recurse=False).find(law, law.__name__, globs=known):
+        said: list[str] = []
+        if runner.run(example, out=said.append).failed:
+            lines = [line.strip() for line in "".join(said).splitlines() if line.strip()]
+            yield f"its worked number is another: {' '.join(lines[-4:])}"
+
+
+def tried(law: type[Law]) -> Iterator[str]:
+    """What is wrong at random parameters and states, told once."""
+    for seed in range(TRIALS):
+        draw = random.Random(seed)
+        try:
+            made = _instance(law, draw)
+            # Temperatures about that of a room, all else about one.
+            names = reads(made.statement)
+            values = {name: draw.uniform(*INSIDE) * (ROOM if name.startswith("T") else 1.0) for name in names}
+            wrong = _differs(made, values) or against(made, values)
+        except (InputError, ArithmeticError, TypeError, ValueError, RuntimeError) as error:
+            wrong = f"its formula fails: {type(error).__name__}: {error}"
+        if wrong:
+            yield wrong
+            return  # the same is as a rule wrong everywhere
+
+
+def _instance(law: type[Law], draw: random.Random) -> Any:
+    """The law with parameters in their ranges."""
+    values = {name: option for name, option in OPTIONS.items() if name in dict(law.options())}
+    for name, spec in law.specs():
+        low = max(spec.above, spec.at_least)
+        start = low if math.isfinite(low) else 0.0
+        values[name] = start + draw.uniform(*INSIDE) * min(1.0, spec.at_most - start)
+    made = law(**values)
+    return made.bind(made.piece(0.5)) if isinstance(made, Load) else made
+
+
+def _differs(law: Law, values: dict[str, float]) -> str:
+    """Where floats and symbols do not agree, or no number comes out."""
+    symbols = {name: symengine.Symbol(name) for name in values}
+    number = law.statement(**values)
+    if isinstance(number, tuple):  # a place in space, which its own tests look at
+        return ""
+    if not isinstance(number, int | float) or not math.isfinite(number):
+        return f"its formula gives {number} at {_shown(values)}"
+    other = float(symengine.sympify(law.statement(**symbols)).subs({symbols[x]: value for x, value in values.items()}))
+    if abs(other - number) > NOTHING * max(abs(number), TINY):
+        return f"floats give {number:.17g}, symbols {other:.17g} at {_shown(values)}: use `surfacechem.expressions`"
+    return ""
+
+
+def against(law: Law, values: dict[str, float]) -> str:
+    """Where a law drives what it has to resist."""
+    if isinstance(law, Friction) and "v" in values:
+        for v in (0.7, -0.7):
+            own = values | {"v": v} | ({"direction": math.copysign(1.0, v)} if "direction" in values else {})
+            if law.statement(**own) * v < 0:
+                return f"it drives sliding at {_shown(own)}: traction * v must not be below zero"
+    if isinstance(law, RateLaw) and "mu" in values:
+        for mu in (BOLTZMANN * ROOM, -BOLTZMANN * ROOM):
+            if -mu * law.statement(**values | {"mu": mu}) < 0:
+                return f"it runs uphill at mu = {mu:g} J: -mu * rate must not be below zero"
+    if isinstance(law, HeatTransfer) and law.statement(**values) < 0:
+        return f"heat flows from cold to hot at {_shown(values)}: a conductance must not be below zero"
+    return ""
+
+
+def _shown(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.3g}" for name, value in values.items())
+
+
+def report(found: list[type[Law]]) -> tuple[str, bool]:
+    """What is wrong with each law, as text, and whether all is well."""
+    lines, well = [], True
+    for law in found:
+        wrong = problems(law)
+        well = well and not wrong
+        lines += [f"{law.name()} ({law.contract}): {'keeps what a law has to keep' if not wrong else ''}".rstrip()]
+        lines += [f"  {text}" for text in wrong]
+    return "\n".join(lines), well
