@@ -68,6 +68,12 @@ def on_files(files: Files, config: Any) -> Files:
     buffer = BytesIO()
     plots.save(stability_study().figure(), buffer, "svg")
     files.append(File.generated(config, "images/stability.svg", content=buffer.getvalue()))
+    for name in ("paper", "published"):
+        for picture in drawn(name):
+            buffer = BytesIO()
+            plots.save(picture.draw(), buffer, "svg")
+            path = f"images/list-{name}-{picture.section.name}.svg"
+            files.append(File.generated(config, path, content=buffer.getvalue()))
     return files
 
 
@@ -388,6 +394,33 @@ def made_regimes() -> str:
     return table(("regime", "what it is", "parameter", "values"), rows)
 
 
+def made_pictures(name: str) -> str:
+    """The figures of a list, each with its caption."""
+    shown = []
+    for picture in drawn(name):
+        number = f"images/list-{name}-{picture.section.name}.svg"
+        shown.append(f"![{picture.section.title}]({number})\n\n*{picture.caption}*")
+    return "\n\n".join(shown)
+
+
+@cache
+def drawn(name: str) -> list[Any]:
+    """The figures of a shipped list, computed once."""
+    from surfacechem.studies.figures import pictures, read_list
+
+    return list(pictures(read_list(name)))
+
+
+def made_list_keys(section: str) -> str:
+    """The keys of a section of a list of figures."""
+    from surfacechem.format import declarations
+    from surfacechem.studies import figures
+
+    keys = declarations.keys(getattr(figures, section))
+    rows = [(f"`{name}`", item.text, *_held(item)) for name, item in keys.items()]
+    return table(("key", "meaning", "holds", "unit", "range", "if not given"), rows)
+
+
 MAKERS: dict[str, Callable[..., str]] = {
     "references": made_references,
     "cases": made_cases,
@@ -400,4 +433,6 @@ MAKERS: dict[str, Callable[..., str]] = {
     "solvers": made_solvers,
     "stability": made_stability,
     "regimes": made_regimes,
+    "pictures": made_pictures,
+    "list_keys": made_list_keys,
 }

@@ -338,6 +338,28 @@ def plot(
 
 
 @app.command(epilog=EXIT_CODES)
+def figures(
+    name: Annotated[str, Argument(metavar="LIST", help="A list of figures, or a shipped one: paper, published.")],
+    output: Annotated[Path, Option("-o", "--output", help="Folder of the figures.")] = Path("figures"),
+    suffix: Annotated[str, Option("--format", help="svg, png or pdf.")] = "svg",
+) -> None:
+    """Draw the figures of a list from runs, each with its exact curve and its distance from that."""
+    from surfacechem import plots
+    from surfacechem.studies.figures import pictures, read_list
+
+    content = read_list(name)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made: {error.strerror}.", Place(path=str(output))) from None
+    check_picture(output / f"figure.{suffix}")
+    for picture in pictures(content):
+        target = output / f"{picture.section.name}.{suffix}"
+        plots.write(picture.draw(), target)
+        typer.echo(f"{target}\n  {picture.caption}")
+
+
+@app.command(epilog=EXIT_CODES)
 def rerun(
     file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
     output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,

@@ -1,0 +1,294 @@
+"""Figures from lists: runs and sweeps of cases with their exact curves and with published data on them.
+
+A list is a YAML file of figures; each has two axes and some curves. What a curve shows is computed when the figure is
+drawn, and its largest distance from the exact curve stands below it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.contracts.units import parse as si
+from surfacechem.documents import document, shipped
+from surfacechem.documents.document import Tree
+from surfacechem.errors import InputError, Place, suggestion
+from surfacechem.format.csvtable import CSVText
+from surfacechem.format.declarations import (
+    REQUIRED,
+    Content,
+    Context,
+    Entries,
+    Later,
+    ListOf,
+    Nested,
+    OneOf,
+    Section,
+    Text,
+    amount,
+    key,
+    read,
+)
+from surfacechem.format.sections import SWEPT
+from surfacechem.runs.simulation import load
+
+if TYPE_CHECKING:
+    import xarray
+
+    from surfacechem.plots.style import Plot
+
+Array = NDArray[np.float64]
+
+SCALES = "linear", "log"
+
+EXACT: Mapping[str, Any] = {"color": "0.8", "linewidth": 4.5, "zorder": 1}
+"""How an exact curve is drawn."""
+
+
+def _anything(content: Content) -> Entries:
+    return Entries(others=Later(content), by_scene=True)
+
+
+# -- what stands in a list --------------------------------------------------------------------------------------------
+
+
+class AxisSection(Section):
+    """an axis of a figure"""
+
+    called = "an axis"
+
+    variable: str = key(Text(), "variable of the dataset, or the name of a swept parameter", REQUIRED)
+    name: str = key(Text(), "what stands at the axis", REQUIRED)
+    per: Tree | None = key(Later(amount("1")), "quantity that counts as one, in the unit of the variable")
+    scale: str = key(OneOf("scale", lambda: SCALES), "of the axis", "linear")
+
+
+class DataSection(Section):
+    """published data of a curve"""
+
+    called = "published data"
+
+    file: str = key(Text(), "CSV file beside the list; its first line names columns and units", REQUIRED)
+    x: str = key(Text(), "column along the axis", REQUIRED)
+    y: str = key(Text(), "column of the values", REQUIRED)
+
+
+class CurveSection(Section):
+    """a curve of a figure"""
+
+    called = "a curve"
+
+    label: str = key(Text(), "its name in the legend", "")
+    case: str = key(Text(), "the case that is run, by the name of a shipped one or the path of its file", REQUIRED)
+    set: Mapping[str, Tree] = key(_anything(amount("[x]")), "other values of the case, by path", {})
+    over: Mapping[str, Tree] = key(_anything(SWEPT), "values of a parameter by path: the curve is what runs end at", {})
+    until: Mapping[str, Tree] = key(_anything(amount("[x]")), "a ramp and the value at which each run ends", {})
+    per: Mapping[str, Tree] = key(
+        Entries({axis: key(Later(amount("1")), name=axis) for axis in "xy"}), "what counts as one for this curve", {}
+    )
+    exact: Sequence[Sequence[float]] = key(
+        ListOf(ListOf(amount("1"), "[0, 1]", count=2), "[[0, 0], [1, 1]]"), "corners of the exact curve", ()
+    )
+    data: DataSection | None = key(Nested(DataSection))
+
+
+class FigureSection(Section):
+    """a figure"""
+
+    called = "a figure"
+
+    name: str = key(Text(), "name of its file", REQUIRED)
+    title: str = key(Text(), "what it shows", REQUIRED)
+    source: str = key(Text(), "where it is published, and for data their licence", "")
+    x: AxisSection = key(Nested(AxisSection), default=REQUIRED)
+    y: AxisSection = key(Nested(AxisSection), default=REQUIRED)
+    curves: Sequence[CurveSection] = key(ListOf(Nested(CurveSection), "- {case: exothermic}"), "its curves", REQUIRED)
+
+
+class ListSection(Section):
+    """a list of figures"""
+
+    called = "a list of figures"
+
+    title: str = key(Text(), "what they have in common", REQUIRED)
+    source: str = key(Text(), "where they are published", "")
+    figures: Sequence[FigureSection] = key(ListOf(Nested(FigureSection)), "the figures", REQUIRED)
+
+
+# -- what is drawn of it ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve as computed, in the units of its axes, shape (n,), with the exact one where that is known, and data."""
+
+    label: str
+    x: Array
+    y: Array
+    refused: NDArray[np.bool_]
+    """Where the second law is broken, though energy is conserved."""
+    exact: tuple[Array, Array] | None
+    data: tuple[Array, Array] | None
+
+    @property
+    def distance(self) -> float:
+        """The largest distance from the exact curve, as a part of the ranges that this spans; NaN without one."""
+        if self.exact is None:
+            return np.nan
+        spans = [float(np.nanmax(part) - np.nanmin(part)) or 1.0 for part in self.exact]
+        line, points = (np.column_stack([x / spans[0], y / spans[1]]) for x, y in (self.exact, (self.x, self.y)))
+        own = points[np.isfinite(points).all(axis=1)]
+        return float(max(_distance(point, line[np.isfinite(line).all(axis=1)]) for point in own))
+
+
+def _distance(point: Array, line: Array) -> float:
+    """Distance of a point from a polyline of shape (n, 2)."""
+    # Where the curve jumps, its two sides belong to one place: hence from the line between them, not along y.
+    start, step = line[:-1], np.diff(line, axis=0)
+    length = np.maximum(np.sum(step**2, axis=1), np.finfo(float).tiny)
+    along = np.clip(np.sum((point - start) * step, axis=1) / length, 0, 1)
+    return float(np.min(np.hypot(*(point - start - along[:, None] * step).T)))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a list with its curves."""
+
+    section: FigureSection
+    curves: Sequence[Line]
+
+    @property
+    def caption(self) -> str:
+        """What it shows, its source, and how far it is from the exact curves."""
+        known = [curve.distance for curve in self.curves if curve.exact is not None]
+        far = [f"Largest distance from the exact curve: {max(known):.0e} of its range."] if known else []
+        return " ".join([f"{self.section.title}.", *([f"{self.section.source}."] if self.section.source else []), *far])
+
+    def draw(self) -> Plot:
+        """The figure."""
+        from surfacechem.plots.style import COLOURS, panels
+
+        with panels(5.4, 3.6) as (plot, ((ax,),)):
+            for curve in self.curves:
+                if curve.exact is not None:
+                    ax.plot(*curve.exact, **EXACT)  # wide, so that it is seen below what lies on it
+            for i, curve in enumerate(self.curves):
+                colour = COLOURS[i % len(COLOURS)]
+                shown = np.where(curve.refused, np.nan, curve.y)
+                ax.plot(curve.x, shown, color=colour, label=curve.label or None)
+                if curve.refused.any():
+                    ax.plot(curve.x, np.where(curve.refused, curve.y, np.nan), ":", color=colour)
+                if curve.data is not None:
+                    ax.plot(*curve.data, "o", color=colour, markersize=4)
+            self._label(ax)
+        return plot
+
+    def _label(self, ax: Any) -> None:
+        x, y = self.section.x, self.section.y
+        ax.set(xlabel=x.name, ylabel=y.name, xscale=x.scale, yscale=y.scale)
+        beside = [ax.plot([], [], label="exact", **EXACT)] if self._any("exact") else []
+        beside += [ax.plot([], [], ":", color="0.4", label="breaks the second law")] if self._any("refused") else []
+        if beside or any(curve.label for curve in self.curves):
+            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+    def _any(self, what: str) -> bool:
+        return any(np.any(getattr(curve, what)) for curve in self.curves if getattr(curve, what) is not None)
+
+
+def lists() -> Path:
+    """The folder of the lists that come with surfacechem."""
+    return shipped.cases() / "figures"
+
+
+def read_list(name: str) -> ListSection:
+    """A list of figures by the name of a shipped one or by its path."""
+    path = Path(name) if Path(name).suffix else lists() / f"{name}.yaml"
+    if not document.is_file(path):
+        known = [path.stem for path in lists().glob("*.yaml")]
+        raise InputError(f"no list of figures '{name}'.{suggestion(name, known)}", Place(path="LIST"))
+    return read(ListSection, document.parse(document.read(path), str(path)), Context())
+
+
+def pictures(content: ListSection) -> Iterator[Picture]:
+    """The figures of a list, one after another, each when its runs are done."""
+    for section in content.figures:
+        yield Picture(section, [_curve(section, curve) for curve in section.curves])
+
+
+def _curve(figure: FigureSection, section: CurveSection) -> Line:
+    """What a case gives along the axes."""
+    folder = Path(section.tree.place.file).parent
+    dataset, exact_ends = _computed(section, folder, f"{figure.y.variable}_exact")
+    axes = {"x": figure.x, "y": figure.y}
+    per = {name: _unit(dataset, axis, section.per.get(name, axis.per)) for name, axis in axes.items()}
+    x, y = (_values(dataset, axis, axis.variable) / per[name] for name, axis in axes.items())
+    exact = tuple(np.array(section.exact, dtype=float).T) if section.exact else None
+    if exact_ends is not None:
+        exact = x, exact_ends / per["y"]
+    # Energy is conserved there, so that only the verdict on the jump tells.
+    refused = np.zeros(x.shape, dtype=bool)
+    if section.over and "event_verdict" in dataset:
+        refused = np.any(dataset["event_verdict"].values == "destroys entropy", axis=-1)
+    return Line(section.label, x, y, refused, exact, _data(dataset, figure, section, folder, per))
+
+
+def _computed(section: CurveSection, folder: Path, exact: str) -> tuple[xarray.Dataset, Array | None]:
+    """The run or the sweep of a curve, and the exact values of its variable along it; None where none are known."""
+    case = str(folder / section.case) if Path(section.case).suffix else section.case
+    over, until = ({path: tree.plain() for path, tree in of.items()} for of in (section.over, section.until))
+    try:
+        simulation = load(case, {path: tree.plain() for path, tree in section.set.items()})
+        dataset = simulation.sweep(over, until or None).dataset if over else simulation.run().dataset
+        if exact in dataset:
+            return dataset, np.asarray(dataset[exact].values, dtype=float)
+        if not over or simulation.case.reference is None:
+            return dataset, None
+        # A sweep over several times keeps no exact curves: each of its runs is made by itself.
+        ends = [simulation.run(point).dataset for point in simulation.plan(over).points]
+    except InputError as error:
+        raise error.at(section.tree.place) from None
+    return dataset, np.array([end[exact].values[-1] if exact in end else np.nan for end in ends])
+
+
+def _values(dataset: xarray.Dataset, axis: AxisSection, name: str) -> Array:
+    """A variable of a run over time, or of a sweep what its runs end at."""
+    if name not in dataset.variables:
+        raise axis.error(f"no variable '{name}'.{suggestion(name, list(map(str, dataset.variables)))}", "variable")
+    values = dataset[name]
+    return np.asarray(values.values if values.ndim == 1 else values.isel(time=-1).values, dtype=float)
+
+
+def _unit(dataset: xarray.Dataset, axis: AxisSection, per: Tree | None) -> float:
+    """What counts as one along an axis [SI]."""
+    if per is None or axis.variable not in dataset.variables:
+        return 1.0
+    return si(per.plain(), _own_unit(dataset[axis.variable]), per.place, "per")
+
+
+def _own_unit(values: xarray.DataArray) -> str:
+    """The unit of a variable as a case writes it."""
+    return re.sub(r"([A-Za-z])(-?\d+)", r"\1^\2", str(values.attrs.get("units", "1")))
+
+
+def _data(
+    dataset: xarray.Dataset, figure: FigureSection, section: CurveSection, folder: Path, per: Mapping[str, float]
+) -> tuple[Array, Array] | None:
+    """The published data of a curve along the same axes."""
+    if (given := section.data) is None:
+        return None
+    path = document.beside(folder, given.file, given.tree.place)
+    if path is None:
+        raise given.error(f"no file {given.file} beside the list.", "file")
+    table = CSVText(Tree(document.read(path), Place(str(path))))
+    names = {"x": (figure.x, given.x), "y": (figure.y, given.y)}
+    x, y = (
+        np.array(table.column(column, _own_unit(dataset[axis.variable]), column)) / per[name]
+        for name, (axis, column) in names.items()
+    )
+    return x, y
