@@ -34,6 +34,7 @@ PLACES = {
     "property": "interface.medium, under the name of the property",
     "loading": "loading.NAME",
     "shape": "surface, under the name of a body",
+    "pair": "surface.pair",
     "factor": "the list `times` of a parameter that varies",
 }
 """Where the laws of a contract stand in a case file."""

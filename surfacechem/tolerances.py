@@ -134,6 +134,9 @@ below what any rounding or tolerance leaves of it.
 TIGHTEST = 1e-13
 """Tightest relative tolerance that is chosen for a run: below some 450 EPS errors of steps are their rounding."""
 
+PRECISE = 1e-10
+"""Accuracy of integrals over surfaces, relative: one digit more than runs are usually held to."""
+
 LAST = 3e-14
 """Tolerance of the run that is held against one at TIGHTEST, near enough to it to have the same digits."""
 

@@ -28,17 +28,25 @@ USUAL = {
     "1/K": 1e-3, "Pa s": 0.1, "W/(m K)": 0.1, "J/(mol K)": 8.0, "J/m^2": 0.1, "m^2": 1e-12, "Pa/m": 1e14,
 }  # fmt: skip
 """Size of the numbers that are drawn, by unit; others are about one."""
-MORE_UNITS = dict.fromkeys(("T_0", "T", "T_from", "T_to", "T_1", "T_2", "x"), "K") | {"mu": "J", "N_c": "1/m^2"}
+MORE_UNITS = (
+    {"r": "m"}
+    | dict.fromkeys(("T_0", "T", "T_from", "T_to", "T_1", "T_2", "x"), "K")
+    | {
+        "mu": "J",
+        "N_c": "1/m^2",
+        "r": "m",
+    }
+)
 SIGNED = {"v", "v_2", "v_n", "v_t", "g_n", "g_t", "u_t", "f", "mu", "t_n", "dmu_dphi", "direction", "direction_2"}
 AT = {"times": 1.0, "pressures": 1e5, "gaps": 1e-9}
 LISTS = {name: (0.0, 0.8 * size, 1.6 * size) for name, size in AT.items()}
 LISTS |= dict.fromkeys(("values", "conductances"), (1.0, 2.5, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
 OPTIONS = LISTS | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
-OPTIONS |= {"shear": "parallel", "pressure": "net"}
+OPTIONS |= {"shear": "parallel", "pressure": "net", "distances": (1e-10, 3e-10, 1e-9), "energies": (4e-21, 1e-21, 0.0)}
 GRID = {"x": range(6), "y": range(6), "z": [0.0] * 36}
-NUMERIC = ("foot", "starts", "derivatives")
-"""Methods of shapes that take arrays of points."""
+NUMERIC = ("foot", "starts", "derivatives", "parts")
+"""Methods that take arrays of points, or give laws."""
 
 
 def every() -> dict[str, type[Law]]:

@@ -567,6 +567,9 @@ class Shape(Law):
     closed: ClassVar[tuple[bool, bool]] = (False, False)
     """Whether u and v come round to where they started."""
 
+    radii: ClassVar[Sequence[str]] = ("R",)
+    """Parameters that are lengths of the whole shape."""
+
     turn: float = parameter("rad", "angle by which it is turned about z", default=0.0, varies=False)
     tilt: float = parameter("rad", "angle by which it is tilted about y", default=0.0, varies=False)
 
@@ -576,6 +579,12 @@ class Shape(Law):
     @abstractmethod
     def span(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Lowest and highest value of u and of v."""
+
+    @property
+    def lengths(self) -> list[float]:
+        """Radii, wavelengths or tubes [m]."""
+        given = [getattr(self, name) for name in self.radii]
+        return [value for value in given if value is not None]
 
     foot: ClassVar[Callable[..., Any] | None] = None
     """Parameters (..., 2) of the nearest point of each of the points (..., 3), where there is a closed form."""
@@ -590,8 +599,13 @@ class PairEnergy(Law):
 
     contract = "pair"
     formula = "energy"
-    core: ClassVar[bool] = True
-    """Whether it keeps surfaces apart, so that their energy has a lower bound."""
+    cutoff: ClassVar[float] = math.inf
+    """Distance beyond which there is no energy [m]."""
+    decay: ClassVar[float] = 4.0
+    """Power with which the energy falls at large distances, at least."""
+    parts: ClassVar[Callable[..., Sequence[tuple[Expression, Any]]] | None] = None
+    """Laws without parameters, for a unit of length [m], of which the energy is a sum, each times what its own
+    parameters make of it; where there are none, nothing but the densities may change without a new integration."""
 
     n_1: float = parameter("1/m^2", "density of interacting points on body 1", above=0, stretch=-1)
     n_2: float = parameter("1/m^2", "density of interacting points on body 2", above=0, stretch=-1)

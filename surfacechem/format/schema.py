@@ -12,6 +12,7 @@ from surfacechem.contracts.terms import (
     Law,
     Limit,
     Load,
+    PairEnergy,
     Potential,
     Property,
     RateLaw,
@@ -21,7 +22,18 @@ from surfacechem.format.csvtable import TEXTS
 from surfacechem.format.declarations import NODE, QUANTITY, Schema, closed, law_keys, reference, schema_of
 from surfacechem.format.sections import Document
 
-CONTRACTS: tuple[type[Law], ...] = (Potential, RateLaw, Friction, HeatTransfer, Limit, Property, Load, Factor, Shape)
+CONTRACTS: tuple[type[Law], ...] = (
+    Potential,
+    RateLaw,
+    Friction,
+    HeatTransfer,
+    Limit,
+    Property,
+    Load,
+    Factor,
+    Shape,
+    PairEnergy,
+)
 
 
 def schema() -> Schema:

@@ -19,6 +19,7 @@ from surfacechem.contracts.terms import (
     Law,
     Limit,
     Load,
+    PairEnergy,
     Potential,
     Property,
     RateLaw,
@@ -39,11 +40,12 @@ FAMILIES: dict[type[Law], tuple[str, ...]] = {
     Load: ("loading",),
     Factor: ("factors",),
     Shape: ("shapes",),
+    PairEnergy: ("pair_laws",),
 }
 """The modules in which the laws of a contract stand."""
 
 
-ELSEWHERE = {"shapes": "surfacechem.surfaces.shapes"}
+ELSEWHERE = {name: f"surfacechem.surfaces.{name}" for name in ("shapes", "pair_laws")}
 """Modules of other rooms."""
 
 

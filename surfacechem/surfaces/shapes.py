@@ -42,6 +42,8 @@ class Plane(Shape):
     (1.0, 2.0, 0.0)
     """
 
+    radii = ()
+
     length: float | None = parameter("m", "extent along x", default=None, above=0, varies=False)
     width: float | None = parameter("m", "extent along y", default=None, above=0, varies=False)
 
@@ -68,7 +70,7 @@ class Sphere(Shape):
     Source: elementary. u is the angle from the highest point.
 
     >>> Sphere(R=2.0).point(0.0, 1.0)
-    (0.0, 0.0, 0.0)
+    (0.0, 0.0, -0.0)
     """
 
     about_axis = True
@@ -80,7 +82,7 @@ class Sphere(Shape):
 
     def point(self, u: Expression, v: Expression) -> Point:
         """Point at the angles u from the axis and v about it."""
-        return self.R * sin(u) * cos(v), self.R * sin(u) * sin(v), self.bulge * self.R * (cos(u) - 1)
+        return self.R * sin(u) * cos(v), self.R * sin(u) * sin(v), -2 * self.bulge * self.R * sin(u / 2) ** 2
 
     @property
     def span(self) -> Span:
@@ -140,7 +142,7 @@ class Cylinder(Shape):
     Source: elementary. Without a length it has no end; its end faces are not part of the surface.
 
     >>> Cylinder(R=2.0).point(1.0, 0.0)
-    (1.0, 0.0, 0.0)
+    (1.0, 0.0, -0.0)
     """
 
     closed = (False, True)
@@ -150,7 +152,7 @@ class Cylinder(Shape):
 
     def point(self, u: Expression, v: Expression) -> Point:
         """Point at the length u and the angle v from the highest line."""
-        return u, self.R * sin(v), self.R * (cos(v) - 1)
+        return u, self.R * sin(v), -2 * self.R * sin(v / 2) ** 2
 
     @property
     def span(self) -> Span:
@@ -214,6 +216,8 @@ class Cone(Turned):
     -0.510683842
     """
 
+    radii = ("radius",)
+
     slope: float = parameter("rad", "angle between its side and the plane", above=0, at_most=STEEPEST, varies=False)
 
     def point(self, u: Expression, v: Expression) -> Point:
@@ -229,11 +233,13 @@ class Torus(Shape):
     Source: elementary. Its hole is open, so that it does not meet itself. Its highest points are a circle of radius R.
 
     >>> Torus(hole=1.0, r=1.0).point(0.0, 0.0)
-    (2.0, 0.0, 0.0)
+    (2.0, 0.0, -0.0)
     """
 
     about_axis = True
     closed = (True, True)
+
+    radii = ("hole", "r")
 
     hole: float = parameter("m", "radius of its hole, R_0", above=0, varies=False)
     r: float = parameter("m", "radius of its tube", above=0, varies=False)
@@ -241,7 +247,7 @@ class Torus(Shape):
     def point(self, u: Expression, v: Expression) -> Point:
         """Point at the angle u about the middle of the tube and v about the axis."""
         out = self.hole + self.r * (1 + sin(u))
-        return out * cos(v), out * sin(v), self.r * (cos(u) - 1)
+        return out * cos(v), out * sin(v), -2 * self.r * sin(u / 2) ** 2
 
     @property
     def span(self) -> Span:
@@ -266,6 +272,7 @@ class Wavy(Plane):
     -2e-09
     """
 
+    radii = ("wavelength",)  # type: ignore[assignment]
     foot = None  # type: ignore[assignment]
 
     amplitude: float = parameter("m", "amplitude", above=0, varies=False)
@@ -295,6 +302,8 @@ class Heights(Shape):
     >>> Heights(x=range(6), y=range(6), z=[0.0] * 36).span
     ((0.0, 5.0), (0.0, 5.0))
     """
+
+    radii = ()
 
     x: Sequence[float] = option("places along x, increasing [m]")
     y: Sequence[float] = option("places along y, increasing [m]")

@@ -23,7 +23,11 @@ POINTS = dict.fromkeys(("times", "pressures", "gaps"), (0.0, 1.0, 3.0))
 VALUES = dict.fromkeys(("values", "conductances"), (1.0, 2.0, 0.5))
 NAMES = {"between": ("lower", "upper"), "closure": "direct", "of": "T_c", "extrapolation": "hold"}
 OPTIONS = POINTS | VALUES | NAMES | {"release": "joint", "violation": "warn", "breaks": ""}
-OPTIONS |= {"shear": "parallel", "pressure": "net"} | law_values.GRID
+OPTIONS |= (
+    {"shear": "parallel", "pressure": "net"}
+    | law_values.GRID
+    | {"distances": (1.0, 2.0, 3.0), "energies": (2.0, 1.0, 0.0)}
+)
 READABLE = {*VARIABLES, "x", "T", "N_c", "M", "u", "r"}
 SAMPLES = 20
 APPROVED = json.loads(law_values.TABLE.read_text())
@@ -34,7 +38,7 @@ each_law = pytest.mark.parametrize("law", EVERY, ids=lambda law: f"{law.contract
 def example(law: type[Law], seed: int) -> Law:
     """An instance with random admissible parameters."""
     draw = random.Random(f"{law.name()}{seed}")
-    values = {name: draw.uniform(0.1, 0.9) for name, _ in law.specs()}
+    values = {name: draw.uniform(0.1, 0.9) + max(spec.above, spec.at_least, 0) for name, spec in law.specs()}
     return law(**values, **{name: OPTIONS[name] for name, _ in law.options()})
 
 

@@ -1,0 +1,163 @@
+"""Force of a law of the gap between two curved surfaces: its energy integrated over one of them.
+
+Each point of body 1 counts with the gap to the nearest point of body 2, where the opposite traction acts, so that net
+force and net moment vanish to rounding. For a pairwise law with the energy between flats this is its local
+approximation. Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_sr and e:psi_c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from surfacechem.contracts.terms import HeatTransfer, PairEnergy, Potential, Varying, reads
+from surfacechem.errors import InputError
+from surfacechem.surfaces.nodes import integral, outer_nodes
+from surfacechem.surfaces.pairwise import check_finite, kernel, length
+from surfacechem.surfaces.projection import Array, Surface
+from surfacechem.tolerances import PRECISE, TINY, ULPS
+
+GAP = "g_n"
+
+Density = Callable[[Array], Array]
+"""Energy per area [J/m^2] and traction [Pa], tension positive, (n, 2) for n gaps [m]."""
+
+SAMPLES = 400
+"""Places between which gaps are looked at for where a law bends."""
+
+FAR = 1e6
+"""Extent of an endless surface over the largest length of the two."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Energy [J], forces [N] and moments about the origin [N m] on both bodies, area where they touch or overlap [m^2],
+    heat conductance [W/K], least gap [m], and the error relative to the size of each, of the area aside.
+    """
+
+    energy: float
+    force_1: Array
+    force_2: Array
+    moment_1: Array
+    moment_2: Array
+    area: float
+    conductance: float
+    gap: float
+    error: float
+
+
+def density(law: Potential | HeatTransfer) -> Callable[[Array], Array]:
+    """Value and slope of a law over the gap as machine code; InputError where it reads anything else."""
+    import symengine
+
+    foreign = [name for name in reads(law.statement) if name != GAP]
+    varying = [name for name, _ in law.specs() if isinstance(getattr(law, name), Varying)]
+    if foreign or varying:
+        what = f"reads {foreign[0]}" if foreign else f"has a {varying[0]} that varies"
+        raise InputError(f"{law.name()} {what}; over curved surfaces a law may read the gap g_n alone.", law.place)
+    g = symengine.Symbol(GAP)
+    value = symengine.sympify(law.statement(**({GAP: g} if GAP in reads(law.statement) else {})))
+    # Branches that divide by zero are not taken.
+    compiled = symengine.Lambdify([g], [value, value.diff(g)], backend="llvm")
+    return lambda gaps: np.asarray(compiled(gaps.reshape(-1, 1))).reshape(*gaps.shape, 2)
+
+
+def between_flats(law: PairEnergy) -> Density:
+    """Energy of a pair summed over two flats: the traction is exact, t = -2 pi n_1 n_2 g psi(g).
+
+    The energy is counted from a gap of a thousand times the least of those that are asked for.
+    """
+    psi, amount = kernel(law), 2 * np.pi * law.n_1 * law.n_2
+    x, w = np.polynomial.legendre.leggauss(24)
+    t = (np.arange(8)[:, None] + (x + 1) / 2).ravel()  # r = g exp(t), up to exp(8) g
+
+    def at(gaps: Array) -> Array:
+        r = gaps[..., None] * np.exp(t)
+        whole = np.sum(psi(r)[..., 0] * r**2 * np.tile(w / 2, 8), axis=-1)
+        # What is left of a power of the distance follows from its end.
+        end = r[..., -1:]
+        whole += (psi(end)[..., 0] * end**2)[..., 0] / (law.decay - 2)
+        return np.stack([amount * whole, -amount * gaps * psi(gaps)[..., 0]], axis=-1)
+
+    return at
+
+
+def bends(laws: Iterable[Potential]) -> list[float]:
+    """Gaps at which laws bend or are narrow, and zero."""
+    found = {0.0}
+    for law in laws:
+        for places in (law.kinks.get(GAP, ()), law.peaks.get(GAP, ())):
+            found |= {float(x) for x in (places if isinstance(places, Sequence) else (places,))}
+    return sorted(found)
+
+
+def over_gap(
+    lower: Surface,
+    upper: Surface,
+    laws: Sequence[Density],
+    levels: Sequence[float] = (0.0,),
+    heat: Sequence[Callable[[Array], Array]] = (),
+    rtol: float = PRECISE,
+) -> Contact:
+    """Integral of laws of the gap over body 1; ``levels`` are gaps [m] at which the laws bend.
+
+    InputError where an accuracy is out of reach.
+    """
+    check_finite(lower, upper)
+    size = length(lower, upper)
+    around, gap = outer_nodes(lower, upper, size, size * FAR)
+
+    def integrand(t: Array, order: int) -> Array:
+        x, vectors = around.nodes(t)
+        near = upper.nearest(x)
+        area, count = np.linalg.norm(vectors, axis=-1), np.zeros((*near.gap.shape, 15))
+        for law in laws:
+            psi, traction = np.moveaxis(law(near.gap), -1, 0)
+            pull = -traction[..., None] * near.normal
+            count[..., 0] += psi
+            count[..., 1:4] += pull
+            count[..., 4:7] -= pull
+            count[..., 7:10] += np.cross(x, pull)
+            count[..., 10:13] -= np.cross(near.point, pull)
+        count[..., 13] = near.gap <= 0
+        for path in heat:
+            count[..., 14] += path(near.gap)[..., 0]
+        return np.asarray(np.sum(count * area[..., None], axis=1))
+
+    def sizes(found: Array) -> Array:
+        force, moment = (float(np.linalg.norm(found[k])) for k in (slice(1, 4), slice(7, 10)))
+        force = max(force, TINY)
+        parts = [max(abs(found[0]), force * abs(gap)), *[force] * 6, *[max(moment, force * abs(gap), TINY)] * 6]
+        return np.array([*parts, np.inf, max(abs(found[14]), TINY)])
+
+    pieces = [integral(integrand, box, sizes, rtol) for box in _boxes(around.box, around.nodes, upper, levels)]
+    whole = np.sum([part for part, _ in pieces], axis=0)
+    force_1, force_2, moment_1, moment_2 = np.split(whole[1:13], 4)
+    energy, area, conductance = map(float, whole[[0, 13, 14]])
+    error = max(error for _, error in pieces)
+    return Contact(energy, force_1, force_2, moment_1, moment_2, area, conductance, gap, error)
+
+
+def _boxes(
+    box: tuple[Array, Array], nodes: Callable[[Array], tuple[Array, Array]], upper: Surface, levels: Sequence[float]
+) -> list[tuple[Array, Array]]:
+    """The box of an integral in one direction, cut where the gap passes a level; others as they are."""
+    low, high = box
+    if len(low) != 1:
+        return [box]
+    from scipy.optimize import brentq
+
+    def gap(t: float) -> float:
+        return float(upper.nearest(nodes(np.array([[t]]))[0]).gap.flat[0])
+
+    places = np.linspace(low[0], high[0], SAMPLES)
+    gaps = upper.nearest(nodes(places[:, None])[0]).gap[:, 0]
+    cuts = []
+    for level in levels:
+        for k in np.flatnonzero((gaps[:-1] - level) * (gaps[1:] - level) < 0):
+            ends = float(places[k]), float(places[k + 1])
+            cuts += [float(brentq(lambda t, level=level: gap(t) - level, *ends, xtol=ULPS))]
+    at = np.array([low[0], *sorted(cuts), high[0]])
+    return [(at[k : k + 1], at[k + 1 : k + 2]) for k in range(len(at) - 1)]

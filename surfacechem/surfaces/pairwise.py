@@ -1,0 +1,145 @@
+r"""Force between two surfaces whose points interact in pairs: the double integral of the energy of a pair.
+
+Both tractions come from one potential at the same pairs of points,
+
+.. math:: t_1(x_1) = n_1 n_2 \int_{S_2} \psi'(r) \frac{x_2 - x_1}{r} dA_2,
+
+so that net force and net moment vanish to rounding.
+Source: Sauer, Duong & Mandadapu (2021), eqs. e:bt_lr and e:psi12ex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from surfacechem.contracts.terms import PairEnergy
+from surfacechem.errors import InputError
+from surfacechem.surfaces.nodes import MOST_NODES, inner_nodes, integral, is_round, outer_nodes
+from surfacechem.surfaces.projection import Array, Surface
+from surfacechem.surfaces.shapes import Plane
+from surfacechem.tolerances import PRECISE, TINY
+
+COUNT = 13
+"""Energy, and three components of two forces and two moments."""
+
+
+@dataclass(frozen=True)
+class PairForces:
+    """Energy [J], forces [N] and moments about the origin [N m] on both bodies, and the largest error of any of them
+    relative to its size. With several laws all are arrays over them.
+    """
+
+    energy: Array
+    force_1: Array
+    force_2: Array
+    moment_1: Array
+    moment_2: Array
+    error: float
+    gap: float
+    """Least gap of the surfaces [m]."""
+    pairs: int
+    """Pairs of points that were looked at."""
+
+
+@lru_cache(maxsize=64)
+def kernel(law: PairEnergy) -> Callable[[Array], Array]:
+    """Energy of a pair and its slope as machine code, (n, 2) for n distances."""
+    import symengine
+
+    r = symengine.Symbol("r")
+    psi = symengine.sympify(law.energy(r))
+    compiled: Callable[[Array], Array] = symengine.Lambdify([r], [psi, psi.diff(r)], backend="llvm")
+    return lambda distances: np.asarray(compiled(distances.reshape(-1, 1))).reshape(*distances.shape, 2)
+
+
+def interaction(lower: Surface, upper: Surface, laws: Sequence[PairEnergy], rtol: float = PRECISE) -> PairForces:
+    """The double integrals of some laws over two surfaces; InputError where an accuracy is out of reach.
+
+    Densities count as they are in each law.
+    """
+    check_finite(lower, upper)
+    # The inner surface is the simpler one, if any.
+    swapped = is_round(lower) and (not is_round(upper) or isinstance(lower.shape, Plane))
+    outer, inner = (upper, lower) if swapped else (lower, upper)
+    kernels, pairs = [kernel(law) for law in laws], 0
+    slowest = min(laws, key=lambda law: law.decay)
+    size = length(lower, upper)
+    around, gap = outer_nodes(outer, inner, size, size * rtol ** (-1 / (slowest.decay - 2)))
+    if not gap > 0:
+        raise InputError(
+            f"the surfaces overlap by {-gap:.3g} m; a law of the distance of their points holds outside only."
+        )
+    amounts = np.array([law.n_1 * law.n_2 for law in laws])[:, None]
+
+    def integrand(t: Array, order: int) -> Array:
+        nonlocal pairs
+        x, area = around.nodes(t)
+        found, count = _sums(x, area, inner, kernels, slowest, order, rtol)
+        pairs += count
+        return np.asarray(found * amounts)
+
+    found, error = integral(integrand, around.box, lambda found: _sizes(found, gap), rtol)
+    energy, on_outer, on_inner, moment, opposite = np.split(found, [1, 4, 7, 10], axis=-1)
+    forces, moments = (on_outer, on_inner), (moment, opposite)
+    if swapped:
+        forces, moments = forces[::-1], moments[::-1]
+    return PairForces(energy[:, 0], *forces, *moments, error, gap, pairs)
+
+
+def check_finite(lower: Surface, upper: Surface) -> None:
+    """InputError where two surfaces without end run along each other, so that their energy has no end either."""
+    endless = [not s.shape.about_axis and not np.all(np.isfinite(s.shape.span)) for s in (lower, upper)]
+    if all(endless) and lower.shape.turn == upper.shape.turn:
+        raise InputError("both surfaces have no end: give one of them a length, so that the force has one.")
+
+
+def length(lower: Surface, upper: Surface) -> float:
+    """A length of the surfaces [m]: the largest radius or extent."""
+    spans = [b - a for s in (lower, upper) if not s.shape.about_axis for a, b in s.shape.span if np.isfinite(b - a)]
+    return float(max([*lower.shape.lengths, *upper.shape.lengths, *spans], default=1.0))
+
+
+def _sums(
+    x: Array,
+    area: Array,
+    inner: Surface,
+    kernels: Sequence[Callable[[Array], Array]],
+    law: PairEnergy,
+    order: int,
+    rtol: float,
+) -> tuple[Array, int]:
+    """Integrals (n, laws, 13) over the inner surface for nodes (n, k, 3) of the outer one, and the number of pairs."""
+    n, k = x.shape[:2]
+    flat, found, pairs = x.reshape(-1, 3), np.empty((n * k, len(kernels), COUNT)), 0
+    first = inner_nodes(inner, flat[:1], order, law, rtol)
+    batch = max(1, MOST_NODES // first.area.size)
+    for begin in range(0, n * k, batch):
+        part = slice(begin, begin + batch)
+        nodes = inner_nodes(inner, flat[part], order, law, rtol)
+        pairs += nodes.area.size
+        ours, away = flat[part], flat[part][:, None] - nodes.x
+        r = np.sqrt(np.einsum("nkc,nkc->nk", away, away))
+        for j, one in enumerate(kernels):
+            psi, slope = np.moveaxis(one(r), -1, 0)
+            strength = -slope * nodes.area / r
+            push, theirs = (np.einsum("nk,nkc->nc", strength, arms) for arms in (away, nodes.x))
+            found[part, j, 0] = np.einsum("nk,nk->n", psi, nodes.area)
+            found[part, j, 1:4], found[part, j, 4:7] = push, -push
+            # The moment of -strength * away at the other end is x2 x away = x2 x x1, the same for all but the arm.
+            found[part, j, 7:10], found[part, j, 10:13] = np.cross(ours, push), np.cross(ours, theirs)
+    found *= np.linalg.norm(area, axis=-1).reshape(-1, 1, 1)
+    return found.reshape(n, k, len(kernels), COUNT).sum(axis=1), pairs
+
+
+def _sizes(found: Array, gap: float) -> Array:
+    """Sizes of energies, forces and moments that errors are relative to, as some components vanish."""
+    force = np.maximum(np.linalg.norm(found[:, 1:4], axis=-1, keepdims=True), TINY)
+    # What is nowhere anything has the size of the smallest number.
+    arms = np.linalg.norm(found[:, 7:10], axis=-1, keepdims=True)
+    moment = np.maximum(arms, force * gap)
+    energy = np.maximum(np.abs(found[:, :1]), force * gap)
+    return np.concatenate([energy, np.repeat(force, 6, axis=-1), np.repeat(moment, 6, axis=-1)], axis=-1)

@@ -1,0 +1,196 @@
+"""Forces of pairs of points and of laws of the gap: closed forms, balance, order of convergence, limits."""
+
+import itertools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from surfacechem.errors import InputError
+from surfacechem.laws.contact import BondedContact, Penalty
+from surfacechem.laws.longrange import LennardJonesSpherePlane
+from surfacechem.surfaces import nodes
+from surfacechem.surfaces.curved_gap import between_flats, density, over_gap
+from surfacechem.surfaces.pair_laws import InversePower, LennardJonesPair, PairTable, PenaltyPair
+from surfacechem.surfaces.pairwise import interaction
+from surfacechem.surfaces.projection import Surface
+from surfacechem.surfaces.shapes import Cavity, Cylinder, Paraboloid, Plane, Sphere, Torus
+
+mpmath.mp.dps = 40
+
+
+def power(m):
+    return InversePower(n_1=2.0, n_2=3.0, psi_0=1 / 6, r_0=1.0, m=m)
+
+
+def pair(lower, upper, d, laws, rtol=1e-10):
+    return interaction(Surface(lower), Surface(upper, True, d), laws, rtol)
+
+
+def spheres(c, R_1, R_2, m):
+    """Double integral of r^-m over two spheres whose centres are c apart; over a cavity and a sphere inside it alike.
+
+    The mean over a sphere of r^-m from a point at the distance c is that of (c + R cos)^-m, weighted by its potential.
+    """
+    c, R_1, R_2, m = map(mpmath.mpf, (c, R_1, R_2, m))
+
+    def inner(rho):
+        return 2 * mpmath.pi * R_2 / rho * ((rho + R_2) ** (2 - m) - abs(rho - R_2) ** (2 - m)) / (2 - m)
+
+    # Over the first sphere dA = 2 pi R_1 / c rho d rho.
+    return (
+        2 * mpmath.pi * R_1 / c * mpmath.quad(lambda rho: rho * inner(rho), mpmath.linspace(abs(c - R_1), c + R_1, 9))
+    )
+
+
+def closed(c, R_1, R_2, m):
+    ends = (c + R_1 + R_2, c + R_2 - R_1, c - R_2 + R_1, c - R_1 - R_2)
+    sums = sum(sign * mpmath.mpf(end) ** (3 - m) for sign, end in zip((1, -1, -1, 1), ends, strict=True))
+    return 4 * mpmath.pi**2 * R_1 * R_2 / (mpmath.mpf(c) * (2 - m) * (3 - m)) * sums
+
+
+def test_the_closed_form_is_the_integral():
+    for m in (4, 6, 10):
+        assert mpmath.almosteq(closed(3.7, 1, 2, m), spheres(3.7, 1, 2, m), 1e-20)
+
+
+@pytest.mark.parametrize("m", [4, 6, 10])
+@pytest.mark.parametrize("d", [1e-3, 0.1, 1.0, 10.0])
+def test_two_spheres_are_closed_forms(d, m):
+    c = 3 + mpmath.mpf(d)
+    found = pair(Sphere(R=1.0), Sphere(R=2.0), d, [power(m)])
+    assert found.energy[0] == pytest.approx(float(closed(c, 1, 2, m)), rel=1e-10)
+    slope = mpmath.diff(lambda x: closed(x, 1, 2, m), c)
+    assert found.force_2[0, 2] == pytest.approx(float(-slope), rel=1e-10)
+    assert np.abs(found.force_1 + found.force_2).max() <= 1e-13 * np.abs(found.force_1).max()
+    assert np.abs(found.moment_1 + found.moment_2).max() <= 1e-13 * np.abs(found.force_1).max() * 4
+
+
+@pytest.mark.parametrize("m", [4, 6])
+def test_a_sphere_in_a_cavity_is_a_closed_form_whichever_is_the_first(m):
+    d, R, hollow = 0.01, 1.0, 3.0
+    exact = float(spheres(hollow - R - d, R, hollow, m))
+    for bodies in ((Sphere(R=R), Cavity(R=hollow)), (Cavity(R=hollow), Sphere(R=R))):
+        assert pair(*bodies, d, [power(m)]).energy[0] == pytest.approx(exact, rel=1e-10)
+
+
+def test_a_sphere_over_a_plane_is_the_law_that_is_there():
+    n_1, n_2, psi_0, g_0, R, d = 2e19, 3e19, 4e-21, 3e-10, 5e-8, 4e-10
+    law = LennardJonesPair(n_1=n_1, n_2=n_2, psi_0=psi_0, g_0=g_0)
+    exact = LennardJonesSpherePlane(n_1=n_1, n_2=n_2, psi_0=psi_0, g_0=g_0, R=R, area=1.0).energy(d)
+    for bodies in ((Sphere(R=R), Plane()), (Plane(), Sphere(R=R))):
+        found = pair(*bodies, d, [law])
+        assert found.energy[0] == pytest.approx(exact, rel=1e-10)
+        assert found.force_1[0] == pytest.approx(-found.force_2[0], rel=1e-13)
+
+
+def test_parallel_cylinders_per_length():
+    """Along a line r^-6 gives 3 pi / (8 a^5) at the distance a of the axes' points."""
+    d, R_1, R_2 = 0.3, 1.0, 2.0
+    # The trapezium rule converges geometrically on circles.
+    v, w = np.meshgrid(*[2 * np.longdouble(np.pi) * np.arange(320, dtype=np.longdouble) / 320] * 2)
+    x, z = R_1 * np.sin(v) - R_2 * np.sin(w), R_1 + R_2 + d - R_1 * np.cos(v) - R_2 * np.cos(w)
+    exact = 2 * 3 * np.pi / 8 * np.sum(np.hypot(x, z) ** -5) * (2 * np.pi / 320) ** 2 * R_1 * R_2
+    found = pair(Cylinder(R=R_1, length=2.0), Cylinder(R=R_2), d, [power(6)])
+    assert found.energy[0] == pytest.approx(float(exact), rel=1e-10)
+
+
+def test_tilted_plates_balance_and_agree_whichever_carries_the_nodes():
+    plates = Plane(length=1.0, width=0.7), Plane(length=0.8, width=1.0, tilt=0.2)
+    found = pair(*plates, 0.6, [power(6)], 1e-7)
+    mirrored = pair(*plates[::-1], 0.6, [power(6)], 1e-7)
+    assert found.energy == pytest.approx(mirrored.energy, rel=1e-7)
+    assert found.force_1[0] == pytest.approx(mirrored.force_2[0] * [1, 1, -1], rel=1e-6, abs=1e-7 * found.energy[0])
+    net = np.abs(found.moment_1 + found.moment_2).max()
+    assert net <= 1e-13 * np.abs(found.force_1).max()
+    turning = found.moment_1[0, 1]
+    assert abs(turning) > 1e3 * net
+
+
+def test_the_force_is_the_slope_of_the_energy_and_the_moment_of_its_tilt():
+    h, law = 1e-4, [power(4)]
+    low, middle, high = (pair(Torus(hole=1.0, r=0.5), Plane(), d, law, 1e-11) for d in (0.2 - h, 0.2, 0.2 + h))
+    assert (low.energy[0] - high.energy[0]) / (2 * h) == pytest.approx(middle.force_2[0, 2], rel=1e-6)
+    low, middle, high = (pair(Torus(hole=1.0, r=0.5, tilt=a), Plane(), 0.3, law, 1e-9) for a in (0.1 - h, 0.1, 0.1 + h))
+    assert (low.energy[0] - high.energy[0]) / (2 * h) == pytest.approx(middle.moment_1[0, 1], rel=3e-6)
+
+
+def test_each_rule_of_higher_order_gains_the_digits_that_it_should(monkeypatch):
+    exact, errors = float(closed(3.01, 1, 2, 6)), []
+    for order in (4, 6, 9, 13):
+        monkeypatch.setattr(nodes, "ORDERS", (order, order))
+        errors.append(abs(pair(Sphere(R=1.0), Sphere(R=2.0), 0.01, [power(6)], 1e-13).energy[0] / exact - 1))
+    # Geometric convergence: the logarithm of the error falls in proportion to the order.
+    assert errors[0] < 0.05
+    for (low, high), (before, after) in zip(((4, 6), (6, 9)), itertools.pairwise(errors), strict=False):
+        assert math.log(before / after) / (high - low) > 1.0
+    assert errors[3] < 1e-9
+
+
+def test_the_local_law_errs_by_gap_over_radius_and_derjaguin_is_its_limit():
+    """Also for bodies of different densities: the product counts."""
+    law, bodies = power(6), (Sphere(R=1.0), Sphere(R=1.0))
+    for of in ("local", "derjaguin"):
+        errors = []
+        for d in (1e-2, 1e-3):
+            exact = pair(*bodies, d, [law]).force_1[0, 2]
+            local = over_gap(Surface(bodies[0]), Surface(bodies[1], True, d), [between_flats(law)]).force_1[2]
+            derjaguin = -math.pi * 2 * math.pi / 4 * d**-4
+            errors.append((local if of == "local" else derjaguin) / exact - 1)
+        assert errors[0] / errors[1] == pytest.approx(10, rel=0.02)
+        assert abs(errors[1]) < 2e-3
+
+
+def test_between_flats_is_the_sum_over_planes():
+    g = np.array([3e-10, 1e-9])
+    law = LennardJonesPair(n_1=2e19, n_2=3e19, psi_0=4e-21, g_0=3e-10)
+    psi, traction = between_flats(law)(g).T
+    A = 2 * math.pi * 2e19 * 3e19 * 4e-21
+    x = 3e-10 / g
+    assert psi == pytest.approx(A * 9e-20 * (x**8 / 360 - x**2 / 6), rel=1e-9)
+    assert traction == pytest.approx(-A * g * (x**10 / 45 - x**4 / 3), rel=1e-12)
+
+
+def test_a_sphere_pressed_into_a_penalty():
+    """Over the sphere dA = 2 pi R dz, so that F = pi E R delta^2, and the area that overlaps is 2 pi R delta."""
+    E, R, delta = 3.0, 2.0, 0.1
+    found = over_gap(Surface(Sphere(R=R)), Surface(Plane(), True, -delta), [density(Penalty(E_n=E))])
+    assert found.force_2[2] == pytest.approx(math.pi * E * R * delta**2, rel=1e-12)
+    assert found.energy == pytest.approx(math.pi * E * R * delta**3 / 3, rel=1e-12)
+    assert found.area == pytest.approx(2 * math.pi * R * delta, rel=1e-12)
+    assert np.abs(found.moment_1 + found.moment_2).max() <= 1e-13
+
+
+def test_a_table_and_a_penalty_of_pairs_end_where_they_say():
+    distances = np.linspace(0.5, 2.0, 200)
+    table = PairTable(n_1=1.0, n_2=1.0, distances=distances, energies=[*(2 - distances[:-1]) ** 4, 0.0])
+    direct = 2 * math.pi * mpmath.quad(lambda r: (2 - r) ** 4 * r * 1, [1, 2])
+    # A small plate sees the plane as a point does.
+    found = pair(Plane(length=1e-3, width=1e-3), Plane(), 1.0, [table], 1e-6)
+    assert found.energy[0] == pytest.approx(1e-6 * float(direct), rel=1e-4)
+    penalty = PenaltyPair(n_1=1.0, n_2=1.0, k=2.0, r_0=0.5)
+    assert pair(Sphere(R=1.0), Plane(), 0.5, [penalty]).energy[0] == 0.0
+    exact = mpmath.quad(lambda z: 4 * mpmath.pi**2 * mpmath.quad(lambda r: (0.5 - r) ** 2 * r, [z, 0.5]), [0.2, 0.5])
+    assert pair(Sphere(R=1.0), Plane(), 0.2, [penalty], 1e-8).energy[0] == pytest.approx(float(exact), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: pair(Sphere(R=1.0), Plane(), -0.1, [power(4)]), "the surfaces overlap by 0.1 m"),
+        (lambda: pair(Plane(), Plane(), 0.1, [power(4)]), "no end: give one of them a length"),
+        (lambda: density(BondedContact(E_n=1.0)), "reads bonded; .* the gap g_n alone"),
+        (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2, 3], energies=[1, 2, 3]), "the last energy is 3 J"),
+        (lambda: PairTable(n_1=1, n_2=1, distances=[1, 2], energies=[1, 0]), "at least 3"),
+        (lambda: InversePower(n_1=1, n_2=1, psi_0=1, r_0=1, m=2), "m = 2 is outside its range: > 2"),
+        (
+            lambda: pair(Paraboloid(R=1.0), Sphere(R=1.0), 0.1, [power(6)], 1e-17),
+            "1e-17 of an integral .* out of reach",
+        ),
+    ],
+)
+def test_what_has_no_integral_is_refused(make, message, monkeypatch):
+    monkeypatch.setattr(nodes, "MOST_DIVISIONS", 3)
+    with pytest.raises(InputError, match=message):
+        make()
