@@ -126,17 +126,17 @@ def jumps(build):
 ADAPTER = '''
 """Dormand and Prince's method of order 8."""
 
-from scipy.integrate import DOP853
+from scipy.integrate import RK45
 
 from surfacechem.solve.adapters.scipy_methods import SciPySolver
 
 
-NAMES = ("dop853",)
+NAMES = ("rk45",)
 
 
 def make(name: str) -> SciPySolver:
     """The solver of this name."""
-    return SciPySolver(name, DOP853)
+    return SciPySolver(name, RK45)
 '''
 
 
@@ -185,7 +185,7 @@ PLACES = {
     ),
     "a solver": Place(
         {"solve/adapters/explicit.py": ("", ADAPTER)},
-        {"lsoda": "dop853"},
+        {"lsoda": "rk45"},
         {"v": V_I - MU_P / M * 1e-3},
     ),
 }

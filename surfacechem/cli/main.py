@@ -184,8 +184,8 @@ def check(
     start, end = consistent_start(model, values), settings.times[-1]
     numbers = groups(model, scene, values, start, end)
     found = [*warnings(system), *start_warnings(model, problem, start, end)]
-    why = reasons(model, settings) if settings.solver == AUTO else ()
-    settings = model.chosen(settings)
+    why = reasons(problem, settings) if settings.solver == AUTO else ()
+    settings = model.chosen(settings, values)
     typer.echo(check_summary(simulation.case.title, system, scene, settings, numbers, found, why))
 
 

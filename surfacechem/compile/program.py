@@ -8,7 +8,7 @@ raw pointer by the stepper and as a vectorised function from Python.
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -102,6 +102,8 @@ class Program:
     chains: tuple[Chain, ...] = ()
     groups: tuple[int, ...] = ()
     """Per quadrature: errors of a group are measured by its largest, 0 to 2; -1 for what steps need not serve."""
+    solved: Callable[[], Function | None] = lambda: None
+    """Makes the code of the rates by themselves; None where the equations do not give them one after another."""
     plain_margins: bool = False
     """Whether margins read neither derivatives nor what comes from outside."""
 
@@ -112,13 +114,13 @@ class Program:
     @cached_property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """What the stepper reads of a program: its sizes (states, accounts, margins, inputs; in the core, chains, cells
-        of chains); a row (code, user data, function, place in its result) for residual, jacobian, ledger and
-        margins, zero where absent, and then for their further pieces; which states are algebraic; a row (first, end,
+        of chains); a row (code, user data, function, place in its result) for residual, jacobian, ledger, margins and
+        rates, zero where absent, and then for their further pieces; which states are algebraic; a row (first, end,
         anchor) for each chain; the group of each quadrature, -1 where it is in none.
         """
         core = self.chains[0].first if self.chains else self.n
         sizes = self.n, self.n_ledger, self.n_margins, self.n_inputs, core, len(self.chains), self.n - core
-        functions = (self.residual, self.jacobian, self.ledger, self.margins)
+        functions = (self.residual, self.jacobian, self.ledger, self.margins, None)
         code = [(f.address, f.user, which, 0) if f else (0, 0, which, 0) for which, f in enumerate(functions)]
         for which, f in enumerate(functions):
             place = f.n_out if f else 0
@@ -128,6 +130,20 @@ class Program:
         chains = np.array([(c.first, c.end, c.anchor) for c in self.chains], np.int64).reshape(-1, 3)
         groups = np.array(self.groups or (-1,) * self.n_ledger, np.int64)
         return np.array(sizes, np.int64), np.array(code, np.int64), self.algebraic_mask, chains, groups
+
+    @cached_property
+    def rates(self) -> Function | None:
+        """The rates by time, state and parameters alone, compiled when they are first asked for."""
+        return self.solved()
+
+    @cached_property
+    def explicit_tables(self) -> tuple[NDArray[Any], ...]:
+        """The tables with the code of the rates."""
+        assert self.rates is not None
+        sizes, code, *others = self.tables
+        code = code.copy()
+        code[4, :2] = self.rates.address, self.rates.user
+        return sizes, code, *others
 
     def derivatives(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """dG/dy and dG/dydot as matrices [..., equation, variable]."""
@@ -218,9 +234,9 @@ def jacobian(
 
     def total(expression: Any) -> dict[Any, Any]:
         terms: dict[Any, list[Any]] = {}
-        for symbol, partial in gradient(expression).items():
+        for symbol, by_symbol in gradient(expression).items():
             for x, slope in slopes.get(symbol, {}).items():
-                terms.setdefault(x, []).append(partial * slope)
+                terms.setdefault(x, []).append(by_symbol * slope)
         return {x: symengine.Add(*items) for x, items in terms.items()}
 
     for symbol, expression in named:
@@ -287,8 +303,38 @@ def compile_program(
         algebraic=tuple(all(entry == 0 for entry in by_rate[j::core]) for j in range(core)) + (False,) * (n - core),
         filler=filler,
         chains=tuple(chains),
+        solved=partial(_compiled_rates, inputs, residual, derivatives, chains or filler),
         plain_margins=not read & {*derivatives, *outside},
     )
+
+
+@PREPARING
+def _compiled_rates(
+    inputs: Sequence[Any], residual: Sequence[Any], derivatives: Sequence[Any], others: object
+) -> Function | None:
+    """The code of the rates; none where ``others`` are found beside them: chains, or what comes from outside."""
+    rates = None if others else solved_rates(residual, derivatives)
+    return compile_function(inputs, rates) if rates else None
+
+
+def solved_rates(residual: Sequence[Any], rates: Sequence[Any]) -> list[Any] | None:
+    """The rates from equations that give them one after another; None from others.
+
+    >>> a, b, x = symengine.symbols("a b x")
+    >>> solved_rates([2 * b + a - 3 * x, a - x], [a, b])
+    [x, x]
+    """
+    left = dict.fromkeys(rates)
+    rows, named = list(residual), []
+    while rows:
+        unknown = [[rate for rate in left if rate in row.free_symbols] for row in rows]
+        found = next((i for i, those in enumerate(unknown) if len(those) == 1), None)
+        if found is None:
+            return None
+        rate, row = unknown[found][0], rows.pop(found)
+        named.append((rate, -row.xreplace({rate: 0}) / row.diff(rate)))
+        del left[rate]
+    return expanded(named, rates)
 
 
 def _read(named: Named, expressions: Sequence[Any]) -> Named:

@@ -28,8 +28,9 @@ from surfacechem.results.audit import audit
 from surfacechem.results.dataset import profile_values
 from surfacechem.results.event_table import KINK, SIDE, event_times
 from surfacechem.scene import Scene
-from surfacechem.solve import ASKING
-from surfacechem.solve.run import Model, Run, Trajectory
+from surfacechem.solve.choice import method
+from surfacechem.solve.contract import Problem
+from surfacechem.solve.run import Run, Trajectory
 from surfacechem.tolerances import EPS, FLOOR, TIGHTEST
 
 Array = NDArray[np.float64]
@@ -318,19 +319,13 @@ def rounding_of_time(trajectory: Trajectory) -> float:
     return float(np.max(np.divide(change, size, out=np.zeros_like(change), where=size > 0), initial=0.0))
 
 
-def reasons(model: Model, run: Run) -> list[tuple[str, str, str]]:
+def reasons(problem: Problem, run: Run) -> list[tuple[str, str, str]]:
     """What was chosen for a run and why, a row each."""
-    chosen, system = model.chosen(run), model.system
-    parts = ["algebraic states"] if any(state.algebraic for state in system.states) else []
-    parts += ["jumps" if system.edges else "margins"] if system.edges or model.margins else []
-    method = f"compiled, with exact Jacobian{''.join(f', {part}' for part in parts)}; order 5 to 13 by tolerance"
-    if chosen.solver in ASKING:
-        method = "rates of the mechanism come from Cantera itself, which it can ask"
     part = f"a hundredth of the accuracy {asked(run):.0e}, as errors of smooth runs are below 100 rtol"
     if run.rtol == TIGHTEST:
         part = f"for the accuracy {asked(run):.0e}; below this is rounding"
     return [
-        ("solver", chosen.solver, method),
+        ("solver", *method(problem)),
         ("rtol", f"{run.rtol:.0e}", part),
         (
             "verified",

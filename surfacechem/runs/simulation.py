@@ -326,7 +326,8 @@ class Simulation:
         values = {path: value for path, value in values.items() if path not in self.system.constants}
         chosen, done, errors = self._resolved(self.case.run, values, plan, threads)
         model = done[0].model
-        solution = sweeps.SweepSolution(model, plan, model.chosen(self.case.run), done, **chosen._origin(values))
+        run = model.chosen(self.case.run, done[0].values)
+        solution = sweeps.SweepSolution(model, plan, run, done, **chosen._origin(values))
         cells = cache(lambda: errors or [chosen._cell_errors(run) for run in done])
         return replace(solution, accuracy=sweeps.accuracy(chosen.case, solution, threads, cells))
 

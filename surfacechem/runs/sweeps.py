@@ -61,7 +61,7 @@ def solve(
 ) -> list[Trajectory]:
     """The runs of a :func:`prepared` system over the plan; how a run ends is its status, never an exception."""
     values = [model.values({**changes, **point}) for point in plan.points]
-    pairs = list(zip(settings(model.system, plan, model.chosen(run), values), values, strict=True))
+    pairs = list(zip(settings(model.system, plan, model.chosen(run, values[0]), values), values, strict=True))
     return model.solve_all(pairs, threads or os.cpu_count() or 1)
 
 

@@ -3,7 +3,7 @@
 >>> solver("radua")
 Traceback (most recent call last):
     ...
-ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, ida, lsoda, radau, scipy-radau.
+ValueError: no solver 'radua'. Did you mean 'radau'? Known: bdf, cantera, cvode, dop853, ida, lsoda, radau, scipy-radau.
 """
 
 import ast
@@ -32,7 +32,10 @@ def _adapters() -> dict[str, str]:
 
 _ADAPTERS = _adapters()
 
-names = ("radau", *sorted(_ADAPTERS, key=lambda name: name in ASKING))
+_OWN = {"radau": "Radau", "dop853": "Dop853"}
+"""The methods of this package, and their classes."""
+
+names = (*_OWN, *sorted(_ADAPTERS, key=lambda name: name in ASKING))
 
 
 def solver(name: str) -> Solver:
@@ -41,8 +44,8 @@ def solver(name: str) -> Solver:
         near = difflib.get_close_matches(name, names, n=1)
         guess = f" Did you mean '{near[0]}'?" if near else ""
         raise ValueError(f"no solver '{name}'.{guess} Known: {', '.join(sorted(names))}.")
-    if name == "radau":
-        made = import_module("surfacechem.solve.radau.solver").Radau()
+    if name in _OWN:
+        made = getattr(import_module("surfacechem.solve.radau.solver"), _OWN[name])()
     else:
         made = import_module(f"surfacechem.solve.adapters.{_ADAPTERS[name]}").make(name)
     assert isinstance(made, Solver)

@@ -116,6 +116,8 @@ class Problem:
     """Which margins are in play in the modes that hold throughout; None where all are. The others may be anything."""
     goes_on: bool = False
     """Whether another problem continues this one: then a kink at its very end counts, as one between segments."""
+    explicit: bool = False
+    """Whether steps may be explicit where the equations give their rates and are not stiff."""
 
     def __post_init__(self) -> None:
         n, segments = self.program.n, len(self.segments) - 1

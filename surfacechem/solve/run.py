@@ -20,6 +20,7 @@ from surfacechem.model.checks import check_start
 from surfacechem.model.system import System
 from surfacechem.solve import ASKING, AUTO, solver
 from surfacechem.solve import segments as pieces
+from surfacechem.solve.choice import EXPLICIT, method
 from surfacechem.solve.contract import Margin, Problem, Result, Solver, Status
 from surfacechem.solve.diagnose import ROUNDED, cause, is_led_back
 from surfacechem.solve.equilibria import Equilibria, Point
@@ -77,10 +78,11 @@ class Run:
 
     def second(self, rtol: float) -> Run:
         """The run that tells the error of this one: at another tolerance, the absolute one in proportion, and with more
-        looks at the equations, elsewhere.
+        looks at the equations, elsewhere; of explicit steps by implicit ones, which do not share their blindness.
         """
         atol = None if self.atol is None else self.atol * rtol / self.rtol
-        return replace(self, rtol=rtol, atol=atol, samples=CLOSER * self.samples)
+        used = OWN if self.solver == EXPLICIT else self.solver
+        return replace(self, rtol=rtol, atol=atol, solver=used, samples=CLOSER * self.samples)
 
 
 @dataclass(frozen=True)
@@ -302,11 +304,9 @@ class Model:
         """
         return self.solve_values(trajectory.run.second(rtol), trajectory.values, nudged=True)
 
-    def chosen(self, run: Run) -> Run:
-        """The run with a method: where the choice is left to us our own, or the one that can ask Cantera for rates."""
-        if run.solver != AUTO:
-            return run
-        return replace(run, solver=ASKING[0] if self.program.filler is not None else OWN)
+    def chosen(self, run: Run, values: Mapping[str, float]) -> Run:
+        """The run with a method, where the choice is left to us the one that suits the scene with these values."""
+        return run if run.solver != AUTO else replace(run, solver=method(self.problem(run, values))[0])
 
     def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
         """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
@@ -318,29 +318,29 @@ class Model:
         self, runs: Sequence[tuple[Run, Mapping[str, float]]], threads: int = 1, *, nudged: bool = False
     ) -> list[Trajectory]:
         """Runs that differ in values and output times, together in the compiled loop."""
-        run = self.chosen(runs[0][0])
-        method = solver(run.solver)
+        run = self.chosen(*runs[0])
+        used = solver(run.solver)
         if self.program.filler is not None and run.solver not in ASKING:
             raise InputError(
                 f"rates of the mechanism come from Cantera itself, which the solver {run.solver} cannot ask. Use "
                 f"`solver: {ASKING[0]}` under `run`.",
                 path="run.solver",
             )
-        pairs = [(self.chosen(each), values) for each, values in runs]
+        pairs = [(replace(each, solver=run.solver), values) for each, values in runs]
         # A limit in seconds is one of each run by itself.
         groups = [[pair] for pair in pairs] if run.max_seconds else [pairs]
-        return [done for group in groups for done in self._solve_together(method, group, threads, nudged)]
+        return [done for group in groups for done in self._solve_together(used, group, threads, nudged)]
 
     def _solve_together(
-        self, method: Solver, pairs: Sequence[tuple[Run, Mapping[str, float]]], threads: int, nudged: bool
+        self, used: Solver, pairs: Sequence[tuple[Run, Mapping[str, float]]], threads: int, nudged: bool
     ) -> list[Trajectory]:
         """Runs whose arcs are solved in batches; each has its part of their time."""
         before = PREPARING.seconds
         problems = [self.problem(*pair, nudged=nudged) for pair in pairs]
-        method.prepare()
+        used.prepare()
         start, prepared = time.perf_counter(), PREPARING.seconds
         flows = [self._flow(problem) for problem in problems]
-        ends = solve_together(flows, method, threads)
+        ends = solve_together(flows, used, threads)
         seconds = (time.perf_counter() - start - (PREPARING.seconds - prepared)) / len(pairs)
         self.compile_seconds += PREPARING.seconds - before
         done = []

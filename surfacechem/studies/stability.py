@@ -45,7 +45,7 @@ RTOL, STEPS = 1e-10, 1500
 # Digits below which a value that is given out as an answer is wrong, and those that a double holds.
 LEAST, MOST = 2.0, 16.0
 
-SOLVERS = (OWN, "lsoda", "bdf", "scipy-radau", "cvode", "ida")
+SOLVERS = (OWN, "dop853", "lsoda", "bdf", "scipy-radau", "cvode", "ida")
 
 # Rounds of a search for a worst corner, and the most that may be asked for.
 ROUNDS, MOST_ROUNDS = 12, 10_000

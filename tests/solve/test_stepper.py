@@ -14,16 +14,21 @@ from solver_problems import (
     exothermic_problem,
     linear_decay,
     problem,
+    robertson_sums,
 )
 
 from surfacechem.compile.program import compile_program
 from surfacechem.solve import names, solver
 from surfacechem.solve.contract import Margin, Problem, Status
-from surfacechem.solve.radau.solver import Radau, consistent, output_rates, solve_many
+from surfacechem.solve.radau.solver import Dop853, Radau, consistent, output_rates, solve_many
 from surfacechem.solve.radau.stepper import ROWS
 from surfacechem.solve.radau.tables import (
     COLLOCATION,
     DEFECT,
+    DENSE,
+    EXPLICIT,
+    EXPLICIT_ERRORS,
+    EXPLICIT_NODES,
     FROM_PARTS,
     GAMMA,
     INVERSE,
@@ -56,6 +61,28 @@ def test_order_conditions(k: int) -> None:
     np.testing.assert_allclose(
         np.sort_complex(values), np.sort_complex(np.linalg.eigvals(INVERSE[k, :s, :s])), rtol=1e-10
     )
+
+
+def test_order_conditions_of_the_explicit_steps() -> None:
+    """Quadratures of order 8 by the step, of order 7 by its polynomial at all of its nodes, and the nodes as sums."""
+    np.testing.assert_allclose(EXPLICIT.sum(axis=1), EXPLICIT_NODES, atol=1e-14)
+    for q in range(1, 8):
+        powers = EXPLICIT_NODES ** (q - 1)
+        assert EXPLICIT[12] @ powers == pytest.approx(1 / q, rel=1e-13)
+        np.testing.assert_allclose(DENSE @ powers, NODES[2] ** q / q, atol=2e-13)
+    assert EXPLICIT[12] @ EXPLICIT_NODES**7 == pytest.approx(1 / 8, rel=1e-13)
+    np.testing.assert_allclose(EXPLICIT_ERRORS @ np.stack([EXPLICIT_NODES**q for q in range(3)]).T, 0.0, atol=1e-13)
+
+
+def test_explicit_steps_go_on_implicitly_from_where_a_problem_is_stiff() -> None:
+    """Robertson's problem, whose transient is over long before its end; one that is not stiff stays explicit."""
+    steps, smooth = Dop853(), exothermic_problem(1e-10)
+    long = problem(robertson_sums(), [1.0, 0.0, 0.0], [0.0, 1e11], 1e-10, atol=1e-20)
+    stiff, mild = steps.solve(long), steps.solve(smooth)
+    assert stiff.success
+    assert stiff.counters.jacobians > 0 == mild.counters.jacobians
+    np.testing.assert_allclose(stiff.y, radau.solve(long).y, rtol=1e-7)
+    np.testing.assert_allclose(mild.outputs, exothermic_exact(smooth.times), rtol=1e-10)
 
 
 def test_output_rates_come_from_the_equations() -> None:

@@ -207,7 +207,7 @@ def test_the_report_says_what_every_solver_keeps_and_what_was_left_out(study, mo
     assert "no temperature T_c balances the heat" in html
     assert "<svg" in html
     assert "8 of 16 values of the regimes, for the sake of time" in text
-    assert "the solvers lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
+    assert "the solvers dop853, lsoda, bdf, scipy-radau, cvode, cantera, which were not asked for" in text
     assert "the search for worst corners, which was not asked for" in text
     assert "steps of a run" not in text
     monkeypatch.setitem(regimes(), "seconds", replace(regimes()["seconds"], values=(1.0,)))

@@ -119,7 +119,7 @@ def finish_step(w: Any, h: float) -> None:
     estimate, and the quadratures of the ledger.
     """
     for m in range(w.n):
-        w.correction[m] = GAMMA[w.member] * w.error[m]
+        w.correction[m] = 0.0 if w.explicit != 0 else GAMMA[w.member] * w.error[m]
     if w.n_ledger > 0:
         integrate_ledger(w, h)
 

@@ -244,6 +244,7 @@ def _run(w: Any, i: int) -> None:
     peaks = w.peaks[row_of(w.peaks, i)]
     copy(peaks[: w.n_ledger], w.q_largest)
     copy(peaks[w.n_ledger :], w.margin_largest)
+    w.explicit, w.stiff_steps = w.explicitly, 0
     copy(w.y0[i], w.y)
     clear(w.ydot)
     status = GOOD

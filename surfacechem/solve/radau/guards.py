@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from surfacechem.solve.radau.dense import finish_step, keep_polynomial, put_inside, put_scanned, scan_step
+from surfacechem.solve.radau.explicit import step_explicitly
 from surfacechem.solve.radau.newton import CONVERGED, factor_newton, predict, set_stage, solve_stages, stage_count
 from surfacechem.solve.radau.step import estimate_error, store_polynomial, too_small
 from surfacechem.solve.radau.tables import EDGE, SCANNED
@@ -354,10 +355,8 @@ def _first(w: Any, h: float) -> tuple[int, float]:
 
 
 @compiled
-def _step_onto(w: Any, size: float) -> float:
-    """Repeat the step with another size, with the full order of the method, and the margins at its end; returns the
-    norm of its error.
-    """
+def _step_implicitly(w: Any, size: float) -> float:
+    """Repeat the step with another size; the norm of its error."""
     w.h_factored = 0.0
     if not factor_newton(w, size):
         return np.inf
@@ -365,7 +364,17 @@ def _step_onto(w: Any, size: float) -> float:
     if solve_stages(w, size) != CONVERGED:
         return np.inf
     store_polynomial(w, size, 0.0)
-    norm = estimate_error(w, size)
+    return estimate_error(w, size)
+
+
+@compiled
+def _step_onto(w: Any, size: float) -> float:
+    """Repeat the step with another size, with the full order of the method, and the margins at its end; returns the
+    norm of its error.
+    """
+    norm = step_explicitly(w, size, np.inf) if w.explicit != 0 else _step_implicitly(w, size)
+    if not norm < np.inf:
+        return np.inf
     finish_step(w, size)
     set_stage(w, stage_count(w.member) - 1, size)
     evaluate(w, MARGINS, w.margin)
@@ -479,7 +488,9 @@ def find_event(w: Any, h: float) -> float:
     if earliest < before:
         # A lowest point shows one point later: the sides that hold there are those of the point before it.
         copy(w.side_last, w.side)
-    size = _refine(w, h, first, max(earliest, TINY), 1.0 if w.kinds[first, 2] == 1 else np.inf)
+    # A fold may lie just beyond a guard: there explicit steps have to be as good as elsewhere.
+    tested = w.kinds[first, 2] == 1 or (w.explicit != 0 and w.kinds[first, 0] == 1)
+    size = _refine(w, h, first, max(earliest, TINY), 1.0 if tested else np.inf)
     if size == 0.0:
         restore_sides(w)
         return 0.0

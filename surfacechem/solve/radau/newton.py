@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from surfacechem.solve.radau.explicit import put_rates
 from surfacechem.solve.radau.linear import factor, fold_shifted, shifted, solve_complex, solve_real
 from surfacechem.solve.radau.roundoff import correction_is_noise
 from surfacechem.solve.radau.tables import (
@@ -82,6 +83,21 @@ def nested(k: int, top: int, x: float, row: Any) -> float:
     for i in range(top - 1, -1, -1):
         value = value * (x - NEWTON_NODES[k, i]) + row[i]
     return float(value * x)
+
+
+@compiled
+def nested_four(k: int, top: int, x: Any, row: Any) -> tuple[float, float, float, float]:
+    """Values of a polynomial at four points at once, of which none waits for another."""
+    a = b = c = d = row[top]
+    for i in range(top - 1, -1, -1):
+        node, factor = NEWTON_NODES[k, i], row[i]
+        a, b, c, d = (
+            a * (x[0] - node) + factor,
+            b * (x[1] - node) + factor,
+            c * (x[2] - node) + factor,
+            d * (x[3] - node) + factor,
+        )
+    return a * x[0], b * x[1], c * x[2], d * x[3]
 
 
 @compiled
@@ -186,6 +202,14 @@ def _put_stage(w: Any, i: int, h: float, rate: float) -> None:
 def set_stage(w: Any, i: int, h: float) -> None:
     """Inputs of stage i."""
     k = w.member
+    if w.explicit != 0:
+        w.inputs[0] = w.base + (w.tau + NODES[k, i] * h)
+        for m in range(w.n):
+            w.inputs[1 + m] = w.y[m] + w.z[i, m]
+            w.inputs[1 + w.n + m] = w.k[12, m]
+        if i + 1 < stage_count(k):
+            put_rates(w, w.trial_dot)
+        return
     combine(INVERSE[k, i].ctypes.data, 7, 1, stage_count(k), w.z.ctypes.data, w.n, w.slopes[i].ctypes.data)
     _put_stage(w, i, h, 1.0 / h)
 

@@ -7,8 +7,19 @@ computed by a step of its own, from the start of the main step, which has the fu
 
 from typing import Any
 
+import numpy as np
+
 from surfacechem.solve.radau.dense import integrate_ledger, interpolate, keep_polynomial, probe_ledger
-from surfacechem.solve.radau.newton import CONVERGED, end_of_step, factor_newton, predict, solve_stages, stage_count
+from surfacechem.solve.radau.explicit import step_explicitly
+from surfacechem.solve.radau.newton import (
+    CONVERGED,
+    end_of_step,
+    factor_newton,
+    nested_four,
+    predict,
+    solve_stages,
+    stage_count,
+)
 from surfacechem.solve.radau.roundoff import find_noise
 from surfacechem.solve.radau.step import MAGNIFIED, defect_inside, store_polynomial
 from surfacechem.solve.radau.tables import PROBE, PROBE_RATE, PROBE_SHAPE
@@ -34,7 +45,9 @@ def _largest(w: Any, floor: float) -> float:
 def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
     """An output by a step of its own, which has the full order; by the polynomial where Newton's method fails."""
     stepped = False
-    if 0.0 < size < h and factor_newton(w, size):
+    if 0.0 < size < h and w.explicit != 0:
+        stepped = step_explicitly(w, size, np.inf) < np.inf
+    elif 0.0 < size < h and factor_newton(w, size):
         predict(w, size)
         w.contraction = 1.0
         stepped = solve_stages(w, size) == CONVERGED
@@ -46,6 +59,25 @@ def _write_by_step(w: Any, size: float, h: float, output: Any) -> None:
         interpolate(w, min(max(size / h, 0.0), 1.0))
     copy(w.trial, output)
     copy(w.q_trial, output[w.n :])
+
+
+@compiled
+def write_four(w: Any, times: Any, outputs: Any, first: int, end: int, h: float) -> None:
+    """Up to four outputs on the polynomials of the step."""
+    k, x, n = w.member, w.fractions, w.n
+    top, last = stage_count(k) + 1, end - 1
+    for i in range(4):
+        x[i] = min(max(((times[min(first + i, last)] - w.base) - w.tau) / h, 0.0), 1.0)
+    second, third, fourth = min(first + 1, last), min(first + 2, last), min(first + 3, last)
+    for m in range(n + w.n_ledger):
+        start, row = (w.y[m], w.polynomial[m]) if m < n else (w.q[m - n], w.q_polynomial[m - n])
+        a, b, c, d = nested_four(k, top, x, row)
+        outputs[fourth, m], outputs[third, m], outputs[second, m], outputs[first, m] = (
+            start + d,
+            start + c,
+            start + b,
+            start + a,
+        )
 
 
 @compiled
@@ -69,22 +101,22 @@ def _write_inside(w: Any, times: Any, outputs: Any, first: int, last: int, h: fl
             for i in range(stage_count(k) + 2):
                 w.q_polynomial[m, i] += PROBE_SHAPE[k, i] * (h * defect)
     if serves:
-        for i in range(first, last):
-            x = ((times[i] - w.base) - w.tau) / h
-            interpolate(w, min(max(x, 0.0), 1.0))
-            copy(w.trial, outputs[i])
-            copy(w.q_trial, outputs[i, w.n :])
+        for i in range(first, last, 4):
+            write_four(w, times, outputs, i, last, h)
         return
     theta, contraction, guessed, tries = w.theta, w.contraction, w.guessed, w.tries
     store_polynomial(w, h, 0.0)
     for i in range(first, last):
         _write_by_step(w, (times[i] - w.base) - w.tau, h, outputs[i])
     # The main step as it was: its stages, quadratures and factors, and what Newton's method knew.
+    if w.explicit != 0:
+        step_explicitly(w, h, np.inf)
     for i in range(stage_count(k)):
         copy(w.z_last[i], w.z[i])
     if w.n_ledger > 0:
         integrate_ledger(w, h)
-    factor_newton(w, h)
+    if w.explicit == 0:
+        factor_newton(w, h)
     # They decide on the next step, which must not depend on the outputs that were asked for.
     w.theta, w.contraction, w.guessed, w.tries = theta, contraction, guessed, tries
 

@@ -102,6 +102,10 @@ def _chain_noise(w: Any, y: Any, ydot: Any, column: Any) -> None:
 @compiled
 def find_noise(w: Any) -> None:
     """Largest change of each variable at the start of the step that rounding errors can cause, into the noise."""
+    if w.explicit != 0:  # nothing is divided by what may be small
+        for j in range(w.n):
+            w.noise[j] = ULPS * abs(w.y[j])
+        return
     spread_noise(w, w.y, w.ydot)
     for j in range(w.n):
         most = max(LARGEST * w.scale[j], w.atol[j] / w.rtol)

@@ -62,13 +62,15 @@ def _batch(problem: Problem, runs: Sequence[Array], room: tuple[int, int] | None
     as are usual.
     """
     program, times = problem.program, runs[-1]
+    explicit = problem.explicit and program.rates is not None
     usual = STEP_ROWS if problem.record_steps else 0, EVENT_ROWS if problem.margins else 0
     step_rows, event_rows = usual if room is None else room
     n, q, m, count = program.n, program.n_ledger, program.n_margins, len(runs[0])
     return Batch(
-        *program.tables,
+        *(program.explicit_tables if explicit else program.tables),
         min(problem.rtol, LONGEST_STEP),
         _contiguous(problem.atol),
+        int(explicit),
         _kinds(problem.margins, problem.in_play),
         int(problem.goes_on),
         *runs,
@@ -139,6 +141,22 @@ class Radau(Solver):
                 for i, result in zip(chunk, each, strict=True)
             }
         return [found[i] for i in range(len(problems))]
+
+
+class Dop853(Radau):
+    """Explicit steps of order 8 as long as the equations give their rates and are not stiff, those of Radau IIA from
+    there on.
+
+    Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.5, and its program DOP853.
+    """
+
+    name = "dop853"
+
+    def solve(self, problem: Problem) -> Result:
+        return super().solve(problem.changed(explicit=True))
+
+    def solve_all(self, problems: Sequence[Problem], threads: int = 1) -> list[Result]:
+        return super().solve_all([problem.changed(explicit=True) for problem in problems], threads)
 
 
 def _solved(problems: Sequence[Problem]) -> list[Result]:
@@ -285,7 +303,7 @@ def search_batch(program: Program, ends: Array, table: Array, counts: NDArray[np
     rows, nothing = np.zeros((1, 0)), _no_rows(len(ends))
     return Batch(
         *program.tables,
-        1.0, np.ones(program.n), _kinds(()), 0,
+        1.0, np.ones(program.n), 0, _kinds(()), 0,
         ends, table, np.zeros(0), np.empty(0, np.int64), rows, rows, rows, ends, counts, nothing, nothing, nothing,
     )  # fmt: skip
 

@@ -19,6 +19,14 @@ import numpy as np
 from surfacechem.solve.contract import Status
 from surfacechem.solve.radau.consistency import CONSISTENT, NO_STATE, SINGULAR_STATE, find_consistent
 from surfacechem.solve.radau.dense import change_and_slope, keep_polynomial, probe_ledger, put_inside
+from surfacechem.solve.radau.explicit import (
+    DENSEST,
+    defect_of_rates,
+    is_stiff,
+    mark_noise,
+    put_rates,
+    step_explicitly,
+)
 from surfacechem.solve.radau.linear import solve_real
 from surfacechem.solve.radau.newton import (
     CONVERGED,
@@ -84,6 +92,8 @@ def filter_residual(w: Any) -> bool:
     """
     # Unfiltered, the defect of a stiff component would be as large as its rate (Hairer & Wanner II, IV.8).
     error = w.error
+    if w.explicit != 0:
+        return defect_of_rates(w, error)
     evaluate(w, RESIDUAL, error)
     w.residuals += 1
     solve_real(w, error)
@@ -202,6 +212,8 @@ def growing_size(w: Any) -> float:
     The method would damp what grows much faster, and never leave an equilibrium that is unstable. What is nothing and
     is driven by nothing does not grow.
     """
+    if w.fresh == INVALID:
+        return np.inf
     mass, stiffness = w.jacobian[1], w.jacobian[0]
     fastest = 0.0
     for j in range(mass.shape[0]):
@@ -239,7 +251,10 @@ def first_size(w: Any, span: float) -> float:
         w.trial[j] = w.y[j] + (0.0 if w.algebraic[j] else trial * w.ydot[j])
         w.trial_dot[j] = w.ydot[j]
     w.inputs[0] = w.base + (w.tau + trial)
-    if find_consistent(w) != CONSISTENT:
+    if w.explicit != 0:
+        set_inputs(w, w.trial, w.ydot)
+        put_rates(w, w.trial_dot)
+    elif find_consistent(w) != CONSISTENT:
         return trial
     for j in range(n):
         w.trial_dot[j] -= w.ydot[j]
@@ -276,6 +291,31 @@ STOPPED = int(Status.STOPPED)
 
 
 @compiled
+def start_explicitly(w: Any) -> bool:
+    """Whether steps are explicit from here on, with the rates of the state if they are."""
+    if w.explicit != 0:
+        set_inputs(w, w.y, w.ydot)
+        put_rates(w, w.trial_dot)
+        if finite(w.trial_dot):
+            copy(w.trial_dot, w.ydot)
+            w.member = DENSEST
+        else:
+            w.explicit = 0
+    return bool(w.explicit != 0)
+
+
+@compiled
+def _go_implicit(w: Any) -> None:
+    """Steps are implicit from here on."""
+    w.explicit = 0
+    w.h_last = w.h_factored = w.theta = w.guessed = 0.0
+    w.contraction = 1.0
+    w.calm = 0
+    w.fresh = INVALID
+    w.member = preferred_member(w.rtol)
+
+
+@compiled
 def restart(w: Any) -> int:
     """Make the state consistent and forget the past; time starts from zero."""
     w.base += w.tau
@@ -285,14 +325,15 @@ def restart(w: Any) -> int:
     w.refused = min(w.refused, w.steps // 2)
     w.fresh = INVALID
     w.member = preferred_member(w.rtol)
-    copy(w.y, w.trial)
-    copy(w.ydot, w.trial_dot)
     w.inputs[0] = w.base
-    outcome = find_consistent(w)
-    if outcome != CONSISTENT:
-        return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
-    copy(w.trial, w.y)
-    copy(w.trial_dot, w.ydot)
+    if not start_explicitly(w):
+        copy(w.y, w.trial)
+        copy(w.ydot, w.trial_dot)
+        outcome = find_consistent(w)
+        if outcome != CONSISTENT:
+            return NO_CONSISTENT if outcome == NO_STATE else SINGULAR if outcome == SINGULAR_STATE else NONFINITE
+        copy(w.trial, w.y)
+        copy(w.trial_dot, w.ydot)
     # The rates at the start of the first step; later ones begin with those at the end of the step before.
     if w.n_ledger > 0:
         set_inputs(w, w.y, w.ydot)
@@ -338,7 +379,27 @@ def _may_try(w: Any, h: float, i: int) -> int:
 
 
 @compiled
-def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
+def advance_explicitly(w: Any, h: float, i: int, h_last: float, norm_last: float) -> tuple[int, float, float, float]:
+    """As :func:`advance_implicitly`, by explicit steps."""
+    failed = False
+    w.tries = 1
+    while True:
+        outcome = _may_try(w, h, i)
+        if outcome != GOOD:
+            return outcome, h, 0.0, h
+        norm = step_explicitly(w, h, 1.0)
+        if failed:
+            mark_noise(w, norm, norm_last * (h / h_last) ** 8)
+        if norm < 1.0:
+            proposed = h if failed else next_size(w, h, norm, h_last, norm_last)
+            return GOOD, h, norm, min(proposed, next_size(w, h, norm, 0.0, 1.0))
+        w.rejected += 1
+        failed, h_last, norm_last = True, h, norm
+        h = next_size(w, h, min(norm, 1e30), 0.0, 1.0)
+
+
+@compiled
+def advance_implicitly(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
     """Shrink h until a step passes; returns outcome, the step taken, its error norm and the next step size."""
     # The first step after a start, and every one that has been rejected, may be in a transient.
     repeated = w.h_last == 0.0
@@ -382,6 +443,17 @@ def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tup
 
 
 @compiled
+def advance(w: Any, h: float, i: int, size_last: float, norm_last: float) -> tuple[int, float, float, float]:
+    """As :func:`advance_implicitly`, by explicit steps where these serve."""
+    if w.explicit != 0:
+        found = advance_explicitly(w, h, i, size_last, norm_last)
+        if found[0] != STEP_UNDERFLOW:
+            return found
+        _go_implicit(w)
+    return advance_implicitly(w, h, i, size_last, norm_last)
+
+
+@compiled
 def store_polynomial(w: Any, h: float, offset: float) -> None:
     """Keep the polynomial of this step for predictions from its end (offset 1) or its start (offset 0)."""
     k = w.member
@@ -404,11 +476,15 @@ def accept(w: Any, h: float) -> None:
     w.steps += 1
     w.fresh = min(w.fresh, OLD)
     set_weights(w)
+    if w.explicit != 0 and is_stiff(w):
+        _go_implicit(w)
 
 
 @compiled
 def keep_matrices(w: Any, h: float, proposed: float) -> float:
     """Step size to try next: unchanged where Newton converged so fast that the factors are worth keeping."""
+    if w.fresh == INVALID:
+        return proposed
     proposed = min(proposed, convergent_size(w, h))
     if choose_member(w, SLOW):
         w.h_factored = 0.0

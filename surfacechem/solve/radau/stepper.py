@@ -25,6 +25,8 @@ BATCH: dict[str, tuple[Any, int]] = {
     # the method
     "rtol": (float, 0),
     "atol": (float, 1),
+    # whether steps are explicit as long as the equations are not stiff
+    "explicitly": (int, 0),
     # guards: a row (terminal, direction, smooth, strict, in play) for each
     "kinds": (np.int64, 2),
     # runs that others follow
@@ -75,6 +77,8 @@ NUMBERS: dict[str, type] = {
     # Member of the Radau family now, and that of the stored polynomial. Newton iterations of this step; easy steps in a
     # row; age of the Jacobian; steps that the ledger has refused.
     **dict.fromkeys(("member", "last_member", "tries", "calm", "fresh", "refused"), int),
+    # Whether steps are explicit now; twice the number of those that were stiff.
+    **dict.fromkeys(("explicit", "stiff_steps"), int),
 }
 """Numbers of a trajectory that change."""
 
@@ -105,6 +109,8 @@ MEMORY = {
     # stages: increments, those of the stored step, residuals and corrections, slopes; corrections in the eigenbasis
     **_arrays("z z_last g slopes parts", ROWS, "n"),
     **_arrays("pairs", 3, "n", kind=complex),
+    # rates at the stages of an explicit step
+    **_arrays("k", 16, "n"),
     # derivatives by states and by rates, one behind the other as the compiled function writes them
     **_arrays("jacobian", 2, "core", "core"),
     **_arrays("border_derivatives", 2, "core", "links"),
@@ -119,6 +125,8 @@ MEMORY = {
     **_arrays("order", 4, "core", kind=int),
     # polynomials in Newton's form: the stored one, and those of state and ledger over the step
     **_arrays("z_polynomial polynomial", "n", 9),
+    # fractions of the step of four outputs
+    **_arrays("fractions", 4),
     **_arrays("q_polynomial", "n_ledger", 9),
     # change of the state and its rate at the points where guards are examined
     **_arrays("scanned scanned_rates", SCAN_POINTS + WIDTH - 1, "n"),
@@ -156,6 +164,7 @@ _SOURCES = (
     "linear",
     "roundoff",
     "tables",
+    "explicit",
     "newton",
     "step",
     "consistency",

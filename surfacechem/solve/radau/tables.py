@@ -55,6 +55,38 @@ PAIR_ROWS = _padded("PAIR_ROWS")
 PAIR_COLUMNS = _padded("PAIR_COLUMNS")
 
 
+LAST_STAGE, STAGES_OF_DENSE = 15, 13
+"""Of the explicit method: the last row of its rates, and those before the ones that only its polynomial needs."""
+
+
+def _rows(name: str, columns: int) -> NDArray[np.float64]:
+    """Rows of different lengths as a zero-padded table."""
+    return np.array([np.pad(row, (0, columns - len(row))) for row in _GIVEN[name]])
+
+
+EXPLICIT_NODES = np.array(_GIVEN["EXPLICIT_NODES"])
+EXPLICIT = np.pad(_rows("EXPLICIT", LAST_STAGE + 1), ((1, 0), (0, 0)))
+"""Changes of the state at the stages of the explicit method from the rates of those before; row 12 is its step."""
+EXPLICIT_ERRORS = _rows("EXPLICIT_ERRORS", LAST_STAGE + 1)
+"""Errors of order 5 and 3 from the rates."""
+
+
+def _dense(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Changes at the nodes of an explicit step's polynomial from all its rates.
+
+    The polynomial is x (F_0 + (1 - x) (F_1 + x (F_2 + (1 - x) (F_3 + ...)))), with F_0 to F_2 from both ends.
+    """
+    step, first, last = EXPLICIT[12], np.eye(LAST_STAGE + 1)[0], np.eye(LAST_STAGE + 1)[12]
+    factors = [step, first - step, 2.0 * step - last - first, *_rows("EXPLICIT_DENSE", LAST_STAGE + 1)]
+    table = np.zeros((len(nodes), LAST_STAGE + 1))
+    for i, factor in enumerate(reversed(factors)):
+        table = (table + factor) * (nodes if i % 2 == 0 else 1.0 - nodes)[:, None]
+    return table
+
+
+DENSE = _dense(np.array(_GIVEN["NODES"][2]))
+
+
 def _lagrange(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
     """1 / (c_j prod_{k != j} (c_j - c_k)): barycentric weights of the nodes 0, c_1, ..., c_s without the node 0."""
     gaps = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))

@@ -46,8 +46,8 @@ def compiled(function: Any) -> Any:
     return _njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
-RESIDUAL, JACOBIAN, LEDGER, MARGINS = np.arange(4)
-FUNCTIONS = 4
+RESIDUAL, JACOBIAN, LEDGER, MARGINS, RATES = np.arange(5)
+FUNCTIONS = 5
 """Rows of the table of addresses (code, user data, function, place in its result); further rows are later parts of
 functions that are compiled in pieces. NumPy's integers, as Numba compiles what takes a Python constant anew for each
 constant."""
@@ -328,3 +328,46 @@ def combine(
         return context.get_dummy_value()
 
     return signature, generate
+
+
+def weighted_sums(table: Any) -> Any:
+    """A function that takes a row of this table times the rows of a matrix, given by its address, into another.
+
+    The factors stand in the code and those that are zero nowhere, so it takes half the time of :func:`combine`.
+    """
+
+    @_intrinsic
+    def sums(_context: Any, _row: Any, _values: Any, _states: Any, _out: Any) -> Any:
+        signature = types.void(*(types.intp,) * 4)
+
+        def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+            row, values, states, out = args
+
+            def place(start: Any, row: int, column: Any) -> Any:
+                entry = builder.add(builder.mul(_WORD(row), states), column)
+                return builder.gep(builder.inttoptr(start, _NUMBER.as_pointer()), [entry])
+
+            done = builder.append_basic_block("done")
+            cases = builder.switch(row, done)
+            for i, factors in enumerate(table):
+                block = builder.append_basic_block()
+                cases.add_case(_WORD(i), block)
+                builder.position_at_end(block)
+                with _strided_loop(builder, _WORD(0), states, _WORD(WIDTH), inc=True) as (first, _):
+                    # Two sums, of which neither waits for the other.
+                    totals = [_Constant(_VECTOR, [0.0] * WIDTH)] * 2
+                    for k, j in enumerate(np.flatnonzero(factors)):
+                        pointer = builder.bitcast(place(values, int(j), first), _VECTOR.as_pointer())
+                        term = builder.fmul(
+                            _Constant(_VECTOR, [float(factors[j])] * WIDTH), builder.load(pointer, align=8)
+                        )
+                        totals[k % 2] = builder.fadd(totals[k % 2], term)
+                    result = builder.bitcast(place(out, 0, first), _VECTOR.as_pointer())
+                    builder.store(builder.fadd(*totals), result, align=8)
+                builder.branch(done)
+            builder.position_at_end(done)
+            return _context.get_dummy_value()
+
+        return signature, generate
+
+    return sums

@@ -1,0 +1,60 @@
+"""The method that suits a scene, and why, where the choice is left to us."""
+
+import numpy as np
+
+from surfacechem.compile.program import Program
+from surfacechem.solve import ASKING
+from surfacechem.solve.contract import Problem
+from surfacechem.tolerances import TIGHTEST
+
+IMPLICIT, EXPLICIT = "radau", "dop853"
+
+STIFF = 1e3
+"""Length of a run in units of its fastest relaxation above which it is stiff from the start: some two hundred explicit
+steps, at the limit of their stability, cost what the implicit ones of a smooth run do.
+"""
+
+
+def method(problem: Problem) -> tuple[str, str]:
+    """The solver of a problem, and why, in words.
+
+    What becomes stiff on the way only is seen there: explicit steps are followed by implicit ones in the same run.
+    """
+    program = problem.program
+    if program.filler is not None:
+        return ASKING[0], "rates of the mechanism come from Cantera itself, which it can ask"
+    why = _why_implicit(problem)
+    if why:
+        return IMPLICIT, f"implicit, order 5 to 13 by tolerance: {why}"
+    return EXPLICIT, "explicit, order 8, as the start is not stiff; implicit from where the run becomes so"
+
+
+def _why_implicit(problem: Problem) -> str:
+    """Why steps have to be implicit; nothing where they can be explicit."""
+    program = problem.program
+    if any(program.algebraic):
+        return "some states are algebraic"
+    if program.chains:
+        return "heat conducted between cells is stiff"
+    if program.rates is None:
+        return "the equations determine their rates together"
+    if problem.rtol <= TIGHTEST:
+        return "at this tolerance fewer and longer steps round less"
+    end, fastest = float(problem.segments[-1]), fastest_relaxation(program, problem)
+    if fastest * end <= STIFF:
+        return ""
+    return f"stiff, as the fastest relaxation at the start takes {1 / fastest:.2g} s of {end:.2g} s"
+
+
+def fastest_relaxation(program: Program, problem: Problem) -> float:
+    """Largest rate [1/s] at which a small disturbance of the start falls; infinite where that is not finite."""
+    n, parameters = program.n, problem.parameters[0]
+    inputs = np.concatenate([problem.segments[:1], problem.y0, np.zeros(n), parameters])
+    assert program.rates is not None
+    inputs[1 + n : 1 + 2 * n] = program.rates(inputs)
+    K, M = program.derivatives(inputs)
+    try:
+        growth = np.linalg.eigvals(np.linalg.solve(M, -K))
+    except (np.linalg.LinAlgError, ValueError):
+        return np.inf
+    return float(max(-growth.real.min(initial=0.0), 0.0)) if np.all(np.isfinite(growth)) else np.inf
