@@ -23,11 +23,12 @@ from surfacechem.quantities import VELOCITIES
 from surfacechem.results.audit import ROUNDINGS, residuals, resolved
 from surfacechem.runs import spectrum
 from surfacechem.runs.keeping import REACHED, STATUSES, Columns, Keep, reason_table, variable
+from surfacechem.solve.choice import EXPLICIT, IMPLICIT
 from surfacechem.solve.contract import Problem, Status
 from surfacechem.solve.diagnose import are_led_back
 from surfacechem.solve.radau.solver import consistent, solve_arrays
 from surfacechem.solve.radau.stepper import END, EVENTS, OUTPUTS, RECORDS
-from surfacechem.solve.run import OWN, Model, Run
+from surfacechem.solve.run import Model, Run
 from surfacechem.tolerances import CROSSED, EPS, MICROMETRE, PICOMETRE
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def solvable(model: Model, plan: Plan, run: Run, problem: Problem) -> bool:
     """Whether runs of a plan differ in nothing but values of states and parameters: so that arrays tell all."""
     system = model.system
     one_arc = model.jumper is None or len(problem.segments) == 2
-    own = run.solver == OWN and run.max_seconds is None and model.program.filler is None
+    own = run.solver in (IMPLICIT, EXPLICIT) and run.max_seconds is None and model.program.filler is None
     shared = model.passing.is_empty and not set(plan.paths) & set(system.cycles)
     return own and shared and one_arc and not system.equilibria and _starts_as_given(system, set(plan.paths))
 
@@ -82,7 +83,7 @@ class ArrayRuns:
     def __init__(self, model: Model, plan: Plan, run: Run, changes: Mapping[str, float], keep: Keep) -> None:
         self.model, self.plan, self.run, self.keep = model, plan, run, keep
         self.values = model.values(changes)
-        self.problem = self._first_problem(changes)
+        self.problem = self._first_problem(changes).changed(explicit=run.solver == EXPLICIT)
         system = model.system
         self.n = len(system.states)
         paths = [parameter.path for parameter in system.parameters]

@@ -44,7 +44,7 @@ class ChunkRuns:
         self.simulation, self.plan, self.keep = simulation, plan, keep
         self.changes = changes
         self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
-        self.run = self.model.chosen(simulation.case.run)
+        self.run = self.model.chosen(simulation.case.run, self.model.values(changes))
         self.one_by_one = RunByRun(self.model, keep)
         arrays = ArrayRuns(self.model, plan, self.run, changes, keep)
         self.arrays = arrays if solvable(self.model, plan, self.run, arrays.problem) else None

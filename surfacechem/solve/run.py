@@ -306,7 +306,12 @@ class Model:
 
     def chosen(self, run: Run, values: Mapping[str, float]) -> Run:
         """The run with a method, where the choice is left to us the one that suits the scene with these values."""
-        return run if run.solver != AUTO else replace(run, solver=method(self.problem(run, values))[0])
+        if run.solver != AUTO:
+            return run
+        try:
+            return replace(run, solver=method(self.problem(run, values))[0])
+        except InputError:  # the run says so itself
+            return replace(run, solver=OWN)
 
     def solve_values(self, run: Run, values: Mapping[str, float], *, nudged: bool = False) -> Trajectory:
         """Run with every value given, whatever bounds they need; under loads that are nudged by their last digit if so
