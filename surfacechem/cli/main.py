@@ -126,8 +126,8 @@ def sweep(
     cluster: Annotated[
         str | None, Option("--cluster", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler.")
     ] = None,
-    threads: Annotated[
-        int | None, Option("--threads", min=1, help="Threads; as many as processors if not given.")
+    only: Annotated[
+        str | None, Option("--only", metavar="STATUS", help="Run those runs of the store again that are failed, say.")
     ] = None,
     changes: Changes = None,
     quiet: Quiet = False,
@@ -141,13 +141,13 @@ def sweep(
 
     simulation = load(case, changes or ())
     values, end = assignments(over or ()) or None, assignments([until] if until else ()) or None
-    if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster}):
+    if stores.asked_for(output, {"--resume": resume, "--part": part, "--cluster": cluster, "--only": only}):
         assert output is not None
         plan = simulation.plan(values, end)
-        return stores.write(simulation, plan, output, resume, part, cluster, threads, quiet)
+        return stores.write(simulation, plan, output, stores.Options(resume, part, cluster, only, quiet))
     target = dataset_path(output or f"{simulation.case.name}-sweep.nc")
     refuse_unwritable(target)
-    solution = solved(lambda: simulation.sweep(values, end, threads=threads), quiet)
+    solution = solved(lambda: simulation.sweep(values, end), quiet)
     solution.write(target)
     if not quiet:
         typer.echo(sweep_summary(solution, target))

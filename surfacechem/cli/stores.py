@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,24 +38,32 @@ def asked_for(output: Path | None, options: dict[str, object]) -> bool:
     return False
 
 
-def write(
-    simulation: Simulation,
-    plan: Plan,
-    target: Path,
-    resume: bool,
-    part: str | None,
-    cluster: str | None,
-    threads: int | None,
-    quiet: bool,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """What the command line says of a store."""
+
+    resume: bool
+    part: str | None
+    cluster: str | None
+    only: str | None
+    """How the runs of a store ended that are run again, beside it."""
+    quiet: bool
+
+
+def write(simulation: Simulation, plan: Plan, target: Path, options: Options) -> None:
     """Run a sweep into a store, with a bar on a terminal; an interrupt says how to go on."""
+    from surfacechem.runs.checking import check
+    from surfacechem.runs.streaming import failed_runs
     from surfacechem.runs.summaries import store_summary
 
-    chosen = part_of(part)
-    with client_at(cluster) as client, bar_of(quiet) as told:
-        stream = simulation.stream(plan, target, resume=resume, part=chosen)
+    quiet, part = options.quiet, part_of(options.part)
+    if options.only is not None:
+        plan, target = failed_runs(target, options.only), target.with_name(f"{target.stem}-{options.only}.zarr")
+    with client_at(options.cluster) as client, bar_of(quiet) as told:
+        stream = simulation.stream(plan, target, resume=options.resume, part=part)
         try:
-            store = solved(lambda: stream.run(threads, client, told), quiet)
+            store = solved(lambda: stream.run(None, client, told), quiet)
+            errors = solved(lambda: check(stream), quiet)
         except SignalledError as error:
             (number,) = error.args
             word = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
@@ -62,7 +71,7 @@ def write(
             os._exit(
                 SIGNALLED + number
             )  # at once, as compiled code may run on; a chunk without its mark does not count
-    status, text = store_summary(stream, store)
+    status, text = store_summary(stream, store, errors)
     if not quiet:
         typer.echo(text)
     leave_with(status)

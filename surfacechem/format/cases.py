@@ -122,7 +122,7 @@ def load_text(
         tree, text = whole, document.dump(whole)
     with laws.known(own):
         case, mechanism = read_document(tree, str(base), mechanism_text)
-    if case.sweep and not (case.sweep.over or case.sweep.sample):
+    if case.sweep and not case.sweep.tree.value:
         raise case.sweep.error(NOTHING_SWEPT)
     return Case(
         name=name,

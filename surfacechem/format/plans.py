@@ -164,6 +164,11 @@ class Plan:
         values = {axis.path: axis.at(place) for axis, place in zip(self.axes, grid, strict=False)}
         return values | (self.sample.at(places[-1]) if self.sample else {})
 
+    def picked(self, index: Index) -> Plan:
+        """The plan of some of the runs alone, whose values go together."""
+        axes = [Axis(path, values.tolist()) for path, values in self.at(index).items()]
+        return Plan(axes, self.until, zipped=True)
+
     @property
     def points(self) -> list[dict[str, float]]:
         """The swept values of each run by path, the last dimension fastest."""

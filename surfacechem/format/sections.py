@@ -536,6 +536,11 @@ class SweepSection(Section):
     until: Mapping[str, float] | None = key(
         UNTIL, "a prescribed ramp and the value at which each run ends, instead of `run.until`"
     )
+    checked: int | str = key(
+        Whole(0, word=ALL),
+        "runs of a store whose error is found, spread over the plan; 100 of the hardest come to it",
+        1000,
+    )
     keep: KeepSection | None = key(
         Nested(KeepSection), "what a store keeps of each run; if not given all ends, extremes and times of events"
     )

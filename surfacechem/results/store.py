@@ -68,6 +68,9 @@ class Layout:
     runs: tuple[str, ...]
     """Dimensions of the runs."""
     variables: Mapping[str, StoredArray]
+    """Arrays along the runs."""
+    beside: Mapping[str, StoredArray]
+    """Arrays that do not belong to chunks."""
     coordinates: Sequence[Column]
     attributes: Mapping[str, Any]
     at_once: int
@@ -138,6 +141,12 @@ class Store:
                 values = columns[name]
                 self._array(name)[region] = values.reshape(*shape, *values.shape[1:])
             self.mark(str(number), self.checksum(number))
+
+    def write_beside(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Write whole arrays that do not belong to chunks."""
+        with self.writing():
+            for name, values in columns.items():
+                self._array(name)[...] = values
 
     def mark(self, name: str, text: str) -> None:
         """Put a mark in its place, whole or not at all."""
@@ -273,17 +282,15 @@ def _make(path: Path, layout: Layout) -> None:
     """All arrays, without values but those of the coordinates."""
     zarr = _zarr()
     group = zarr.create_group(path, zarr_format=3, attributes=dict(layout.attributes))
-    for name, item in layout.variables.items():
-        inner = tuple(layout.sizes[dimension] for dimension in item.dimensions[len(layout.runs) :])
-        group.create_array(
-            name,
-            shape=(*layout.shape, *inner),
-            chunks=(*layout.chunk, *inner),
-            dtype=item.kind,
-            fill_value=np.nan if item.kind.startswith("float") else -1,
-            dimension_names=item.dimensions,
-            attributes=dict(item.attributes),
+    for name, item in {**layout.variables, **layout.beside}.items():
+        shape = tuple(layout.sizes[dimension] for dimension in item.dimensions)
+        part = (*layout.chunk, *shape[len(layout.chunk) :]) if name in layout.variables else shape
+        attributes, along = dict(item.attributes), item.dimensions
+        missing = np.nan if item.kind.startswith("float") else -1
+        made = group.create_array(
+            name, shape=shape, chunks=part, dtype=item.kind, dimension_names=along, fill_value=missing
         )
+        made.update_attributes(attributes)
     for column in layout.coordinates:
         values = np.asarray(column.values)
         made = group.create_array(

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfacechem import format as cases
-from surfacechem.errors import InputError
+from surfacechem.errors import InputError, Place, suggestion
 from surfacechem.format.plans import Plan, recorded_plan
+from surfacechem.format.sections import ALL, SweepSection
 from surfacechem.results.netcdf import CONVENTIONS, Column, cf_unit, versions
-from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, store_path
+from surfacechem.results.store import MOST_BYTES, Layout, Store, StoredArray, begin, opened, store_path
 from surfacechem.runs import keeping, sweeps
 from surfacechem.runs.arrays import ArrayRuns, solvable
+from surfacechem.runs.checking import checked_arrays
 from surfacechem.runs.keeping import STATUSES, Columns, Keep, RunByRun, keep_of, variable
 from surfacechem.solve.run import Model, Run, Trajectory
 
@@ -37,12 +39,22 @@ RUNS_OF_A_PIECE = 2**11
 """Runs that one thread takes at a time, so that all of them share a chunk."""
 
 
+def processors() -> int:
+    """Processors that this process may use: of a job on a shared machine fewer than there are."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # on some systems nobody knows
+        return os.cpu_count() or 1
+
+
 class ChunkRuns:
     """The runs of a plan, in any order and in parts of any size, as columns of what is kept."""
 
-    def __init__(self, simulation: Simulation, plan: Plan, keep: Keep, changes: Mapping[str, float]) -> None:
+    def __init__(
+        self, simulation: Simulation, plan: Plan, keep: Keep, changes: Mapping[str, float], checked: int = 0
+    ) -> None:
         self.simulation, self.plan, self.keep = simulation, plan, keep
-        self.changes = changes
+        self.changes, self.checked = changes, checked
         self.model = Model(keeping.reaching(sweeps.prepared(simulation.system, plan), keep))
         self.run = self.model.chosen(simulation.case.run, self.model.values(changes))
         self.one_by_one = RunByRun(self.model, keep)
@@ -84,19 +96,14 @@ class ChunkRuns:
     def _solved(self, values: Mapping[str, Any], chosen: Index) -> list[Trajectory | None]:
         """Some runs by themselves, None for one whose values are not admissible."""
         points = [{path: float(column[i]) for path, column in values.items()} for i in chosen.tolist()]
-        pairs: list[tuple[Run, Mapping[str, float]] | None] = []
-        for point in points:
-            try:
-                full = self.model.values({**self.changes, **point})
-                (run,) = sweeps.settings(self.model.system, self.plan, self.run, [full])
-                self.model.problem(run, full)
-                pairs.append((run, full))
-            except InputError:
-                pairs.append(None)
-        # Those that are admissible go through the compiled loop together.
-        admissible = [pair for pair in pairs if pair is not None]
-        done = iter(self.model.solve_all(admissible) if admissible else [])
-        return [None if pair is None else next(done) for pair in pairs]
+        try:  # through the compiled loop together
+            full = [self.model.values({**self.changes, **point}) for point in points]
+            runs = sweeps.settings(self.model.system, self.plan, self.run, full)
+            return [*self.model.solve_all(list(zip(runs, full, strict=True)))]
+        except InputError:
+            if len(chosen) == 1:
+                return [None]
+        return [run for i in chosen.tolist() for run in self._solved(values, np.array([i]))]
 
 
 def _merged(told: NDArray[np.bool_], these: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
@@ -177,7 +184,7 @@ class Stream:
             )
             done, failed = resumed, 0
             told(Progress(runs, done, failed, resumed))
-            for number, columns in self._computed(missing, threads or os.cpu_count() or 1, client):
+            for number, columns in self._computed(missing, threads or processors(), client):
                 # Only this thread writes, so that chunks and their marks come in order.
                 self.store.write(number, columns)
                 done += len(columns["status"])
@@ -218,6 +225,21 @@ def _joined(number: int, futures: Sequence[Any]) -> tuple[int, Columns]:
     return number, {name: np.concatenate([columns[name] for columns in found]) for name in found[0]}
 
 
+def failed_runs(path: Path, status: str) -> Plan:
+    """The plan of the runs of a store that ended in one way; InputError where none has, or nothing is stored."""
+    if status not in STATUSES:
+        raise InputError(f"no runs are called '{status}'.{suggestion(status, STATUSES)}", Place(path="--only"))
+    try:
+        data = opened(path)
+        codes, plan = data["status"].values.ravel(), recorded_plan(data.attrs["sweep"])
+    except (OSError, LookupError, ValueError) as error:
+        raise InputError(f"is no store of a sweep: {' '.join(str(error).split())}.", Place(str(path))) from None
+    found = np.flatnonzero(codes == STATUSES.index(status))
+    if not len(found):
+        raise InputError(f"no run of it is {status}.", Place(str(path)))
+    return plan.picked(found)
+
+
 def stream(
     simulation: Simulation,
     plan: Plan,
@@ -229,8 +251,10 @@ def stream(
 ) -> Stream:
     """A sweep that is about to go into a store, which is made, or opened to be gone on with."""
     target, case = store_path(path), simulation.case
-    keep = keep_of(case.sweep.keep if case.sweep else None, sweeps.prepared(simulation.system, plan))
-    chunks = ChunkRuns(simulation, plan, keep, changes)
+    section = case.sweep or SweepSection()
+    keep = keep_of(section.keep, sweeps.prepared(simulation.system, plan))
+    checked = plan.size if section.checked == ALL else int(section.checked)
+    chunks = ChunkRuns(simulation, plan, keep, changes, checked)
     job = Job(
         case.name,
         case.text,
@@ -261,8 +285,9 @@ def _layout(chunks: ChunkRuns, job: Job) -> Layout:
     for name, q in keeping.series(system, keep).items():
         attributes = Column(name, (), None, q.unit, q.long_name).attributes
         variables[name] = StoredArray("float64", (*runs, "time"), attributes)
+    more, beside = checked_arrays(plan.size, chunks.checked)
     at_once = RUNS_OF_A_CHUNK if chunks.arrays else OF_A_SLOW_ONE
-    return Layout(sizes, runs, variables, coordinates, _attributes(chunks, job), at_once)
+    return Layout(sizes | more, runs, variables, beside, coordinates, _attributes(chunks, job), at_once)
 
 
 def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
@@ -278,6 +303,7 @@ def _attributes(chunks: ChunkRuns, job: Job) -> dict[str, Any]:
         "changes": job.changes,
         "run": json.dumps({**asdict(chunks.run), "times": list(chunks.run.times)}),
         "runs": chunks.plan.size,
+        "check": chunks.checked,
         "regime": chunks.model.system.regime,
         "reasons": chunks.one_by_one.reasons,
         "versions": versions(),

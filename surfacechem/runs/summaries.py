@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from surfacechem.results.solution import Solution
     from surfacechem.results.store import Store
     from surfacechem.runs.check import Group
+    from surfacechem.runs.checking import Checked
     from surfacechem.runs.points import PointResults
     from surfacechem.runs.streaming import Stream
     from surfacechem.runs.sweeps import SweepSolution
@@ -247,7 +248,7 @@ def _state_rows(system: System) -> list[tuple[str, ...]]:
     return rows
 
 
-def store_summary(stream: Stream, store: Store) -> tuple[str, str]:
+def store_summary(stream: Stream, store: Store, checked: Checked | None) -> tuple[str, str]:
     """How a sweep ended that went into a store, in a word; and what it was and how its runs ended, in words."""
     from surfacechem.runs.keeping import STATUSES
     from surfacechem.runs.sweeps import parameter_names
@@ -264,7 +265,11 @@ def store_summary(stream: Stream, store: Store) -> tuple[str, str]:
     lines.append(labelled("swept", swept_in_words(chunks.plan, names)))
     lines.append(labelled("solved", _solved(chunks.model.system, chunks.run)))
     lines.append(labelled("ended", f"{ends.sum()} of {chunks.plan.size} runs: {counted}"))
-    lines.append(labelled("balances", f"energy {worst:.1e} at worst"))
+    if checked is not None:
+        unknown = f"; unknown in {checked.unknown}" if checked.unknown else ""
+        lines.append(labelled("error", f"{checked.error:.2g} of {checked.count} runs ({checked.source}){unknown}"))
+    destroyed = f"; ENTROPY DESTROYED in {checked.destroys} runs" if checked and checked.destroys else ""
+    lines.append(labelled("balances", f"energy {worst:.1e} at worst{destroyed}"))
     lines.append(labelled("written", f"{store.path}, {len(done)} of {layout.chunks} chunks"))
     stopped = ends[STATUSES.index("stopped")] == ends.sum()
     status = "failed" if ends[STATUSES.index("failed")] else "stopped" if stopped else "finished"

@@ -16,7 +16,8 @@ import surfacechem
 from surfacechem.cli.main import app
 from surfacechem.errors import InputError, OutputError
 from surfacechem.results.store import Layout, StoredArray, opened
-from surfacechem.runs import streaming
+from surfacechem.runs import checking, streaming
+from surfacechem.runs.checking import check
 from surfacechem.runs.keeping import STATUSES
 
 pytestmark = pytest.mark.around
@@ -135,7 +136,8 @@ def test_threads_pieces_and_parts_change_no_byte(whole, tmp_path, monkeypatch):
 
 SCRIPT = """
 import sys, time
-from surfacechem.runs import streaming
+from surfacechem.runs import checking, streaming
+from surfacechem.runs.checking import check
 streaming.RUNS_OF_A_CHUNK = 16
 import surfacechem
 from surfacechem.results.store import Store
@@ -241,16 +243,20 @@ def test_a_killed_worker_of_a_cluster_changes_no_byte(whole, tmp_path):
 
 
 def test_chunks_of_a_grid_are_blocks_of_it():
-    layout = Layout({"a": 5, "b": 7, "time": 3}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, [], {}, 16)
+    layout = Layout(
+        {"a": 5, "b": 7, "time": 3}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, {}, [], {}, 16
+    )
     assert (layout.chunk, layout.counts, layout.chunks) == ((2, 7), (3, 1), 3)
     assert np.array_equal(np.concatenate([layout.index(k) for k in range(3)]), np.arange(35))
-    huge = Layout({"a": 2**20, "b": 2**20}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, [], {}, 2**14)
+    huge = Layout(
+        {"a": 2**20, "b": 2**20}, ("a", "b"), {"x": StoredArray("float64", ("a", "b"), {})}, {}, [], {}, 2**14
+    )
     assert huge.region(huge.chunks - 1) == (slice(2**20 - 1, 2**20), slice(2**20 - 2**14, 2**20))
 
 
 def test_commands_write_a_store_and_go_on_with_it(tmp_path):
     path = tmp_path / "o.zarr"
-    given = ["sweep", "exothermic", "--over", f"{K_0}=[100, 200, 300]", "-o", str(path), "--threads", "1"]
+    given = ["sweep", "exothermic", "--over", f"{K_0}=[100, 200, 300]", "-o", str(path)]
     result = CliRunner().invoke(app, [*given, "--part", "1/1"])
     assert result.exit_code == 0, result.output
     assert "3 of 3 runs: 3 finished" in result.output
@@ -261,3 +267,41 @@ def test_commands_write_a_store_and_go_on_with_it(tmp_path):
     data = opened(path)
     assert data["K_0"].values.tolist() == [100, 200, 300]
     assert data["T_max"].attrs["units"] == "K"
+
+
+def test_errors_of_runs_that_are_checked_are_those_of_a_sweep(tmp_path, monkeypatch):
+    over = {"initial.phi": [0.0, 1.2], K_0: {"from": 50, "to": 300, "points": 7}}
+    simulation = case(keep=ENDS, over=over, checked="all")
+    stream = simulation.stream(simulation.plan(), tmp_path / "o.zarr")
+    assert check(stream) is None
+    data = stream.run(1).dataset
+    found = check(stream)
+    swept = case(over={**over, "initial.phi": [0.0]}).sweep()
+    assert np.array_equal(data["checked_run"], np.arange(14))
+    for name in ("error", "energy_error", "entropy_error", "site_error", "destroys_entropy"):
+        assert np.array_equal(data[f"checked_{name}"][:7], swept.dataset[name].values.ravel())
+    assert np.isnan(data["checked_error"][7:]).all()
+    assert (found.error, found.unknown, found.count) == (swept.dataset.attrs["error"], 14, 28)
+    assert found.source == swept.dataset.attrs["error_source"]
+    steps, hardest = data["steps"].values.ravel(), data["hardest_run"].values
+    assert sorted(hardest[hardest >= 0]) == list(range(7))
+    monkeypatch.setattr(checking, "HARDEST", 3)
+    few = checking._hardest(stream)
+    assert sorted(steps[few]) == sorted(np.sort(steps)[-3:])
+
+
+def test_runs_that_failed_are_run_again_alone(tmp_path):
+    path = tmp_path / "o.zarr"
+    given = ["sweep", "exothermic", "--over", f"{K_0}={{from: 0.01, to: 300, points: 8}}", "-q"]
+    sparse = ["--set", "run.max-steps=10", "--set", "sweep.keep={last: [T]}", "-o", str(path)]
+    assert CliRunner().invoke(app, [*given, *sparse]).exit_code == 4
+    failed = opened(path).where(opened(path)["status"] == STATUSES.index("failed"), drop=True)
+    assert 0 < failed.sizes["K_0"] < 8
+    again = ["--set", "sweep.keep={last: [T]}", "-o", str(path), "--only", "failed"]
+    assert CliRunner().invoke(app, [*given, *again]).exit_code == 0
+    data = opened(tmp_path / "o-failed.zarr")
+    assert np.array_equal(data["K_0"], failed["K_0"])
+    alone = surfacechem.load("exothermic").run({K_0: data["K_0"].values[0]}).dataset
+    assert data["T_last"].values[0] == alone["T"].values[-1]
+    assert "no run of it is stopped" in CliRunner().invoke(app, [*given, *again[:-1], "stopped"]).output
+    assert "no runs are called 'faild'" in CliRunner().invoke(app, [*given, *again[:-1], "faild"]).output

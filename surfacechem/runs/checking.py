@@ -1,0 +1,137 @@
+"""Errors of a store: of runs spread evenly over its plan, and of those that took the most steps, each as by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfacechem.errors import InputError
+from surfacechem.format.draws import permuted
+from surfacechem.results.event_table import entropy_destroyed
+from surfacechem.results.store import StoredArray
+from surfacechem.runs.keeping import STATUSES
+
+if TYPE_CHECKING:
+    from surfacechem.runs.streaming import Stream
+
+Index = NDArray[np.int64]
+Array = NDArray[Any]
+
+HARDEST = 100
+"""Runs with the most steps that are checked beside those of the plan."""
+
+AT_ONCE = 200
+"""Runs that are checked together, with all of their steps in memory."""
+
+KEYS = {
+    "run": ("int64", "number of the run in the plan, the last dimension fastest; -1 for none"),
+    "error": ("float64", "largest relative error of the run"),
+    "energy_error": ("float64", "largest energy residual relative to the energy exchanged"),
+    "entropy_error": ("float64", "largest entropy residual relative to what was exchanged"),
+    "site_error": ("float64", "largest residual of the site balances"),
+    "destroys_entropy": ("float64", "1 where a law or a jump does, else 0"),
+}
+"""What is stored of a run that is checked: type and meaning."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found: the worst error that is known, how many are not, and where the errors are from."""
+
+    error: float
+    unknown: int
+    count: int
+    destroys: int
+    """Runs in which a law or a jump destroys entropy."""
+    source: str
+
+
+def checked_arrays(size: int, count: int) -> tuple[dict[str, int], dict[str, StoredArray]]:
+    """Dimensions and arrays of what is checked in a store of so many runs."""
+    sizes = {"checked": min(count, size), "hardest": min(HARDEST, size)} if count else {}
+    arrays = {
+        f"{which}_{key}": StoredArray(kind, (which,), {"units": "1", "long_name": text})
+        for which in sizes
+        for key, (kind, text) in KEYS.items()
+    }
+    return sizes, arrays
+
+
+def check(stream: Stream, threads: int | None = None) -> Checked | None:
+    """Find the errors of the runs that are checked and store them, once every chunk is there; None before."""
+    store, plan = stream.store, stream.chunks.plan
+    sizes = {name: store.layout.sizes[name] for name in ("checked", "hardest") if name in store.layout.sizes}
+    if not sizes or not all((store.marks / str(number)).exists() for number in range(store.layout.chunks)):
+        return None
+    chosen = {"checked": np.sort(permuted(np.arange(sizes["checked"]), plan.size, 0)), "hardest": _hardest(stream)}
+    # Evenly spread by a permutation of the plan, the same for every writer.
+    found: dict[str, Array] = {}
+    sources: list[str] = []
+    for which, index in chosen.items():
+        columns, told = _columns(stream, index, sizes[which], threads)
+        found |= {f"{which}_{key}": values for key, values in columns.items()}
+        sources += told
+    store.write_beside(found)
+
+    def both(key: str) -> Array:
+        return np.concatenate([found[f"{which}_{key}"] for which in chosen])
+
+    errors, destroys = both("error"), np.nansum(both("destroys_entropy"))
+    worst = float(np.fmax.reduce(errors, initial=-np.inf))
+    return Checked(worst, int(np.isnan(errors).sum()), len(errors), int(destroys), "; ".join(dict.fromkeys(sources)))
+
+
+def _columns(stream: Stream, index: Index, size: int, threads: int | None) -> tuple[dict[str, Array], list[str]]:
+    """The arrays of the runs of these numbers, and where the errors are from."""
+    columns, sources = {key: np.full(size, np.nan) for key in KEYS}, []
+    columns["run"] = np.append(index, np.full(size - len(index), -1))
+    for first, part, errors, source in _errors(stream, index, threads):
+        for key, values in errors.items():
+            columns[key][first : first + len(part)] = values
+        sources.append(source)
+    return columns, sources
+
+
+def _hardest(stream: Stream) -> Index:
+    """Numbers of the runs with the most steps that have not failed, in their order."""
+    steps, numbers = np.empty(0, np.int64), np.empty(0, np.int64)
+    for number in range(stream.store.layout.chunks):
+        taken, status = stream.store.read("steps", number), stream.store.read("status", number)
+        went = status < STATUSES.index("failed")
+        steps, numbers = (
+            np.concatenate([steps, taken[went]]),
+            np.concatenate([numbers, stream.store.layout.index(number)[went]]),
+        )
+        # Of equally many steps the first of the plan, so that the choice depends on nothing else.
+        best = np.lexsort((numbers, -steps))[:HARDEST]
+        steps, numbers = steps[best], numbers[best]
+    return np.sort(numbers)
+
+
+def _errors(stream: Stream, index: Index, threads: int | None) -> Iterator[tuple[int, Index, dict[str, Any], str]]:
+    """Errors and balances of runs by themselves, some at a time; nothing of one that is not admissible."""
+    chunks = stream.chunks
+    for first in range(0, len(index), AT_ONCE):
+        part = index[first : first + AT_ONCE]
+        try:
+            done = chunks.simulation.sweep_plan(chunks.plan.picked(part), chunks.changes, threads)
+        except InputError:
+            # One of them is refused: each alone, so that the others have an error.
+            if len(part) > 1:
+                for k, one in enumerate(part.tolist()):
+                    for _, single, errors, source in _errors(stream, np.array([one]), threads):
+                        yield first + k, single, errors, source
+            continue
+        assert done.accuracy is not None
+        values: dict[str, Any] = {"error": done.accuracy.errors}
+        for balance in ("energy", "entropy", "site"):
+            values[f"{balance}_error"] = [getattr(books, f"{balance}_error") for books in done.audits]
+        values["destroys_entropy"] = [
+            books.destroys or entropy_destroyed(run.jumps) > 0
+            for books, run in zip(done.audits, done.runs, strict=True)
+        ]
+        yield first, part, values, done.accuracy.source
