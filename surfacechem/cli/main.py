@@ -360,6 +360,33 @@ def figures(
 
 
 @app.command(epilog=EXIT_CODES)
+def report(
+    source: Annotated[
+        str, Argument(metavar="FILE.nc|CASE", help="A dataset of a run or a sweep, or a case to run first.")
+    ],
+    output: Annotated[Path | None, written_to("HTML file; <name>.html if not given.")] = None,
+    changes: Changes = None,
+) -> None:
+    """Write one page about a run or a sweep that needs no network: scene, equations, figures, events, balances."""
+    from surfacechem.results.netcdf import SUFFIXES
+    from surfacechem.runs.simulation import load
+    from surfacechem.studies import run_report
+
+    is_file = source.endswith(SUFFIXES)
+    if is_file and changes:
+        raise InputError("a dataset is reported as it is; give a case to change values of.", Place(path="--set"))
+    target = output or Path(f"{Path(source).stem}.html")
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"a report is HTML: give {target.with_suffix('.html').name}.", Place(path=str(target)))
+    refuse_unwritable(target)
+    solution = None if is_file else solved(load(source, changes or ()).run, quiet=False, brief=True)
+    run_report.write(solution.dataset if solution else source, target)
+    typer.echo(str(target))
+    if solution:
+        leave_with(solution.status, solution.reason)
+
+
+@app.command(epilog=EXIT_CODES)
 def rerun(
     file: Annotated[Path, Argument(metavar="FILE.nc", help="A dataset that a run has written.")],
     output: Annotated[Path | None, written_to("Write the new dataset here.")] = None,

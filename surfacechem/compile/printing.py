@@ -20,6 +20,7 @@ import symengine
 import sympy  # type: ignore[import-untyped]
 from sympy.core.parameters import distribute  # type: ignore[import-untyped]
 from sympy.printing.latex import LatexPrinter  # type: ignore[import-untyped]
+from sympy.printing.mathml import MathMLPresentationPrinter  # type: ignore[import-untyped]
 from sympy.printing.printer import Printer  # type: ignore[import-untyped]
 from sympy.printing.pycode import PythonCodePrinter  # type: ignore[import-untyped]
 
@@ -386,3 +387,45 @@ SPECIAL: Mapping[int, str] = {ord(c): f"\\{c}" for c in "_%&#$"}
 def _latex_row(printer: _Latex, left: str, right: Expression, text: str, in_unit: str) -> str:
     note = text.translate(SPECIAL) + (f" $[{unit(in_unit)}]$" if in_unit else "")
     return rf"  {left} &= {printer.text(right)} && \text{{{note}}}"
+
+
+class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
+    def _print_Symbol(self, symbol: Any, style: str = "plain") -> Any:
+        rate = re.fullmatch(r"d(\w+)_dt", str(symbol))
+        if rate is None:
+            return super()._print_Symbol(symbol, style)
+        over, dot = self.dom.createElement("mover"), self.dom.createElement("mo")
+        dot.appendChild(self.dom.createTextNode("\u02d9"))
+        over.appendChild(self._print(sympy.Symbol(rate[1])))
+        over.appendChild(dot)
+        return over
+
+    def _print_Piecewise(self, expression: Any) -> Any:
+        """Cases under a brace, which SymPy prints for LaTeX only."""
+        whole, brace, table = (self.dom.createElement(tag) for tag in ("mrow", "mo", "mtable"))
+        brace.appendChild(self.dom.createTextNode("{"))
+        for value, condition in expression.args:
+            word, row = self.dom.createElement("mtext"), self.dom.createElement("mtr")
+            word.appendChild(self.dom.createTextNode("otherwise" if condition is sympy.true else "for\u00a0"))
+            cells = [[self._print(value)], [word] if condition is sympy.true else [word, self._print(condition)]]
+            for cell in cells:
+                held = self.dom.createElement("mtd")
+                for part in cell:
+                    held.appendChild(part)
+                row.appendChild(held)
+            table.appendChild(row)
+        whole.appendChild(brace)
+        whole.appendChild(table)
+        return whole
+
+
+def mathml(name: str, expression: Expression) -> str:
+    """An equation as MathML, which browsers show without scripts; piecewise terms of its conditions stand below."""
+    whole, terms = _apart(expression)
+    # Short names for what stands below.
+    short = {symengine.Symbol(long): symengine.Symbol(f"c_{k}") for k, long in enumerate(terms)}
+    printer = _MathML({"mul_symbol": "dot"})
+    left = "<mn>0</mn>" if name == "0" else printer.doprint(sympy.Symbol(name))
+    right = printer.doprint(_sympy(whole.xreplace(short)))
+    equation = f'<math display="block"><mrow>{left}<mo>=</mo>{right}</mrow></math>'
+    return equation + "".join(mathml(str(x), terms[str(long)]) for long, x in short.items())

@@ -65,6 +65,12 @@ class PageSection(NamedTuple):
     tables: Sequence[PageTable] = ()
     figure: bool = False
     details: bool = False
+    drawings: Sequence[Callable[[], Figure]] = ()
+    """Figures of this section alone, each with its words as the first paragraph says them."""
+    formulas: Sequence[tuple[str, str]] = ()
+    """Formulas as MathML, which browsers show without scripts, each with what it is."""
+    code: str = ""
+    """Text that is shown as it is, of a case for instance."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,7 @@ class Page:
         parts = [self.title]
         for section in self.sections:
             lines = [section.title, *(f"  {line}" for line in section.paragraphs)]
+            lines += [f"  {line}" for line in section.code.splitlines()]
             for table in section.tables:
                 lines += [table.caption] if table.caption else []
                 lines += [f"  {line}" for line in columns([table.heading, *table.rows])]
@@ -98,11 +105,15 @@ class Page:
         loader = FileSystemLoader(Path(__file__).parent)
         template = Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("page.html")
         figure = inline_svg(self.draw()) if self.draw else ""
-        return template.render(page=self, figure=figure, machine=machine())
+        drawn = [
+            [inline_svg(draw(), f"s{i}f{k}-") for k, draw in enumerate(section.drawings)]
+            for i, section in enumerate(self.sections)
+        ]
+        return template.render(page=self, figure=figure, drawn=drawn, machine=machine())
 
 
-def inline_svg(figure: Figure) -> str:
-    """A figure as an SVG element of a page."""
+def inline_svg(figure: Figure, prefix: str = "f0-") -> str:
+    """A figure as an SVG element of a page, whose names begin with a prefix of their own."""
     from surfacechem import plots
 
     buffer = StringIO()
@@ -110,7 +121,7 @@ def inline_svg(figure: Figure) -> str:
     text = buffer.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Names of the figure must differ from those of the page.
-    return re.sub(r'(\bid="|url\(#|href="#)', r"\g<1>f0-", text)
+    return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}", text)
 
 
 @cache

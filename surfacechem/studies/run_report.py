@@ -1,0 +1,139 @@
+"""A run or a sweep as one page: the scene in words and as a drawing, equations, figures, events, balances, a rerun.
+
+All of it is from the dataset; the scene is read from the case that it keeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from surfacechem import format as cases
+from surfacechem.compile import printing
+from surfacechem.errors import InputError
+from surfacechem.model.system import System
+from surfacechem.plots import drawing, figure, opened
+from surfacechem.results import spatial
+from surfacechem.results.netcdf import replacing
+from surfacechem.runs.check import laws_of
+from surfacechem.runs.listing import formulas, source
+from surfacechem.runs.simulation import Simulation
+from surfacechem.runs.summaries import REGIMES, duration
+from surfacechem.studies.report import Page, PageSection, PageTable
+
+if TYPE_CHECKING:
+    import xarray
+
+MOST_EVENTS = 100
+"""Events that a page lists."""
+
+QUICK = 1.0
+"""Run time [s] up to which a page runs a case again at looser tolerances."""
+
+TOLERANCES = tuple(10.0**-digits for digits in (4, 6, 8, 10))
+
+
+def page(data: xarray.Dataset | str | Path) -> Page:
+    """The report of a dataset of a run or a sweep, or of its file."""
+    dataset = opened(data)
+    if "case" not in dataset.attrs or "status" not in dataset.attrs:
+        raise InputError("is no dataset of a run or of a sweep.")
+    command = f"surfacechem rerun {Path(data).name}" if isinstance(data, str | Path) else "surfacechem rerun RUN.nc"
+    attributes, omissions = dataset.attrs, []
+    sections = [PageSection("What happened", [_ending(attributes), *_warnings(attributes)], figure=True)]
+    try:
+        case = cases.load_text(attributes["case"], mechanism_text=attributes.get("mechanism"))
+        sections += [*_scene(case), *_events(dataset), _balances(attributes), *_precision(case, attributes)]
+    except InputError as error:  # code that the dataset carries is not run to draw it
+        sections += [*_events(dataset), _balances(attributes)]
+        omissions.append(f"The scene and its equations: {error.message}")
+    again = "The dataset holds the case, the mechanism and the settings of the run."
+    sections.append(PageSection("How to run it again", [again, f"$ {command}"], code=attributes["case"], details=True))
+    return Page(attributes.get("title", "untitled"), command, sections, omissions, lambda: figure(dataset))
+
+
+def write(data: xarray.Dataset | str | Path, path: str | Path) -> Path:
+    """Save the report of a dataset as one HTML file, whole or not at all."""
+    text = page(data).html()
+    with replacing(Path(path)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def _ending(attributes: Any) -> str:
+    """How it ended, how accurate and how fast it was."""
+    text = f"{attributes['status']}: {attributes['reason']}; {attributes['solver']} at rtol {attributes['rtol']:g}."
+    if "error" in attributes:
+        text += f" Error {attributes['error']:.2g} ({attributes['error_source']})."
+    return f"{text} Run time {duration(attributes['run_seconds'])}, {attributes['count_steps']} steps."
+
+
+def _warnings(attributes: Any) -> list[str]:
+    warnings = attributes.get("warnings", "none")
+    return [] if warnings == "none" else [f"Warning: {text}." for text in warnings.split("; ")]
+
+
+def _scene(case: cases.Case) -> Iterator[PageSection]:
+    """The scene in words, as a drawing, and as equations."""
+    system = case.system()
+    regime = f"{system.regime}: {REGIMES.get(system.regime, '')}"
+    rows = [(role.variable, role.role, role.by) for role in system.roles if role.role != "internal"]
+    kinds = [(law, type(law)) for law in laws_of(case.scene)]
+    stated = [(law.contract, law.title, "; ".join(formulas(kind)), source(kind)) for law, kind in kinds]
+    tables = [
+        PageTable(("variable", "role", "by"), rows, "Variables"),
+        PageTable(("contract", "law", "formula", "source"), stated, "Laws"),
+    ]
+    words = [text for text in (case.description, case.source and f"Source: {case.source}", regime) if text]
+    yield PageSection("The scene", words, tables, drawings=[lambda: drawing.figure(case.scene)])
+    if spatial.divided(case.scene):  # equations of many cells read alike
+        system = replace(case, scene=spatial.few(case.scene)).system()
+    numbers = [(p.path, f"{p.at(0.0):.6g}", p.spec.unit, p.spec.text) for p in system.parameters if p.changeable]
+    table = PageTable(("parameter", "value", "unit", "meaning"), numbers, "Numbers")
+    yield PageSection("Equations", tables=[table], formulas=_formulas(system), details=True)
+
+
+def _formulas(system: System) -> list[tuple[str, str]]:
+    """The balances, and the named quantities that they read, as MathML."""
+    wanted = printing.needed(system.named, system.rows.values())
+    found = [(printing.mathml(i.name, i.expression), f"{i.quantity.long_name} [{i.quantity.unit}]") for i in wanted]
+    return found + [(printing.mathml("0", row), f"balance of {name}") for name, row in system.rows.items()]
+
+
+def _events(dataset: xarray.Dataset) -> list[PageSection]:
+    """The events of a run with their verdicts."""
+    if "event_time" not in dataset or dataset["event_time"].ndim != 1:
+        return []
+    names = [name for name in ("event_name", "event_reason", "event_verdict") if name in dataset]
+    columns = [dataset[name].values.tolist() for name in names]
+    times = [f"{t:.9g}" for t in dataset["event_time"].values.tolist()]
+    rows = [*zip(times, *columns, strict=True)]
+    heading = ("time [s]", *(name.removeprefix("event_") for name in names))
+    more = [f"{len(rows) - MOST_EVENTS} more are in the dataset."] if len(rows) > MOST_EVENTS else []
+    return [PageSection("Events", more, [PageTable(heading, rows[:MOST_EVENTS])])]
+
+
+def _balances(attributes: Any) -> PageSection:
+    """How well the balances close."""
+    rows = [(name, f"{attributes[f'{name}_error']:.2g}") for name in ("energy", "entropy", "site")]
+    destroyed = attributes.get("entropy_violations", "none")
+    rows.append(("laws that destroy entropy", destroyed))
+    return PageSection("Balances", tables=[PageTable(("balance", "largest residual, relative"), rows)])
+
+
+def _precision(case: cases.Case, attributes: Any) -> Iterator[PageSection]:
+    """Error against run time: the case again at looser tolerances, where that takes little."""
+    # What the numbers of the dataset are of is the case itself, or they are not to be compared with.
+    if "sweep" in attributes or "departures" in attributes or attributes["run_seconds"] > QUICK:
+        return
+    simulation, rows = Simulation(case), []
+    for rtol in (*(tolerance for tolerance in TOLERANCES if tolerance > case.run.rtol), case.run.rtol):
+        solution = simulation.run(run=replace(case.run, rtol=rtol, solver=attributes["solver"], accuracy=None))
+        error = f"{solution.accuracy.error:.1e}" if solution.accuracy else ""
+        steps = f"{solution.attributes['count_steps']}"
+        rows.append((f"{rtol:g}", error, duration(solution.trajectory.seconds), steps))
+    heading = ("relative tolerance", "error", "run time", "steps")
+    table = PageTable(heading, rows, f"error: {attributes.get('error_source', 'unknown')}")
+    yield PageSection("Error against run time", tables=[table])

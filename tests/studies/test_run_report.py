@@ -1,0 +1,76 @@
+"""The page about a run: all in one file, within a phone's width in a real browser, and without code that it carries."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+import surfacechem
+from surfacechem.errors import InputError
+from surfacechem.studies import run_report
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PHONE = 390
+LARGEST = 1_000_000
+MEASURE = """<!DOCTYPE html><iframe id=f style="width:%dpx;height:900px;border:0"></iframe><pre id=o></pre><script>
+const f = document.getElementById("f");
+f.onload = () => {
+  const beyond = [];
+  for (const e of f.contentDocument.body.querySelectorAll("*")) {
+    const inner = e.closest("table,pre,.formula,svg");  // what scrolls or scales by itself
+    if ((!inner || inner === e) && e.getBoundingClientRect().right > %d + 0.5) beyond.push(e.tagName);
+  }
+  const d = f.contentDocument.documentElement;
+  document.getElementById("o").textContent = JSON.stringify([d.scrollWidth, d.scrollHeight, beyond]);
+};
+f.srcdoc = %s;
+</script>"""
+PARTS = ["What happened", "The scene", "Equations", "Balances", "How to run it again", "Machine and versions"]
+
+
+@pytest.fixture(scope="module", params=["stick-slip", "force-spectroscopy"])
+def report(request, tmp_path_factory):
+    simulation = surfacechem.load(request.param)
+    swept = simulation.case.sweep is not None
+    solution = simulation.sweep({"interface.bonding.bell.k_off": [1, 2]}) if swept else simulation.run()
+    return run_report.write(solution.dataset, tmp_path_factory.mktemp("report") / "report.html")
+
+
+def test_a_report_is_one_file_without_scripts_or_network(report):
+    text = report.read_text(encoding="utf-8")
+    assert len(text.encode()) < LARGEST
+    assert not re.search(r"<script|<link|@import|src=|href=[\"']http", text)
+    assert [part for part in PARTS if f"<h2>{part}</h2>" not in text] == []
+    assert text.count("<svg") == 2
+    names = re.findall(r'\bid="([^"]+)"', text)
+    assert len(names) == len(set(names))
+
+
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_nothing_overflows_on_a_phone_or_in_print(report, tmp_path):
+    page = tmp_path / "measure.html"
+    source = json.dumps(report.read_text(encoding="utf-8")).replace("</", "<\\/")
+    page.write_text(MEASURE % (PHONE, PHONE, source), encoding="utf-8")
+    browser = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
+    shot, print_out = tmp_path / "shot.png", tmp_path / "print.pdf"
+    waiting = [*browser, "--virtual-time-budget=5000"]
+    done = subprocess.run([*waiting, "--dump-dom", str(page)], capture_output=True, text=True, check=True, timeout=120)
+    width, height, beyond = json.loads(re.search(r'<pre id="o">(.*?)</pre>', done.stdout)[1])
+    assert width <= PHONE
+    assert height > 900
+    assert beyond == []
+    for option in (f"--screenshot={shot}", f"--print-to-pdf={print_out}"):
+        subprocess.run([*waiting, option, str(report)], capture_output=True, check=True, timeout=120)
+    assert shot.read_bytes().startswith(b"\x89PNG")
+    assert print_out.read_bytes().startswith(b"%PDF")
+
+
+def test_a_report_of_events_lists_them_with_verdicts():
+    dataset = surfacechem.run("stick-slip").dataset
+    text = run_report.page(dataset).text()
+    assert text.count("slip forward") == 6
+    assert "Error against run time" in text
+    with pytest.raises(InputError, match="is no dataset of a run or of a sweep"):
+        run_report.page(dataset.drop_attrs())
